@@ -177,8 +177,8 @@ def test_what_a_sensor_ends_goes_on_in_its_steps(error):
         return swinging().sensor("watch", read)
 
     with pytest.raises((InputError, KeyboardInterrupt)) as caught:
-        watched(0.1).integrate(0.2, "auto", rtol=1e-4, check=False)
+        watched(0.1).integrate(0.2, "auto", rtol=1e-4)
     begun = caught.value.state
     assert np.array_equal(begun.sensors["watch"], begun.t)
-    rest = watched(1.0).integrate(0.2, "auto", rtol=1e-4, check=False, start=begun.state(-1))
+    rest = watched(1.0).integrate(0.2, "auto", rtol=1e-4, start=begun.state(-1))
     assert rest.t[1] - rest.t[0] > 0.1 * (begun.t[-2] - begun.t[-3])

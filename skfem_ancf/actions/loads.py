@@ -7,7 +7,6 @@ again for the same scene on other meshes.
 from __future__ import annotations
 
 import re
-import warnings
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
@@ -20,7 +19,7 @@ from skfem.element import DiscreteField
 from ..beam.beam import Beam
 from ..core.errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_function, require_slope, shown,
-                           warnings_as_errors)
+                           warnings_as_errors, warn)
 from ..core.frozen import Sealable, read_only
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.kept import cached_property
@@ -454,10 +453,10 @@ def _warn_of_lever(beam, surfaces, forces):
         size += beam.mesh.height * np.sum(np.hypot(along, across))
     left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
     if left_out > LEVER * kept + ROUND_OFF * size:
-        warnings.warn(
+        warn(
             f"a traction on {beam!r} acts on its axis: it leaves out a moment of {left_out:.3g} by "
             "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or "
-            "give an end its moment by scene.moment", ModelWarning, stacklevel=2)
+            "give an end its moment by scene.moment", ModelWarning)
 
 
 class FormLoad(Load):

@@ -14,7 +14,7 @@ from ..forms import weak as forms
 from ..materials.damping import KelvinVoigt
 from ..elements import ElementBeam, choose_element
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
-                           require_label, require_like, require_names, shown, taught, teaching)
+                           require_label, require_like, require_names, shown)
 from ..mesh.location import Finder
 from ..formulations import get_formulation
 from ..core.frozen import Frozen, read_only
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from ..core.types import Array, Law, Place, Rule
 
 
-@taught
 def reference_coordinates(basis: Basis) -> Array:
     """Coordinates of the stress-free state of a basis of the position field.
 
@@ -98,7 +97,6 @@ def _fields(method):
     return call
 
 
-@teaching
 class Beam(Frozen):
     """A planar beam. It does not change; :meth:`replace` returns a changed copy.
 

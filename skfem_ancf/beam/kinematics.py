@@ -5,7 +5,6 @@ An element names its kind, ``element.kinematics``; what depends on it is asked h
 
 from __future__ import annotations
 
-import warnings
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from .inertia import of_cable, of_sections
 from .kernels import CableKernel, Kernel
 from .kernels.along import CableSections, stretched
-from ..core.errors import InputError, ModelWarning
+from ..core.errors import InputError, ModelWarning, warn
 from ..core.linear import first_order
 from ..formulations.ecm import AXIS
 from ..core.quadrature import gauss
@@ -274,11 +273,10 @@ class Cable(Sections):
             return
         share = 3.0 * section.EI / (GA * float(np.min(mesh.chain_lengths))**2)
         if share > SHEARED:
-            warnings.warn(
+            warn(
                 f"a cable has no shear deformation and ignores GA={GA:g} of {section!r}, which "
                 f"would add {share:.1%} to the deflection of a cantilever of its length: use an "
-                "element with sections, as ElementBeamANCFCubic(2), or leave GA out", ModelWarning,
-                stacklevel=5)
+                "element with sections, as ElementBeamANCFCubic(2), or leave GA out", ModelWarning)
 
     @staticmethod
     def section_rule(element: ElementBeam) -> Rule:

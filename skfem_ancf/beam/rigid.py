@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import (InputError, NameUnknown, require_finite, require_finite_scalar,
-                           require_label, require_names, require_positive, shown, teaching)
+                           require_label, require_names, require_positive, shown)
 from ..core.frozen import Frozen, read_only
 from ..core.linear import angle_of
 from ..mesh.places import as_point
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 NAMES = ("r^1", "r^2", "d^1", "d^2")
 
 
-@teaching
 class RigidBody(Frozen):
     """A rigid body in the plane. It does not change; :meth:`replace` returns a changed copy.
 

@@ -152,10 +152,6 @@ class ModelWarning(UserWarning):
     """The solution is beyond what the law or the mesh is good for."""
 
 
-class AccuracyWarning(UserWarning):
-    """A result is not as exact as was asked for."""
-
-
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a solution: what was found until then is kept.
 

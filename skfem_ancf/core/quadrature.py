@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from .errors import InputError, require_finite, require_integer, shown, taught
+from .errors import InputError, require_finite, require_integer, shown
 from .frozen import Content
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 MAX_POINTS = 1000
 
 
-@taught
 def gauss(n: int) -> Rule:
     """The n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
     x, w = _gauss(require_integer("the number of Gauss points n", n, 1, MAX_POINTS))
@@ -33,7 +32,6 @@ def _gauss(n: int) -> Rule:
     return 0.5 * (x + 1.0), 0.5 * w
 
 
-@taught
 def gauss_lobatto(n: int) -> Array:
     """The n >= 2 Gauss-Lobatto points on [-1, 1], zeros of (1 - x^2) P_{n-1}': antisymmetric."""
     n = require_integer("the number of Gauss-Lobatto points n", n, 2, MAX_POINTS)
@@ -46,7 +44,6 @@ def _lobatto(n: int) -> Array:
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 
-@taught
 def tensor(axis: Rule, section: Rule) -> Rule:
     """The product of a rule along the axis and one across the section.
 
@@ -86,7 +83,6 @@ def _rule(name: str, rule: Any) -> Rule:
     return x, require_finite(f"the weights of {name}", rule[1], x.shape)
 
 
-@taught
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     """The Lagrange polynomials of nodes, at points.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import ask_array, ask_number, require_finite, require_function, taught
+from .errors import ask_array, ask_number, require_finite, require_function
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 FEW = 8  # times up to which a function is asked one by one
 
 
-@taught
 def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "function",
            shape: tuple[int, ...] | None = None) -> Array:
     """A function of one time at each of several times.

@@ -15,7 +15,6 @@ SCHEMES = {cls.name: cls for cls in (EnergyMomentum, EnergyMomentum4, Generalize
                                     Newmark, Gauss, Radau)}
 
 
-@taught
 def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
     """A :class:`Scheme` from its name, its class or itself.
 

@@ -6,7 +6,6 @@ import hashlib
 import json
 import logging
 import time
-import warnings
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from ..core import archive
 from ..core.archive import find_h5py
 from ..core.archive import write as _write
 from ..core.errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
-                           require_path, shown)
+                           require_path, shown, warn)
 from ..actions.forces.system import Forces
 from .base import Motion, recalled
 from .gauss import Gauss
@@ -396,9 +395,8 @@ class Checkpoint:
             self._write()
         except OSError as error:
             self._steps, self._clock = run.steps, time.monotonic()
-            warnings.warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
-                          f"{run.y.t:.6g}, the last good one stays: {error}", CheckpointWarning,
-                          stacklevel=4)
+            warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
+                          f"{run.y.t:.6g}, the last good one stays: {error}", CheckpointWarning)
         self._took = time.monotonic() - before
 
 

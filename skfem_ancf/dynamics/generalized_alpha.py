@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..core.errors import InputError, require_finite_scalar, taught
+from ..core.errors import InputError, require_finite_scalar
 from .base import Scheme
 
 if TYPE_CHECKING:
@@ -37,7 +37,6 @@ class GeneralizedAlpha(Scheme):
 
     name = "generalized-alpha"
 
-    @taught
     def __init__(self, rho_inf: float = 0.9) -> None:
         rho = require_finite_scalar("rho_inf", rho_inf)
         if not 0.0 <= rho <= 1.0:
@@ -80,7 +79,6 @@ class HHT(GeneralizedAlpha):
 
     name = "hht"
 
-    @taught
     def __init__(self, alpha: float = 0.05) -> None:
         alpha = require_finite_scalar("alpha", alpha)
         if not 0.0 <= alpha <= 1.0 / 3.0:
@@ -104,7 +102,6 @@ class Newmark(GeneralizedAlpha):
 
     name = "newmark"
 
-    @taught
     def __init__(self, beta: float = 0.25, gamma: float = 0.5) -> None:
         self._set(0.0, 0.0)
         self.beta = require_finite_scalar("beta", beta)

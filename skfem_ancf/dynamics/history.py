@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError, require_finite, require_index, require_path, shown, teaching
+from ..core.errors import InputError, require_finite, require_index, require_path, shown
 from ..actions.forces.turns import Turns
 from ..core.kept import cached_property
 from ..beam.points import require_body
@@ -43,7 +43,6 @@ STROBES = 8
 SECTIONS = 2048
 
 
-@teaching
 class History:
     """A motion at its stored instants.
 
@@ -81,11 +80,9 @@ class History:
     iterations, factorizations
         Residuals solved for, and tangents factorised, in all steps.
     error
-        By how far a node or a rigid body is off at the end of a step, the farthest, over the size
-        of the scene, beside the exact motion of the same mesh: estimated, with ``dt="auto"``, by
-        ``integrate(..., check=)``; NaN where steps half as long have failed, None elsewhere.
-    passes
-        How often the motion was taken, in other steps each time; this is the most exact.
+        With ``integrate(..., check=True)`` the largest difference of the position of a node or a
+        rigid body from that of the same motion in steps half as long, over the size of the scene;
+        NaN where these steps have failed. None without a check.
     """
 
     COLUMNS = COLUMNS
@@ -100,6 +97,7 @@ class History:
 
     def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
         self.system, self.scheme, self._run = system, scheme, run
+        self.error: float | None = None
         self._rows: list[Motion] = []  # behind those of the blocks
         self._blocks: list[tuple[Columns, Sequence[Any]]] = []
         self._kept: Any = None
@@ -175,7 +173,6 @@ class History:
         if run.y is not None and self._end() == run.y.t:
             self._kept = run.remember()  # of the last instant: the factors too
         self.steps, self.rejected = run.steps, run.rejected
-        self.error, self.passes = run.error, 1
         self.iterations = run.integrator.iterations
         self.factorizations = run.integrator.factorizations
         self.substeps = run.integrator.substeps
@@ -202,7 +199,6 @@ class History:
         span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self) else ""
         cut = "".join(f", {n} {what}" for n, what in (
             (self.substeps, "substeps"), (self.rejected, "rejected")) if n)
-        cut += f", taken {self.passes} times" if self.passes > 1 else ""
         return (f"<History of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
                 f"{cut}, {self.iterations} iterations, {self.factorizations} factorisations>")
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, Interrupted,
-                           ModelWarning, require_finite_scalar, require_flag, require_function,
-                           require_positive, shown, taught)
+from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
+                           require_finite_scalar, require_flag, require_function,
+                           require_positive, shown, warn)
 from ..core.progress import progress_bar
+from ..solvers.stability import position_weights
 from ..core.switch import expecting
 from ..beam.kinematics import folded
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
-from .budget import ENOUGH
-from .companion import Companion
 from .integrator import Integrator, StepFailed
 from .run import MAX_STEPS, Run, task_of
 
@@ -36,20 +35,14 @@ if TYPE_CHECKING:
 LOOKED = 16
 #: Gigabytes of the joints' matrices, at most.
 LARGEST = 2.0
-#: Coordinates up to which the error of a motion is checked unasked: it is twice as long, or a
-#: little more, and in larger scenes that is a wait.
-CHECKED = 1000
-#: How often a motion is taken at most.
-PASSES = 3
 
 
-@taught
 def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: Array | None = None,
               v: Array | None = None, t_start: float | None = None, t_eval: ArrayLike | None = None,
               tol: float | None = None, rtol: float = 1e-5, progress: bool | None = None,
               start: State | None = None, breakpoints: ArrayLike = (),
               checkpoint: StrPath | None = None, every: int | None = None,
-              until: Callable[[State], float] | None = None, check: bool | None = None,
+              until: Callable[[State], float] | None = None, check: bool = False,
               sensors: Sequence[tuple[str, Sensor]] = ()) -> History:
     """Integrate the equation of motion.
 
@@ -60,8 +53,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     t_end
         Time at the end.
     dt
-        Step size, or "auto": chosen so that at any time the displacement of no point is off by more
-        than about ``rtol`` times the size of the scene, beside the exact motion of the same mesh.
+        Step size, or "auto": chosen by an estimate of the error of each step, see ``rtol``.
         Functions of time are asked ahead at 4097 times between start and end, so that no step
         passes over an event that lasts longer than from one of these to the next; name shorter
         ones by ``breakpoints``.
@@ -79,7 +71,10 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     tol
         Tolerance of the iteration in a step; the scheme's own by default.
     rtol
-        Tolerance of the automatic step size: see ``dt``.
+        Tolerance of the automatic step size, a local one: what a step adds to the error of the
+        displacement of a point is at most about its part of ``rtol`` times the size of the scene,
+        in proportion to the size of the step. The error of the motion is of that order, and
+        more where small errors grow on their way: ``check`` measures it.
     progress
         Show a progress bar: True, False, or None for "if it takes long".
     start
@@ -101,11 +96,9 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         ``history.event`` is its time, None if there was none up to ``t_end``. It is asked after
         each step, so that two changes within one are not seen. Not with ``checkpoint``.
     check
-        With ``dt="auto"``, estimate the error of the motion by another one in steps half as long,
-        choose the steps to come by what it is so far, and take the motion again, at most twice,
-        where it is above ``rtol``: ``history.error``, ``history.passes``. A pass takes 1.6 to 2.7
-        times as long, most where nothing is compiled. None: up to 1000 coordinates, if there are
-        no obstacles, no sampled controllers and no checkpoint, with which it is refused.
+        Integrate once more in steps half as long, with ``dt="auto"`` about half as long:
+        ``history.error`` is the largest difference at the stored instants. That takes three times
+        as long in all. Not with ``checkpoint``.
     sensors
         Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`: those of the scene.
 
@@ -124,11 +117,6 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     SupportError
         If joints repeat or contradict each other, or are open at the start, or supports would move
         the body at once.
-
-    Warns
-    -----
-    AccuracyWarning
-        If the error is above ``rtol`` still, as estimated with ``check``.
     """
     motion = None if start is None else start._motion
     if t_start is None:
@@ -146,18 +134,16 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
             raise InputError("a checkpoint cannot keep the function until(state): leave out "
                              "checkpoint=, or integrate in parts, start=history.state(-1)")
         require_function("until", until, "of a State that returns a number")
-    checked = _checked(check, system, task, checkpoint)
+    if require_flag("check", check) and checkpoint is not None:
+        raise InputError("a checkpoint cannot keep the second motion of check=True: leave out one")
     if u is None and start is not None:
         u = start.u
     velocity = v if motion is None else motion.v
 
-    def begun(budget=None):
-        """The motion at its start."""
+    def begun(task, sensors=(), until=None):
+        """A Run at its start."""
         run = Run(system, scheme, task, sensors)
         run.until = until
-        if checked:
-            run.companion = Companion(system, scheme, task.tol)
-            run.budget = budget or run.budget
         if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
             run.go_on(motion, start._origin[1])
         else:
@@ -167,56 +153,31 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
                       None if motion is None else motion.turns)
         return run
 
-    if checked:
-        return _within(begun, task.rtol, progress)
-    run, file = begun(), None
+    run, file = begun(task, sensors, until), None
     if checkpoint is not None:
         file = Checkpoint(checkpoint, every, run)
         file.begin()
-    return follow(run, file, progress)
-
-
-def _checked(check, system, task, checkpoint):
-    """True if the error of a motion is to be estimated."""
-    if check is None and task.dt is not None:
-        return False
-    found = [text for text, there in (
-        ("obstacles", system.forces.contacts.obstacles), ("a checkpoint", checkpoint is not None),
-        ("controllers that are sampled", system.forces.sampled)) if there]
-    if check is None:
-        return not found and system.N <= CHECKED
-    if require_flag("check", check) and (found or task.dt is not None):
-        raise InputError("check=True estimates the error of motions with dt='auto'"
-                         f"{', not with ' + ' and '.join(found) if found else ''}: leave it out, "
-                         "or compare with a motion in shorter steps")
-    return bool(check)
-
-
-def _within(begun, rtol, progress):
-    """The motion, again in shorter steps while its error is above the tolerance; the most exact.
-
-    The error is in proportion to the share that steps may add (Lang, Verwer: "On global
-    error estimation and control for initial value problems", SIAM Journal on Scientific Computing
-    29 (2007)).
-    """
-    passes, best = 1, _go(begun(), None, progress)
-    while best.history.error > ENOUGH * rtol and passes < PASSES:
-        passes += 1
-        try:
-            body = _go(begun(best.run.budget.again(best.history.error / rtol)), None, progress)
-        except ConvergenceError:  # in shorter steps: what there is stays
-            break
-        if not body.history.error < best.history.error:
-            break
-        best = body
-    history = _ended(best)
-    history.passes = passes
-    if history.error > rtol:
-        warnings.warn(f"the motion is off by about {history.error:.2g} times the size of the "
-                      f"scene, above rtol = {rtol:g}: name the times of jumps and kinks by "
-                      "breakpoints=, take another scheme, or a larger rtol", AccuracyWarning,
-                      stacklevel=8)
+    history = follow(run, file, progress)
+    if check:
+        history.error = _difference(history, begun, task, progress)
     return history
+
+
+def _difference(history, begun, task, progress):
+    """How far a motion is from the same one in steps half as long, over the size of the scene."""
+    system, scheme = history.system, history.scheme
+    fine = replace(task, t_end=history.t[-1], t_eval=history.t,
+                   dt=None if task.dt is None else 0.5 * task.dt,
+                   rtol=task.rtol * 0.5**scheme.order)  # an error per unit of time
+    try:
+        other = _go(begun(fine), None, progress).history
+    except ConvergenceError:
+        return np.nan
+    except Interrupted as stopped:
+        raise Interrupted(str(stopped), history) from None
+    places = np.nonzero(position_weights(system))[0]
+    off = (other.u - history.u)[:, places].reshape(-1, 2)
+    return float(np.hypot(*off.T).max(initial=0.0)) / system.size
 
 
 def _samples(system, t_start, t_end):
@@ -308,10 +269,10 @@ def _ended(body):
     _warn_of_turns(history)
     deep = run.system.forces.contacts.sweep.deep()
     if deep:
-        warnings.warn(deep, ModelWarning, stacklevel=9)
+        warn(deep, ModelWarning)
     with run.system.forces.contacts.lent(contacts_of(run.y)):
         for text in run.system.forces.contacts.sunk(run.y.u, run.y.t):
-            warnings.warn(text, ModelWarning, stacklevel=9)
+            warn(text, ModelWarning)
     return history
 
 
@@ -341,10 +302,10 @@ class _Body:
 
     def warn(self):
         if self.t is not None:
-            warnings.warn(f"the body is turned inside out, at t = {self.t:.6g} or before: it is "
+            warn(f"the body is turned inside out, at t = {self.t:.6g} or before: it is "
                           "compressed or bent beyond what it can bear, and what follows means "
                           "nothing. Use NeoHookean, more elements, a smaller load or shorter steps",
-                          ModelWarning, stacklevel=10)
+                          ModelWarning)
 
 
 def _warn_of_turns(history):
@@ -355,9 +316,9 @@ def _warn_of_turns(history):
         return
     jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]
     if len(jumps):
-        warnings.warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "
+        warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "
                       "than half a turn: its angle is taken in (-pi, pi], so that its moment "
-                      "jumps there and the energy is not kept", ModelWarning, stacklevel=10)
+                      "jumps there and the energy is not kept", ModelWarning)
 
 
 __all__ = ["Integrator", "integrate"]

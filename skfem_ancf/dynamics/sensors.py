@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown,
-                           teaching)
+from ..core.errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown)
 from ..recovery.fields import FIELDS, find_field
 from ..core.frozen import Frozen
 from ..actions.joints.base import Joint
@@ -30,7 +29,6 @@ MOVING = ("position", "displacement", "velocity", "acceleration")
 SECTION = ("N", "Q", "M", "force", "curvature", "shear", "angle")
 
 
-@teaching
 class Sensor(Frozen):
     """What is written down at every step.
 

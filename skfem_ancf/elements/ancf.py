@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..core.errors import require_integer, require_option, teaching
+from ..core.errors import require_integer, require_option
 from ..core.frozen import read_only
 from ..core.quadrature import gauss_lobatto
 from .base import ElementBeam, SectionFunctions
@@ -41,7 +41,6 @@ def _section(n: int, points: str) -> tuple[Array, SectionFunctions]:
     return read_only(0.5 * x), SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1)))
 
 
-@teaching
 class ElementBeamANCF(ElementBeam):
     """Beam element with position, axis slope and N section slopes at each node.
 

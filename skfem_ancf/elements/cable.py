@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.errors import teaching
 from ..core.frozen import read_only
 from ..core.kept import cached_property
 from ..core.quadrature import gauss
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from ..core.types import Array
 
 
-@teaching
 class ElementBeamCable(ElementBeam):
     """An axis without a section of its own: ``r`` and its derivatives along X only.
 

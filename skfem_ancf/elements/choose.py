@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..core.errors import InputError, require_like, require_names, require_positive, taught
+from ..core.errors import InputError, require_like, require_names, require_positive
 from .ancf import ElementBeamANCF
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
@@ -21,7 +21,6 @@ ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_x
                   "S_xy": 3}
 
 
-@taught
 def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[str] = (),
                    tolerance: float = 1e-3) -> ElementBeam:
     """The element of lowest order that carries the fields and is accurate enough.

@@ -1,10 +1,8 @@
 """ANCF beam elements whose sections vary cubically along the axis: fourth order."""
 
-from ..core.errors import teaching
 from .hermite import ElementBeamANCFHermite
 
 
-@teaching
 class ElementBeamANCFCubic(ElementBeamANCFHermite):
     """As :class:`ElementBeamANCF`, with Hermite functions along X for the section slopes too.
 

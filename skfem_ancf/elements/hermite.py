@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from ..core.errors import teaching
 from ..core.origin import ours
 from .ancf import ElementBeamANCF
 from .base import DEGREES, require_degree
 
 
-@teaching
 class ElementBeamANCFHermite(ElementBeamANCF):
     """As :class:`ElementBeamANCF`, with Hermite functions of a degree along X for axis and section.
 

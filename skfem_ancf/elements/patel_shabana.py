@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.errors import teaching
 from .base import ElementBeam, SectionFunctions
 
 
-@teaching
 class ElementBeamPatelShabana(ElementBeam):
     """Beam element with ``r``, ``r_X``, ``r_Y`` and the second derivative ``r_YY`` on the axis.
 

@@ -10,8 +10,7 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 from skfem.helpers import dot
 
-from ..core.errors import (InputError, ask_field, require_finite, require_like, require_positive,
-                           taught)
+from ..core.errors import (InputError, ask_field, require_finite, require_like, require_positive)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -87,7 +86,6 @@ def _law(material, k_s):
 # the textbook's forms
 
 
-@taught
 def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) -> Functional:
     """Strain energy ``U(r) = int W(eps) dV``, a ``Functional``.
 
@@ -110,7 +108,6 @@ def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) ->
     return strain_energy
 
 
-@taught
 def textbook_internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
     """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``.
 
@@ -129,7 +126,6 @@ def textbook_internal_force(material: Material, width: float = 1.0, k_s: float =
     return force
 
 
-@taught
 def textbook_tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
     """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``.
 
@@ -241,7 +237,6 @@ def _scattered(K, basis):
 energy = textbook_energy
 
 
-@taught
 def internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
     """Internal force ``int P : grad v dV``, P = F S; a batched ``LinearForm``.
 
@@ -261,7 +256,6 @@ def internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> 
     return force
 
 
-@taught
 def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
     """Tangent ``int grad v : dP/dF : grad u dV``; a batched ``BilinearForm``.
 
@@ -284,7 +278,6 @@ def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> Bilinea
     return stiffness
 
 
-@taught
 def mass(density: float, width: float = 1.0) -> BilinearForm:
     """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion.
 
@@ -304,7 +297,6 @@ def mass(density: float, width: float = 1.0) -> BilinearForm:
     return inertia
 
 
-@taught
 def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
     """Dead load ``int rho g . v dV``, a ``LinearForm``.
 
@@ -333,7 +325,6 @@ def _widths(width):
         width, np.ndarray) else require_positive("width", width)
 
 
-@taught
 def traction(t: ArrayLike | Callable[[Array], Array], width: float | Array = 1.0) -> LinearForm:
     """Dead traction ``int t . v dA`` for a ``FacetBasis``, a ``LinearForm``.
 
@@ -358,7 +349,6 @@ def traction(t: ArrayLike | Callable[[Array], Array], width: float | Array = 1.0
     return surface_load
 
 
-@taught
 def pressure(width: float | Array = 1.0) -> BilinearForm:
     """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
 
@@ -415,7 +405,6 @@ class BeamForms(NamedTuple):
     tangent: BilinearForm
 
 
-@taught
 def of(beam: HasKernel) -> BeamForms:
     """The weak forms of a beam's own formulation, whatever it is.
 

@@ -13,7 +13,6 @@ from .strain_split import StrainSplit
 FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSplit, Assumed)}
 
 
-@taught
 def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formulation:
     """A :class:`Formulation` from its name, its class or itself.
 

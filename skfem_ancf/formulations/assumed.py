@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.linear import stress_of
-from ..core.errors import InputError, require_finite_scalar, require_like, taught
+from ..core.errors import InputError, require_finite_scalar, require_like
 from ..materials import LinearLaw
 from ..core.quadrature import gauss
 from .base import Formulation, Integrated, Term
@@ -65,7 +65,6 @@ class Assumed(Formulation):
 
     name = "assumed"
 
-    @taught
     def __init__(self, alpha: float = 1.0) -> None:
         self.alpha = require_finite_scalar("alpha", alpha)
         if self.alpha < 0.0:

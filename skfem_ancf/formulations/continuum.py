@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..core.errors import require_like, taught
+from ..core.errors import require_like
 from .base import Formulation, Term
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ class Continuum(Formulation):
 
     name = "continuum"
 
-    @taught
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         require_like("material", material, "Material", "law")
         require_like("element", element, "beam element", "strain_degree", "order")

@@ -6,7 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from ..core.errors import require_options, require_path, require_text, teaching
+from ..core.errors import require_options, require_path, require_text
 from ..recovery.fields import find_fields
 from ..actions.obstacles.pictures import obstacles_of
 from ..core.archive import output_file
@@ -24,7 +24,6 @@ logger = logging.getLogger(__name__)
 LISTED = 64
 
 
-@teaching
 class PvdWriter:
     """Writes one .vtu a frame, and a .pvd that lists them with their times.
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.archive import find_h5py, new_file, put_in_place
-from ..core.errors import (FileError, InputError, require_option, require_options, require_path,
-                           teaching)
+from ..core.errors import (FileError, InputError, require_option, require_options, require_path)
 from ..recovery.fields import find_fields
 from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
 from .xml import topology
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 SPARE = 2**22
 
 
-@teaching
 class VtkHdfWriter:
     """Writes a series into one file, in which the cells are stored once.
 

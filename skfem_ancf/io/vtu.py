@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
-                           require_option, require_path, taught)
+                           require_option, require_path)
 from ..recovery.fields import find_fields, values_on_grid
 from ..actions.obstacles.pictures import around, outlines
 from ..recovery.grids import in_space, lagrange_cell, layout, subdivision
@@ -55,7 +55,6 @@ class BodyFields(NamedTuple):
     cell_data: dict
 
 
-@taught
 def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
                 undeformed: bool = False, recover: bool = True, fields: Any = None) -> BodyFields:
     """The body of a state on points.
@@ -144,7 +143,6 @@ def _known(field, values, lenient):
         return np.full(values.n if field.components == 1 else (field.components, values.n), np.nan)
 
 
-@taught
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              lagrange: bool = False, undeformed: bool = False, recover: bool = True,
              fields: Any = None, precision: str = "double",

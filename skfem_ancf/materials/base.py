@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
-                           require_positive, require_slope, shown, taught)
+                           require_positive, require_slope, shown)
 from ..core.frozen import Frozen, rebuilt
 from ..core.kept import cached_property, kept
 from ..core.origin import ours
@@ -78,7 +78,6 @@ class Material(Frozen):
     shear_correction: str | float
     thermal_expansion: float
 
-    @taught
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
         E, nu = _number_or_function("E", E), require_finite_scalar("nu", nu)
@@ -149,7 +148,6 @@ class Material(Frozen):
         """
         return self.nu / (1.0 if self.plane == "stress" else 1.0 - self.nu)
 
-    @taught
     def shear_factor(self, element: HasShear) -> float:
         """The factor k_s on the shear modulus for sections of an element."""
         require_like("element", element, "beam element", "carries_shear_parabola")
@@ -180,7 +178,6 @@ class Material(Frozen):
         return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction",
                                        "thermal_expansion"))
 
-    @taught
     def law(self, k_s: float = 1.0) -> Law:
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)

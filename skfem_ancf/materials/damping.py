@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.errors import InputError, require_finite, require_not_negative, shown, teaching
+from ..core.errors import InputError, require_finite, require_not_negative, shown
 from ..core.frozen import Frozen
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-@teaching
 class KelvinVoigt(Frozen):
     """A material with a stress in proportion to the rate of its strain: a dashpot beside a spring.
 

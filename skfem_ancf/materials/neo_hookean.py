@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.errors import InputError, taught
+from ..core.errors import InputError
 from ..core.source import lanes, primitive, source
 from .text import TextMaterial
 
@@ -127,7 +127,6 @@ class NeoHookean(TextMaterial):
 
     text = staticmethod(neo_hookean)
 
-    @taught
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
         super().__init__(E, nu, density, plane, shear_correction, thermal_expansion)

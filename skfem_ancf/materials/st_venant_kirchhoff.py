@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..core.errors import require_positive, taught
+from ..core.errors import require_positive
 from .base import LinearLaw, Material, hooke
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ class StVenantKirchhoff(Material):
         self._require_number()
         return hooke(self.E, self.nu, self.plane)
 
-    @taught
     def law(self, k_s: float = 1.0) -> Law:
         cls = type(self)
         if any(getattr(cls, name) is not getattr(StVenantKirchhoff, name)

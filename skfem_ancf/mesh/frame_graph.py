@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -15,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..core.errors import (FileError, InputError, MeshError, ModelWarning, NameUnknown, ask,
                            ask_field, require_finite, require_integer, require_label, require_names,
-                           require_not_negative, require_path, shown)
+                           require_not_negative, require_path, shown, warn)
 from .members import Axes, MeshLines, heights_of_chains
 from .mesh_beam import MeshBeam
 from .places import is_point, points_of_rows
@@ -385,8 +384,7 @@ def _warn_of(pairs, apart, what):
     if len(pairs):
         (i, j), d = pairs[0], apart[0]
         more = "" if len(pairs) == 1 else f", {len(pairs) - 1} other pair(s) likewise"
-        warnings.warn(f"the points {i} and {j}, {d:.3g} apart{more}, {what}", ModelWarning,
-                      stacklevel=6)
+        warn(f"the points {i} and {j}, {d:.3g} apart{more}, {what}", ModelWarning)
 
 
 class _Moved:

@@ -16,8 +16,7 @@ from ..core import archive
 from .curve import Curve, check_curvature, derivative_of
 from ..core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask,
                            require_finite, require_finite_scalar, require_function, require_integer,
-                           require_option, require_options, require_path, require_positive, shown,
-                           teaching)
+                           require_option, require_options, require_path, require_positive, shown)
 from .location import Finder
 from ..core.frozen import Frozen, ReadOnlyDict
 from ..core.kept import twin_of
@@ -48,7 +47,6 @@ IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
 MAX_SUBDIVISION = 1000
 
 
-@teaching
 @dataclass(repr=False, eq=False)
 class MeshBeam(Frozen, Mesh2D):
     """A planar beam in its stress-free state, divided into elements along its axis.

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
-                           require_flag, require_integer, require_label, require_text, shown,
-                           teaching)
+                           require_flag, require_integer, require_label, require_text, shown)
 from ..core.kept import cached_property, kept
 from ..core.linear import first_order, step
 from ..beam.kernels.along import stretched
@@ -36,7 +35,6 @@ COMPONENTS = ("xx", "yy", "xy")
 GRIDS = 4
 
 
-@teaching
 @dataclass(frozen=True)
 class Field:
     """A field on the body.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from math import atan, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.errors import ModelWarning
+from ..core.errors import ModelWarning, warn
 from ..beam.distribution import SNAP
 from ..materials import LinearLaw
 
@@ -86,13 +85,13 @@ def check(state: Configuration) -> Checks:
 def warn_of(state: Configuration) -> None:
     """Give a :class:`~skfem_ancf.core.errors.ModelWarning` for each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
-        warnings.warn(text, ModelWarning, stacklevel=4)
+        warn(text, ModelWarning)
     for text in _kinks(state):
-        warnings.warn(text, ModelWarning, stacklevel=4)
+        warn(text, ModelWarning)
     for beam in state.beams:
         u = state.u_of(beam)
         for text in _findings(beam, shortest(beam, u), turning(beam, u)):
-            warnings.warn(f"{text} (state.checks has the numbers)", ModelWarning, stacklevel=4)
+            warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
 
 def _kinks(state):

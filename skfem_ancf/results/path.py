@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import require_index, teaching
+from ..core.errors import require_index
 from .state import State
 
 if TYPE_CHECKING:
@@ -55,7 +55,6 @@ class CriticalPoint:
         return f"<{self.kind} point at load {self.load:.8g}, arc length {self.arc:.6g}>"
 
 
-@teaching
 class Path:
     """The equilibria that a continuation found.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..beam.layout import select_beam, select_member
-from ..core.errors import InputError, NameUnknown, require_flag, shown, teaching
+from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..actions.eigenstrain import EigenStrain
 from ..recovery.fields import Values, find_field
 from ..core.frozen import Frozen
@@ -63,7 +63,6 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-@teaching
 class State(Frozen):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..elements.base import DEGREES
 from ..core.errors import (ConvergenceError, InputError, NameUnknown, require_integer,
-                           require_positive, taught)
+                           require_positive)
 from ..actions.joints.nodes import chain_ends
 from ..core.quadrature import gauss
 
@@ -61,7 +61,6 @@ class Refinement:
     error: float
 
 
-@taught
 def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str = "displacement",
                    max_degree: int = DEGREES[-1], **options: Any) -> State:
     """Solve with higher degrees or on finer meshes until the estimated error is small enough.

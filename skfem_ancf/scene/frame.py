@@ -12,7 +12,7 @@ from ..results.arguments import displacement
 from ..elements import ElementBeamCable
 from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
                            require_integer, require_names, require_option, require_options,
-                           require_positive, shown, teaching)
+                           require_positive, shown)
 from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
@@ -91,7 +91,6 @@ class NodeMoment(EndMoment):
         return float(np.angle(self.direction(u) @ [1.0, 1.0j] / start))
 
 
-@teaching
 class Frame(Scene):
     """A :class:`Scene` of lines between nodes: use :meth:`from_lines` or :meth:`from_meshio`.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from copy import copy
 from functools import wraps
 from itertools import accumulate
@@ -32,7 +31,7 @@ from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass
 from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
                            SupportError, ask_field, require_finite, require_finite_scalar,
                            require_label, require_option, require_options, require_positive, shown,
-                           taught, teaching)
+                           warn)
 from ..actions.joints import Joint, bind_joint, get_joint
 from ..actions.joints.base import both_of, is_ground, members_at, named_place, nearest_of
 from ..actions.joints.prescribed import Turned
@@ -71,8 +70,6 @@ LINEAR_SOLVES, SOLVED_AGAIN, CLOSE = 4, 50000, 1e-13
 
 def _alone(method):
     """One thread at a time: a solution works in the arrays of the scene's system."""
-    method = taught(method)
-
     @wraps(method)
     def locked(self, *args, **kwargs):
         with self._lock:
@@ -91,7 +88,6 @@ class _Things(tuple):
     extend = insert = remove = clear = append
 
 
-@teaching
 class Scene:
     """Beams and rigid bodies with supports and loads.
 
@@ -1517,8 +1513,7 @@ class Scene:
     def _warn(self, state):
         """Say what makes a static solution doubtful."""
         if state.doubt:
-            warnings.warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning,
-                          stacklevel=3)
+            warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
         warn_of(state)
 
     def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
-                           require_function, require_integer, require_positive, shown, taught)
+                           require_function, require_integer, require_positive, shown)
 from ..core.progress import progress_bar
 from ..core.switch import expecting
 from .critical import find_critical
@@ -31,7 +31,6 @@ TURN = 0.03
 SHORTEST = 1e-6
 
 
-@taught
 def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: float | None = None,
                  max_load: float | None = None, until: Callable[[Point], bool] | None = None,
                  tol: float = 1e-8, max_iterations: int = 15, locate: float | None = 1e-8,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..core.band import fix
 from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportError,
-                           require_finite_scalar, require_index, require_integer, teaching)
+                           require_finite_scalar, require_index, require_integer, warn)
 from ..core.linalg import NO_FACTORS
 from ..results.state import State
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
@@ -36,7 +35,6 @@ TURNING = 1e-2  # square of the angular velocity over that of a frequency
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
-@teaching
 @dataclass(repr=False)
 class Modes:
     """Natural frequencies and shapes, the lowest first.
@@ -255,11 +253,11 @@ def _warn_of_turning(state, values, rigid):
     speed = _angular_velocity(state) if np.any(state.v) else 0.0
     values = values[values > max(rigid, TURNING * speed**2)]  # of vibrations
     if values.size and speed**2 > TURNING * values.min():
-        warnings.warn(f"the state turns by {speed:.3g} rad/s, and modes know its stiffness alone: "
+        warn(f"the state turns by {speed:.3g} rad/s, and modes know its stiffness alone: "
                       "centrifugal and Coriolis forces are missing, which change the square of a "
                       "frequency by about the square of that; take the state at rest in a frame "
                       "that turns, with a load of your own (docs/modes.md, What turns)",
-                      ModelWarning, stacklevel=8)
+                      ModelWarning)
 
 
 def _angular_velocity(state):
@@ -521,9 +519,9 @@ def _require_same_springs(system, u):
             "as ropes and one-sided foundations: buckling() knows one stiffness for both. Take "
             "scene.continuation() with a small force to either side, or leave out what comes loose")
     if np.any(np.abs(here - rest) > STIFFER * np.maximum(here, rest)):
-        warnings.warn("springs become stiffer or softer before it buckles, and buckling() knows "
+        warn("springs become stiffer or softer before it buckles, and buckling() knows "
                       "their stiffness without load alone: state.stability of scene.solve_static() "
-                      "tells under which loads it holds", ModelWarning, stacklevel=4)
+                      "tells under which loads it holds", ModelWarning)
 
 
 _FLUTTER = (

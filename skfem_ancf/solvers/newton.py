@@ -10,7 +10,7 @@ import numpy as np
 
 from ..beam.kinematics import folded
 from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite, require_flag,
-                           require_integer, require_option, require_positive, taught)
+                           require_integer, require_option, require_positive)
 from ..core.linalg import INACCURATE, NO_FACTORS
 from ..core.callbacks import handle_of
 from ..core.progress import progress_bar
@@ -219,7 +219,6 @@ class StaticResult:
         return sum(step.iterations for step in self.steps)
 
 
-@taught
 def solve_static(system: System, u: Array | None = None, method: str = "auto", tol: float = 1e-8,
                  max_iterations: int = 30, first_step: float = 1.0, min_step: float = 1e-4,
                  progress: bool | None = None, stable: bool = True,

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..core.archive import Unreadable, read, write
-from ..core.errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown,
-                           teaching)
+from ..core.errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +37,6 @@ class Failure(NamedTuple):
     error: str
 
 
-@teaching
 class Sweep:
     """What :func:`skfem_ancf.sweep` has found, in the order of the parameters.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import time
-import warnings
 from collections.abc import Mapping
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import numpy as np
 
 from ..core.errors import (CallbackError, CallError, CheckpointWarning, FileError, InputError,
                            Interrupted, NameUnknown, SweepWarning, require_function,
-                           require_integer, require_path, shown, taught)
+                           require_integer, require_path, shown, warn)
 from .members import Sweep, column_of, require_plain
 from ..core.progress import progress_bar
 from .probes import Probes, measured
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 _SECONDS, _RARER = 2.0, 20.0
 
 
-@taught
 def sweep(build: Callable[..., Any],
           parameters: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]],
           measure: Callable[[Any], Any] | tuple[Any, ...] | dict[str, Any],
@@ -191,8 +189,8 @@ class _Record:
             try:
                 result.save(self.path)
             except FileError as error:
-                warnings.warn(f"the results are not in the file, the sweep goes on: {error}",
-                              CheckpointWarning, stacklevel=5)
+                warn(f"the results are not in the file, the sweep goes on: {error}",
+                              CheckpointWarning)
         return result
 
     def stopped(self):
@@ -301,5 +299,5 @@ def _judged(result):
                 f"{failures[0].parameters}: {failures[0].error}")
         if len(failures) == len(result):
             raise CallbackError(text)
-        warnings.warn(f"{text}; all are in .failures", SweepWarning, stacklevel=4)
+        warn(f"{text}; all are in .failures", SweepWarning)
     return result

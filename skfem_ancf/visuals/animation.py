@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
                            require_like, require_option, require_path, require_positive,
-                           require_text, taught)
+                           require_text)
 from ..core.archive import output_file
 from .matplotlib import colormap, figure_class, triangulation
 from .pyvista import dressed, lines_of, new_plotter, pixels
@@ -34,7 +34,6 @@ FRAMES = 100
 LARGEST = 4096
 
 
-@taught
 def animate(history: Instants, filename: StrPath, field: Any = "eps_yy", *,
             frames: int | None = None, fps: float | None = None, backend: str | None = None,
             thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,

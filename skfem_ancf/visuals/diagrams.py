@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..beam.layout import select_beam
-from ..core.errors import InputError, require_flag, require_like, taught
+from ..core.errors import InputError, require_flag, require_like
 from .matplotlib import figure_class, page, plain, save
 from .scenery import INK, MUTED
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
 
 
-@taught
 def plot_resultants(state: Configuration, beam: WhichBeam = None, axes: Any = None, *,
                     title: str | None = None, recover: bool = True,
                     filename: StrPath | None = None, dpi: float = 150) -> Any:

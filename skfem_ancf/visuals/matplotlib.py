@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
-                           require_option, require_path, require_positive, require_text, taught)
+                           require_option, require_path, require_positive, require_text)
 from ..core.archive import output_file
 from ..actions.obstacles.pictures import AROUND, around, outlines
 from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery, cells_of
@@ -27,7 +27,6 @@ _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max"
            (True, True): "both"}
 
 
-@taught
 def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
                thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
                cmap: Any = None, limits: tuple[float, float] | None = None,
@@ -181,7 +180,6 @@ def _figsize(points, colorbar):
     return w + (1.2 if colorbar else 0.3), max(1.6, w * aspect) + 0.9
 
 
-@taught
 def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
               ax: Any = None, *, title: str | None = None, filename: StrPath | None = None,
               dpi: float = 200) -> Any:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
-                           require_like, require_options, require_path, require_text, shown, taught,
-                           teaching)
+                           require_like, require_options, require_path, require_text, shown)
 from ..recovery.fields import FIELDS, find_fields, values_on_grid
 from ..core.archive import output_file
 from ..recovery.grids import in_space, lagrange_cell, layout, subdivision
@@ -134,7 +133,6 @@ class _RigidGrid:
         made.Modified()
 
 
-@teaching
 class Series:
     """A motion for pyvista: one mesh whose points and fields are those of any instant.
 
@@ -208,7 +206,6 @@ def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False
     return mesh, update
 
 
-@taught
 def to_pyvista(state: Configuration, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Any:
     """The body of a state as a grid of pyvista.
@@ -304,7 +301,6 @@ def _look(plotter, scenery):
     plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
 
 
-@taught
 def view(state: Configuration, field: Any = "eps_yy", plotter: Any = None, *,
          thickness: Any = "auto", undeformed: bool = True, cmap: Any = None, limits: Any = None,
          unit: str | None = None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.errors import (InputError, ask_array, ask_number, require_function, require_option,
-                            require_positive, shown, teaching)
+                            require_positive, shown)
 from ..joints.base import is_ground, named_place, section
 from ...mesh.places import is_point
 from ...beam.rigid import RigidBody
@@ -55,7 +55,6 @@ class MeasuredSection(NamedTuple):
     rate: float
 
 
-@teaching
 class Control(ForceElement):
     """A force on a point, or a moment on a section, as a function of time and measurements.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...beam.layout import select_beam
-from ...core.errors import require_flag, require_not_negative, teaching
+from ...core.errors import require_flag, require_not_negative
 from ...beam.kernels.section import beam_gradients
 from ...core.quadrature import gauss
 from ...beam.distribution import AXIS, Facets
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ...beam.layout import WhichBeam
 
 
-@teaching
 class Foundation(ForceElement):
     """Winkler's foundation: springs along the normal of a side, as it was in the stress-free state.
 
@@ -72,7 +71,6 @@ class Foundation(ForceElement):
         return f"<Foundation {self.k:g} at {self.side!r}>"
 
 
-@teaching
 class Drag(ForceElement):
     """A force per length of the axis against its velocity v, quadratic in it.
 

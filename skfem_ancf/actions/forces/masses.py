@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.errors import InputError, require_finite, require_not_negative, shown, teaching
+from ...core.errors import InputError, require_finite, require_not_negative, shown
 from ..joints.base import point, section
 from .base import ForceElement, Link, Part, link
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ...beam.layout import WhichBeam
 
 
-@teaching
 class PointMass(ForceElement):
     """A mass on a material point, perhaps with a moment of inertia about it.
 

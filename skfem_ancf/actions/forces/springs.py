@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown, teaching
+from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown
 from ..joints.base import GROUND, Vector, both_of, named_place, point, section
 from ...mesh.places import points_of_rows
 from ...beam.rigid import RigidBody, on_body
@@ -39,7 +39,6 @@ def end_of(layout: Layout, place: Any) -> Vector:
     return point(layout, which, at)
 
 
-@teaching
 class Spring(ForceElement):
     """A spring between two points, with a dashpot along the same line.
 
@@ -128,7 +127,6 @@ class Spring(ForceElement):
         return f"<Spring {said(self.k)} between {shown(self.between)}>"
 
 
-@teaching
 class TorsionalSpring(ForceElement):
     """A moment against the angle by which a section turns, with a dashpot.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.errors import InputError, require_finite, require_label, require_positive, teaching
+from ...core.errors import InputError, require_finite, require_label, require_positive
 from .base import Joint, gradients, point
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ...beam.layout import WhichBeam
 
 
-@teaching
 class OnLine(Joint):
     """n . (r - p) = 0: a material point slides on a straight line.
 
@@ -58,7 +57,6 @@ class OnLine(Joint):
         return self.found
 
 
-@teaching
 class OnCircle(Joint):
     """``(|r - c|^2 - R^2) / (2 R) = 0``: a material point slides on a circle.
 

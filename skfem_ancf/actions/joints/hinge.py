@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.errors import require_label, teaching
+from ...core.errors import require_label
 from .base import Joint, each, equations_of, gradients, point, several
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from ...core.types import Array
 
 
-@teaching
 class Hinge(Joint):
     """r_a = r_b for a material point of each of two beams, and of a third, and so on.
 

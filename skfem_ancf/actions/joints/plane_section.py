@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.errors import require_label, teaching
+from ...core.errors import require_label
 from .base import Joint
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from ...beam.layout import WhichBeam
 
 
-@teaching
 class PlaneSection(Joint):
     """t . r_Y = 0 at every section point: no section slope leaves the stress-free plane.
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from ...core.errors import (ask_array, ask_number, require_finite_scalar, require_function,
-                            require_label, teaching)
+                            require_label)
 from ...beam.rigid import on_body
 from ...core.sampling import Sampled
 from .base import Aligned, Joint, angle_to, both_of, gradients, point, rotation, section
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 PIECES = 500
 
 
-@teaching
 class PrescribedPosition(Joint):
     """r = r(t) for a material point. At a node of the axis it only fixes coordinates.
 
@@ -66,7 +65,6 @@ class PrescribedPosition(Joint):
         return self.found
 
 
-@teaching
 class PrescribedAngle(Joint):
     """The direction of a section or a rigid body has turned by angle(t): e(t) x d = 0.
 
@@ -145,7 +143,6 @@ class Turned:
             epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
 
 
-@teaching
 class PrescribedTurn(Joint):
     """The angle between two sections or rigid bodies grows by angle(t): d x (R(t) e) = 0.
 

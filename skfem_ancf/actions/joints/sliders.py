@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skfem.helpers import dot
 
-from ...core.errors import InputError, require_finite, require_flag, require_label, shown, teaching
+from ...core.errors import InputError, require_finite, require_flag, require_label, shown
 from ...beam.layout import select_beam
 from ...mesh.mapping import cross
 from .axis import Axis
@@ -38,7 +38,6 @@ def _dots(A: Array, B: Array) -> Array:
     return M + M.T
 
 
-@teaching
 class Sleeve(Joint):
     """A material point slides along the axis of a beam.
 
@@ -273,7 +272,6 @@ class Sleeve(Joint):
         return np.bincount(at, span.force(multipliers, v0[at], v1[at]), len(u0))
 
 
-@teaching
 class Slot(Joint):
     """A material point slides along a straight line of a rigid body, or of the ground.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.errors import InputError, require_flag, require_label, teaching
+from ...core.errors import InputError, require_flag, require_label
 from .base import (Aligned, Joint, angle_to, each, equations_of, gradients, is_ground, rotation,
                    section, several)
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .base import Vector
 
 
-@teaching
 class Weld(Joint):
     """The points coincide, and the directions of the sections through them keep their angles.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from ...beam.layout import select_beam
 from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                             require_integer, require_not_negative, require_option, require_positive,
-                            shown, teaching)
+                            shown, warn)
 from ..forces.base import ForceElement, Link, Part
 from ..forces.contacts import Contacts, Group
 from ..forces.poses import carried, taken_back
@@ -52,7 +51,6 @@ ACROSS = 3
 SINK, MOST = 1e-2, 200
 
 
-@teaching
 class Obstacle(ForceElement):
     """An obstacle for the surface of beams: bottom, top and both ends.
 
@@ -248,10 +246,10 @@ class Obstacle(ForceElement):
             pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
             rule, apart = _repeated(*rule, pieces), apart / pieces
         if apart > 2.0 * bend > 0.0:
-            warnings.warn(
+            warn(
                 f"{self!r} has a radius of {bend:.4g}, and the points of {beam!r} that touch it "
                 f"are {apart:.4g} apart: it passes between them unseen. Use shorter elements where "
-                "it is, or a larger points=", ModelWarning, stacklevel=2)
+                "it is, or a larger points=", ModelWarning)
         return rule
 
     def _group(self, beam, first, X, w, tind):
@@ -351,8 +349,8 @@ def _repeated(x, w, pieces):
 
 def _options(options):
     if "slip_speed" in options:
-        warnings.warn("slip_speed= has no effect any more, leave it out: in a motion points stick "
-                      "as they do in statics", DeprecationWarning, stacklevel=4)
+        warn("slip_speed= has no effect any more, leave it out: in a motion points stick "
+                      "as they do in statics", DeprecationWarning)
         options = {name: x for name, x in options.items() if name != "slip_speed"}
     for name in options:
         require_option("option of an obstacle", name, KNOWN)

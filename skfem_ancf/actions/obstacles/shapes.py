@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.errors import (CallbackError, InputError, ask, require_finite, require_flag,
                             require_function, require_not_negative, require_positive, shown,
-                            teaching, warnings_as_errors)
+                            warnings_as_errors)
 from ..forces.contact_texts import OUTLINE, OWN, outline
 from ...core.frozen import Sealable
 from .outlines import circle, clipped, contour
@@ -118,7 +118,6 @@ class Shape(Sealable):
         return f"<{type(self).__name__}>"
 
 
-@teaching
 class Line(Shape):
     """A straight wall without end.
 
@@ -160,7 +159,6 @@ class Line(Shape):
         return f"<Line at {_pair(self.point)}, normal {_pair(self.normal)}>"
 
 
-@teaching
 class Circle(Shape):
     """A disc, or the hole of a ring.
 
@@ -207,7 +205,6 @@ class Circle(Shape):
         return f"<Circle about {_pair(self.center)}, radius {self.radius:g}>"
 
 
-@teaching
 class Polygon(Shape):
     """What is inside of a closed polygon, or outside of it.
 
@@ -324,7 +321,6 @@ def _require_simple(points):
                                  "corners in order, round what is solid")
 
 
-@teaching
 class SignedDistance(Shape):
     """A shape by the signed distance of points from its surface.
 

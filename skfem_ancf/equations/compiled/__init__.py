@@ -20,7 +20,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...core.errors import CompilationWarning
+from ...core.errors import CompilationWarning, warn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -80,9 +80,9 @@ def can_keep() -> bool:
 
 @cache
 def _warn_of(path):
-    warnings.warn(f"compiled code is not kept in {str(path)!r}: each process compiles anew. Make "
+    warn(f"compiled code is not kept in {str(path)!r}: each process compiles anew. Make "
                   "the folder writable, or set the environment variable NUMBA_CACHE_DIR to another "
-                  "one", CompilationWarning, stacklevel=2)
+                  "one", CompilationWarning)
 
 
 def cannot_keep(reason: object) -> None:
