@@ -13,9 +13,8 @@ from . import compiled
 from .compiled.words import Kept
 from .tables import Tables
 from ..core.kept import cached_property, twin_of
-from ..beam.kernels.law import with_text
+from ..beam.kernels.law import OWN
 from ..beam.kernels.section import SectionPack
-from ..materials.followed import NotFollowed
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, expected, wanted
 
@@ -71,13 +70,16 @@ class Machine:
     def __init__(self, system: Any) -> None:
         self.tables = Tables(system)
         self._plain: str | None = None
-        self._followed = False
         self._rooms: dict[str, Any] = {}
         self._kept = Kept()
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif system.forces.contacts.own:
             self._plain = "a distance of your own: SignedDistance"
+        elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
+                 for pack in self.tables.plain.body.packs):
+            self._plain = ("a law of your own in Python, where a "
+                           "skfem_ancf.materials.TextMaterial is compiled")
 
     @property
     def _off(self):
@@ -115,20 +117,7 @@ class Machine:
             A key of :data:`COMPILING`.
         """
         choice = self._chosen(name)
-        if choice.way != "plain" and not self._followed:
-            self._follow()
         return choice if self._plain is None else Choice("plain", self._plain)
-
-    def _follow(self):
-        """Make texts of laws in Python."""
-        self._followed = True
-        try:
-            for pack in self.tables.plain.body.packs:
-                if isinstance(pack, SectionPack):
-                    with_text(pack.law)
-        except NotFollowed as error:
-            self._plain = (f"a law of your own cannot be compiled: {error}; see "
-                           "skfem_ancf.materials.TextMaterial")
 
     def _chosen(self, name):
         missing = self._missing(name)

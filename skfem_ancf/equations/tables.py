@@ -18,7 +18,7 @@ from ..actions.forces.system import NO_FORCES
 from ..actions.forces.texts import ForceTables
 from ..core.kept import cached_property, twin_of
 from ..beam.kernels.base import packed
-from ..beam.kernels.law import LINEAR, text_of, with_text
+from ..beam.kernels.law import LINEAR, text_of
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.section import SectionPack, linearised
 from ..core.origin import ours
@@ -499,9 +499,9 @@ def _with_laws(body, address):
     """A Body whose laws have the addresses of their texts."""
 
     def addressed(pack):
-        law = with_text(pack.law)
-        text = text_of(law)
-        return pack._replace(law=law if text is None else law._replace(address=address(text)))
+        text = text_of(pack.law)
+        return pack if text is None else pack._replace(
+            law=pack.law._replace(address=address(text)))
 
     packs = tuple([
         addressed(pack) if isinstance(pack, SectionPack) and pack.law.kind != LINEAR else pack

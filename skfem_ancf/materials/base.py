@@ -31,13 +31,11 @@ class Material(Frozen):
 
     A law of your own is a subclass that defines :meth:`energy` and :meth:`stress`, and
     :meth:`moduli` if the complex step of ``stress`` is not good enough; in plane stress also
-    :meth:`thickness_stretch` if Cauchy stress is asked for. What it does to a strain is followed
-    and compiled, see :mod:`skfem_ancf.materials.followed`; a law that compares strains is many
-    times faster as a :class:`~skfem_ancf.materials.text.TextMaterial`. A subclass of a law of the
-    package
-    that overrides ``stress`` alone has the energy of that stress, integrated from zero along the
-    strain, and its moduli. Strains and stresses are
-    in the beam's frame (first index along the axis, second across the section):
+    :meth:`thickness_stretch` if Cauchy stress is asked for. Scenes with it run in NumPy:
+    a :class:`~skfem_ancf.materials.text.TextMaterial` is compiled. A subclass of a law of the
+    package that overrides ``stress`` alone has the energy of that stress, integrated from zero
+    along the strain, and its moduli. Strains and stresses are in the beam's frame (first index
+    along the axis, second across the section):
 
     * strain: Green-Lagrange, ``(eps_xx, eps_yy, 2 eps_xy)``, shape (3, ...),
     * stress: second Piola-Kirchhoff, ``(S_xx, S_yy, S_xy)``, shape (3, ...).

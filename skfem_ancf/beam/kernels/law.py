@@ -8,7 +8,6 @@ import numpy as np
 
 from ...materials import LinearLaw, TextMaterial
 from ...materials.base import ShearCorrected
-from ...materials.followed import NotFollowed, follow
 from ...core.source import F1, F2, lanes, primitive, room, source
 from .base import packed
 
@@ -17,8 +16,6 @@ LINEAR, TEXT, OWN = 0, 1, 2
 
 #: By handle, as long as a kernel has them: compiled code holds no Python objects.
 _LAWS: dict[int, Any] = {}
-#: What has come of following those in Python.
-_FOLLOWED: dict[int, Any] = {}
 _handles = count(1)
 
 
@@ -61,32 +58,9 @@ def run_text(law, strain, out):
     _LAWS[law.handle].text(law.constants, strain, out)
 
 
-def with_text(law: LawTables) -> LawTables:
-    """The tables of a law with a text, if it can be made of one in Python.
-
-    Raises
-    ------
-    NotFollowed
-        If it cannot.
-    """
-    if law.kind != OWN:
-        return law
-    if law.handle not in _FOLLOWED:
-        try:
-            _FOLLOWED[law.handle] = follow(_LAWS[law.handle])
-        except NotFollowed as error:
-            _FOLLOWED[law.handle] = error
-    found = _FOLLOWED[law.handle]
-    if isinstance(found, NotFollowed):
-        raise found
-    return law._replace(kind=TEXT, constants=packed(found.constants))
-
-
 def text_of(law: LawTables) -> Any:
     """The text of a law, None for one without."""
-    if law.kind != TEXT:
-        return None
-    return _FOLLOWED[law.handle].text if law.handle in _FOLLOWED else _LAWS[law.handle].text
+    return _LAWS[law.handle].text if law.kind == TEXT else None
 
 
 @source
@@ -190,8 +164,7 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     if isinstance(base, TextMaterial) and base.has_text:
         kind, constants = TEXT, packed(base.constants)
     _LAWS[handle] = base
-    for known in (_LAWS, _FOLLOWED):
-        weakref.finalize(owner, known.pop, handle, None)
+    weakref.finalize(owner, _LAWS.pop, handle, None)
     with np.errstate(all="ignore"):
         D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
     return LawTables(kind, handle, 0, packed(D), constants, packed(scale))
