@@ -220,9 +220,9 @@ def test_meshes_of_a_high_degree_are_moved_saved_and_cut_as_others(tmp_path):
     assert_allclose(moved.mapping().F(X),
                     np.einsum("ij,jep->iep", [[c, -s], [s, c]], x) + [[[1.0]], [[2.0]]], atol=1e-14)
     mesh.save_npz(tmp_path / "mesh.npz")
-    for same in (MeshBeam.load_npz(tmp_path / "mesh.npz"), MeshBeam.from_dict(mesh.to_dict())):
-        assert same.sections == "septic"
-        assert_allclose(same.mapping().F(X), x, atol=1e-15)
+    same = MeshBeam.load_npz(tmp_path / "mesh.npz")
+    assert same.sections == "septic"
+    assert_allclose(same.mapping().F(X), x, atol=1e-15)
     fine = mesh.refined()
     assert fine.sections == "septic" and mesh.restrict([1, 2]).nelements == 2
     assert_allclose(fine.mapping().F(np.array([[0.4], [0.9]]))[:, ::2, 0],

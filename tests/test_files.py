@@ -35,7 +35,6 @@ WRITERS = {
     "run.h5": lambda path: scene().integrate(0.02, 0.01, checkpoint=path),
     "sweep.npz": lambda path: sweep(lambda x: x, {"x": [1.0, 2.0]}, lambda x: x).save(path),
     "mesh.npz": lambda path: scene().beams[0].mesh.save(path),
-    "mesh.json": lambda path: scene().beams[0].mesh.save(path),
     "mesh.vtk": lambda path: scene().beams[0].mesh.save(path),
     "state.vtu": lambda path: scene().solve_linear().save(path),
     "state.vtk": lambda path: scene().solve_linear().save(path),

@@ -990,10 +990,9 @@ def test_calls_that_mean_nothing(call, error, message):
         call(portal())
 
 
-@pytest.mark.parametrize("suffix", ["npz", "json"])
-def test_the_mesh_of_a_frame_is_loaded_as_what_it_was(tmp_path, suffix):
+def test_the_mesh_of_a_frame_is_loaded_as_what_it_was(tmp_path):
     frame = portal(height=[lambda s: 0.02 + 0.01 * s, 0.02, 0.03], elements=3)
-    mesh, path = frame.beams[0].mesh, tmp_path / f"mesh.{suffix}"
+    mesh, path = frame.beams[0].mesh, tmp_path / "mesh.npz"
     mesh.save(path)
     again = MeshBeam.load(path)
     assert type(again) is type(mesh) is not MeshBeam
@@ -1002,11 +1001,14 @@ def test_the_mesh_of_a_frame_is_loaded_as_what_it_was(tmp_path, suffix):
     plain = MeshBeam.init_line([0.0, 1.0], 0.1)
     plain.save(path)
     assert type(MeshBeam.load(path)) is MeshBeam
-    data = {**plain.to_dict(), "kind": "shell"}
+    with np.load(path) as file:
+        data = dict(file)
+    np.savez(path, **{**data, "kind": "shell"})
     with pytest.raises(MeshError, match="'shell' is not known, only .'beam', 'lines'."):
-        MeshBeam.from_dict(data)
+        MeshBeam.load(path)
     del data["kind"]  # as of files that were written before
-    assert type(MeshBeam.from_dict(data)) is MeshBeam
+    np.savez(path, **data)
+    assert type(MeshBeam.load(path)) is MeshBeam
 
 
 @pytest.mark.parametrize("force", [1e-7, 1.0, 300.0])

@@ -233,11 +233,10 @@ def test_refined_meshes_have_the_same_state(element):
 
 def test_files_and_pickles(tmp_path):
     mesh = straight()
-    for name in ("mesh.npz", "mesh.json"):
-        mesh.save(tmp_path / name)
-        other = MeshBeam.load(tmp_path / name)
-        assert_allclose(other.heights, mesh.heights)
-        assert_allclose(other.refined().heights, mesh.refined().heights, rtol=1e-13)
+    mesh.save(tmp_path / "mesh.npz")
+    other = MeshBeam.load(tmp_path / "mesh.npz")
+    assert_allclose(other.heights, mesh.heights)
+    assert_allclose(other.refined().heights, mesh.refined().heights, rtol=1e-13)
     beam = pickle.loads(pickle.dumps(Beam(mesh, ElementBeamANCF(2), STEEL, width=sides)))
     assert beam.mesh.taper(1.0) == taper(1.0) and beam.width(0.0, 0.0) == 0.1
     for bad in (Beam(straight(height=lambda x: 0.1 + x), ElementBeamANCF(2), STEEL, width=0.1),

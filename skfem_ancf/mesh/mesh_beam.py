@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -853,56 +852,6 @@ class MeshBeam(Frozen, Mesh2D):
         return (super().__repr__() + f"\n  Height, length: {height}, "
                 f"{self.lengths.sum():.6g} ({kind})")
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything but the functions ``curve`` and ``taper``, as lists."""
-        out = super().to_dict()
-        out["orientations"] = {k: v.ori.tolist() for k, v in (self.boundaries or {}).items()
-                               if getattr(v, "ori", None) is not None}
-        for name in ("p_X", "p_Y", "p_XY", "lengths", "s", "heights"):
-            value = getattr(self, name)
-            out[name] = None if value is None else value.T.tolist()
-        return {**out, "height": self.height, "sections": self.sections, "kind": self.kind}
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> MeshBeam:
-        """The mesh of what :meth:`to_dict` returned.
-
-        Raises
-        ------
-        MeshError
-            If it is something else.
-        """
-        wanted = {"p", "t", "height", "p_X", "p_Y", "lengths", "sections"}
-        if not isinstance(data, dict) or wanted - set(data):
-            raise MeshError("this is no dictionary of a beam"
-                            + (f": {sorted(wanted - set(data))} are missing" if isinstance(
-                                data, dict) else f", but {shown(data)}"))
-        try:
-            return cls._from_dict(data)
-        except MeshError:
-            raise
-        except Exception as error:  # whatever it holds, it is no mesh
-            raise MeshError(f"the dictionary holds no beam: {type(error).__name__}: {error}"
-                            ) from error
-
-    @classmethod
-    def _from_dict(cls, data):
-        data = {"boundaries": None, "subdomains": None, **data}
-        for name in ("p_X", "p_Y", "p_XY", "heights"):
-            if data.get(name) is not None:
-                data[name] = np.ascontiguousarray(np.array(data[name]).T)
-        for name in ("lengths", "s"):
-            if data.get(name) is not None:
-                data[name] = np.array(data[name])
-        orientations, of = data.pop("orientations", {}), cls._of_kind(data.pop("kind", cls.kind))
-        mesh = super(MeshBeam, of).from_dict(data)
-        if orientations:
-            tags = dict(mesh._boundaries)
-            for name, ori in orientations.items():
-                tags[name] = OrientedBoundary(tags[name], ori)
-            mesh._boundaries = tags
-        return mesh
-
     def save_npz(self, filename: StrPath) -> None:
         """Save all but the functions ``curve`` and ``taper``; read it with :meth:`load_npz`."""
         path = require_path("filename", filename)
@@ -965,7 +914,7 @@ class MeshBeam(Frozen, Mesh2D):
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """Save the mesh: ``.npz`` or ``.json`` to load it again, else the body for a viewer.
+        """Save the mesh: ``.npz`` to load it again, else the body for a viewer.
 
         Any other suffix that meshio knows writes the quads of :meth:`to_meshquad`.
 
@@ -979,23 +928,19 @@ class MeshBeam(Frozen, Mesh2D):
         import meshio
 
         path = require_path("filename", filename)
-        if path.suffix in (".npz", ".json"):
-            require_options(f"save({path.name!r})", kwargs, ("filename",))
         if path.suffix == ".npz":
+            require_options(f"save({path.name!r})", kwargs, ("filename",))
             self.save_npz(path)
             return
         try:
             if not path.suffix:
                 raise FileError(f"the file name {str(path)!r} does not say the format: end it with "
-                                ".npz, .json, .vtu or what else meshio writes")
+                                ".npz, .vtu or what else meshio writes")
             if path.suffix in IN_PARTS:
                 self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
                 return
             with archive.replacing(path) as new:
-                if path.suffix == ".json":
-                    new.write_text(json.dumps(self.to_dict()), encoding="utf-8")
-                else:
-                    self.to_meshquad().save(new, point_data, cell_data, **kwargs)
+                self.to_meshquad().save(new, point_data, cell_data, **kwargs)
         except FileError:
             raise
         except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:
@@ -1003,7 +948,7 @@ class MeshBeam(Frozen, Mesh2D):
 
     @classmethod
     def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
-        """Load a mesh saved as ``.npz`` or ``.json``.
+        """Load a mesh saved as ``.npz``.
 
         Parameters
         ----------
@@ -1016,10 +961,8 @@ class MeshBeam(Frozen, Mesh2D):
         require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":
             return cls.load_npz(path)
-        if path.suffix == ".json":
-            return _read(path, lambda: cls.from_dict(json.loads(path.read_text(encoding="utf-8"))))
-        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz and .json files keep "
-                        "the axis, the tangents and the height; save the mesh in one of them")
+        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz files keep the axis, "
+                        "the tangents and the height; save the mesh as one of them")
 
 
 def _read(path, read):
