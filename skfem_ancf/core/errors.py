@@ -7,18 +7,17 @@ what a caller gives passes one of them before anything is computed.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-import inspect
 import os
 import pickle
+import sys
 import warnings
 from contextlib import contextmanager
-from functools import wraps
 from math import isfinite
 from pathlib import Path
 from threading import RLock
-from types import FunctionType
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from .types import Array
-
-Function = TypeVar("Function", bound="Callable[..., Any]")
-Class = TypeVar("Class", bound=type)
 
 #: The filters of warnings belong to all threads: one at a time sets and restores them.
 _FILTERS = RLock()
@@ -741,63 +737,23 @@ def _returned(door, what, value, args, *more):
         raise CallbackError(str(error) + hint) from None
 
 
-# calls
+# warnings
 
-def taught(function: Function) -> Function:
-    """A function whose wrong calls raise :class:`CallError`, which lists its arguments.
+#: Files of the package, and of the library where its own blocks pass through.
+_WITHIN = str(Path(__file__).resolve().parents[1]) + os.sep, contextlib.__file__
 
-    Arguments with masked values are refused.
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Give a warning that names the line of the caller's that has led to it.
+
+    Parameters
+    ----------
+    message
+        What to say.
+    category
+        Class of the warning.
     """
-    explain, masked, refuse = _explain, is_masked, _refuse_masked_argument
-
-    def call(*args, **kwargs):
-        if masked(args) or masked(kwargs):
-            refuse(function, args, kwargs)
-        try:
-            return function(*args, **kwargs)
-        except TypeError as error:
-            if error.__traceback__.tb_next is None:  # it is the call that is wrong
-                explain(function, kwargs, error)
-            raise
-
-    # doctest finds functions by the globals of their module
-    call = FunctionType(call.__code__, function.__globals__, call.__name__, None,
-                        call.__closure__)
-    return cast("Function", wraps(function)(call))
-
-
-def teaching(cls: Class) -> Class:
-    """A class decorator: :func:`taught` for the constructor and the public methods of a class."""
-    for name, value in list(vars(cls).items()):
-        if name.startswith("_") and name != "__init__":
-            continue
-        if inspect.isfunction(value):
-            setattr(cls, name, taught(value))
-        elif isinstance(value, (classmethod, staticmethod)):
-            setattr(cls, name, type(value)(taught(value.__func__)))
-    return cls
-
-
-def _refuse_masked_argument(function, args, kwargs):
-    try:
-        given = inspect.signature(function).bind(*args, **kwargs).arguments
-    except TypeError:  # which the call itself will say
-        return
-    for name, value in (*kwargs.items(), *given.items()):
-        if is_masked(value):
-            _refuse_masked(name)
-
-
-def _explain(function, kwargs, error):
-    parameters = [p for p in inspect.signature(function).parameters.values()
-                  if p.name not in ("self", "cls", "system")]
-    known = [p.name for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
-    unknown = [name for name in kwargs if name not in known]
-    near = nearest(unknown[0], known) if unknown else None
-    message = str(error).replace("<lambda>", "function")
-    if near is not None:
-        message = message.split(". Did you mean")[0] + f"; did you mean {near!r}?"
-    else:
-        message += ";"
-    arguments = ", ".join(str(p.replace(annotation=p.empty)) for p in parameters)
-    raise CallError(f"{message} Arguments: {arguments or 'none'}") from None
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_WITHIN):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)

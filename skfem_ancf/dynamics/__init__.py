@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..core.errors import require_option, taught
+from ..core.errors import require_option
 from .base import Motion, Scheme, Steps
 from .choice import choose_scheme
 from .energy_momentum import EnergyMomentum, EnergyMomentum4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..core.errors import require_option, taught
+from ..core.errors import require_option
 from .assumed import Assumed
 from .base import COMPONENTS, Formulation, Term
 from .continuum import Continuum
