@@ -14,7 +14,8 @@ from ..forms import weak as forms
 from ..materials.damping import KelvinVoigt
 from ..elements import ElementBeam, choose_element
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
-                           require_label, require_like, require_names, shown)
+                           require_label, require_like, require_names, shown,
+                           require_unmasked)
 from ..mesh.location import Finder
 from ..formulations import get_formulation
 from ..core.frozen import Frozen, read_only
@@ -89,6 +90,7 @@ def _fields(method):
             raise InputError("X must have shape (2, npoints) or (2, nelements, npoints), got "
                              f"{X.shape}")
         if tind is not None:
+            require_unmasked("tind", tind)
             tind = self.mesh.normalize_elements(tind)
         if X.ndim == 3 and X.shape[1] != (self.mesh.nelements if tind is None else len(tind)):
             raise InputError(f"X must hold points for each element, got shape {X.shape}")

@@ -403,14 +403,23 @@ def is_masked(value: object) -> bool:
     return isinstance(value, (list, tuple)) and any(map(is_masked, value))
 
 
-def _refuse_masked(name):
-    raise InputError(f"{name} has masked values, whose numbers mean nothing: leave them out, as by "
-                     "numpy.ma.compressed, or fill them, as by numpy.ma.filled")
+def require_unmasked(name: str, value: Any) -> None:
+    """Raise :class:`InputError` of an array with masked values, or what holds one.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        Anything.
+    """
+    if is_masked(value):
+        raise InputError(f"{name} has masked values, whose numbers mean nothing: leave them out, "
+                         "as by numpy.ma.compressed, or fill them, as by numpy.ma.filled")
 
 
 def _real_array(name, value):
-    if is_masked(value):
-        _refuse_masked(name)
+    require_unmasked(name, value)
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError):  # rows of different lengths, for one

@@ -14,7 +14,8 @@ from scipy.sparse.csgraph import connected_components
 
 from ..core.errors import (FileError, InputError, MeshError, ModelWarning, NameUnknown, ask,
                            ask_field, require_finite, require_integer, require_label, require_names,
-                           require_not_negative, require_path, shown, warn)
+                           require_not_negative, require_path, shown, warn,
+                           require_unmasked)
 from .members import Axes, MeshLines, heights_of_chains
 from .mesh_beam import MeshBeam
 from .places import is_point, points_of_rows
@@ -217,6 +218,7 @@ class Net:
         place
             As there.
         """
+        require_unmasked("place", place)
         n, place = self.points.shape[1], points_of_rows(place)
         if isinstance(place, str):
             if place in self.lost:

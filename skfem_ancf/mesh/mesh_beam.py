@@ -15,7 +15,8 @@ from ..core import archive
 from .curve import Curve, check_curvature, derivative_of
 from ..core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask,
                            require_finite, require_finite_scalar, require_function, require_integer,
-                           require_option, require_options, require_path, require_positive, shown)
+                           require_option, require_options, require_path, require_positive, shown,
+                           require_unmasked)
 from .location import Finder
 from ..core.frozen import Frozen, ReadOnlyDict
 from ..core.kept import twin_of
@@ -604,6 +605,7 @@ class MeshBeam(Frozen, Mesh2D):
             return super().refined(require_integer(
                 "the number of refinements", times_or_ix, 0, max(most, 0),
                 f"a mesh of {MAX_ELEMENTS} elements at most"))
+        require_unmasked("times_or_ix", times_or_ix)
         return self._adaptive(times_or_ix)
 
     def graded(self, at: Any = ("left",), size: float | None = None,
@@ -699,6 +701,7 @@ class MeshBeam(Frozen, Mesh2D):
         MeshBeam
             With ``return_mapping`` a pair: the mesh, and nodes of shape (n,).
         """
+        require_unmasked("elements", elements)
         elements = np.unique(self.normalize_elements(elements))
         if len(elements) == 0:
             raise MeshError("a mesh needs at least one element: the given set is empty")

@@ -12,7 +12,8 @@ from ..results.arguments import displacement
 from ..elements import ElementBeamCable
 from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
                            require_integer, require_names, require_option, require_options,
-                           require_positive, shown)
+                           require_positive, shown,
+                           require_unmasked)
 from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
@@ -269,6 +270,8 @@ class Frame(Scene):
 
     @classmethod
     def _made(cls, net, hinges, elements, sections, options):
+        for name, value in {**options, "hinges": hinges}.items():
+            require_unmasked(name, value)
         m = net.lines.shape[1]
         elements = _elements(elements, m)
         sections = mapping_of("sections", sections)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError, require_finite_scalar, require_flag, require_positive, shown
+from ..core.errors import (InputError, require_finite_scalar, require_flag, require_positive,
+                           shown, require_unmasked)
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
 from ..recovery.grids import in_space, layout, subdivision
 from ..core.linear import first_order
@@ -84,6 +85,7 @@ def _thickness(thickness, bodies):
 
 
 def _limits(limits, values, field):
+    require_unmasked("limits", limits)
     if limits is not None:
         try:
             low, high = limits
