@@ -11,7 +11,7 @@ from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted,
                            require_finite_scalar, require_flag, require_function,
                            require_positive, shown, warn)
 from ..core.progress import progress_bar
-from ..solvers.stability import position_weights
+from ..equations.stability import position_weights
 from ..core.switch import expecting
 from ..beam.kinematics import folded
 from .checkpoint import Checkpoint, same_problem

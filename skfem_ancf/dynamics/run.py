@@ -13,8 +13,6 @@ import scipy
 from ..core.errors import (AncfError, CheckpointError, InputError, ask_number, require_finite,
                            require_finite_scalar, require_positive, shown)
 from .base import Motion, Scheme, contacts_of, interpolate, recalled
-from .budget import Budget
-from .companion import Companion
 from .history import History
 from .integrator import DEPTH, Integrator, StepFailed
 from .sensors import Recorder
@@ -154,9 +152,6 @@ class Run:
         A function of a State whose change of sign ends the motion, or None.
     event
         The time at which it did, or None.
-    companion
-        What follows the motion to tell its error, a
-        :class:`~skfem_ancf.dynamics.companion.Companion`, or None.
     """
 
     def __init__(self, system: System, scheme: Scheme, task: Task,
@@ -179,8 +174,6 @@ class Run:
         self.event: float | None = None
         self._stuck = 0
         self._value: float | None = None
-        self.companion: Companion | None = None
-        self.budget = Budget(task.t_start, task.span)
         self._in_blocks = scheme.in_blocks(system)
         self._limit()
 
@@ -238,8 +231,6 @@ class Run:
         self._store_start()
 
     def _store_start(self):
-        if self.companion is not None:
-            self.companion.begin(self.y, self.integrator.energy, self.integrator.limit)
         self.recorder.record([self.y])
         wanted = self.task.t_eval
         if wanted is None or wanted[0] <= self.task.t_start:
@@ -257,18 +248,9 @@ class Run:
         """Size of the first step of a segment."""
         return min(self.size, self._end - self._begun)
 
-    @property
-    def error(self) -> float | None:
-        """The largest error so far, as of the companion, or None."""
-        if self.companion is None:
-            return None
-        self.companion.catch_up()
-        return self.companion.error
-
     def give_back(self) -> None:
         """Leave the work arrays to the next motion: this one has ended."""
-        beside = None if self.companion is None else self.companion.integrator
-        for one in (self.integrator, self._side, beside):
+        for one in (self.integrator, self._side):
             if one is not None:
                 one.give_back()
 
@@ -370,7 +352,7 @@ class Run:
         touches = self.system.forces.contacts.obstacles  # when, is found in parts of a step
         try:
             new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
-            error = self.sizes.error(self.integrator, y, new, h) / self.budget.share
+            error = self.sizes.error(self.integrator, y, new, h)
             self.size, kept = self.sizes.next(error, h, self.size)
         except StepFailed:
             if h < SHORTEST * self.task.span:
@@ -385,21 +367,7 @@ class Run:
         self._stuck = max(0, self._stuck - 1)  # steps that fail between others that do not
         if h == left:
             new.t = self._end
-        segment = self.segment
         self._commit(y, new)
-        if self.companion is not None:
-            self.companion.follow(self.y, h if self.event is None else self.y.t - y.t)
-            self.budget.add(error, h)
-            if self.budget.due(self.y.t):
-                self._look_at_error()
-            if self.segment != segment:
-                self.companion.turn(self.y, self.integrator.energy, self.integrator.limit)
-
-    def _look_at_error(self):
-        """Steps as the error asks for that they have added so far."""
-        error = self.error / self.task.rtol
-        if not np.isnan(error):
-            self.size *= self.budget.learn(self.y.t, error) ** (1.0 / self.scheme.order)
 
     def _commit(self, old, new):
         """A step is done."""

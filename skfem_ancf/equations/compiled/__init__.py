@@ -12,7 +12,6 @@ import hashlib
 import logging
 import os
 import sys
-import warnings
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
