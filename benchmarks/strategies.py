@@ -18,7 +18,7 @@ import numpy as np
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         Frame, MeshBeam, Scene, StVenantKirchhoff)
 from skfem_ancf.solvers.newton import solve_static
-from skfem_ancf.solvers.stability import verdict
+from skfem_ancf.equations.stability import verdict
 
 #: What the default is compared with.
 EXPLICIT = {"mixed": {"method": "mixed"}, "newton": {"method": "newton"},

@@ -38,7 +38,7 @@ NEAR = 1e-2
 SOON = 15
 #: Iterations of load steps before the next strategy has its turn, and steps that are cut at the
 #: begin before.
-FEW, CUT = 100, 3
+FEW, CUT = 60, 3
 #: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, the others one iteration.
 METHODS = ("mixed", "newton", "auto")
 
@@ -325,6 +325,7 @@ class Search:
         self.soft = False
         self.furthest: StaticResult | None = None
         self.other: StaticResult | None = None
+        self._folded: StaticResult | None = None
         self._failure: Exception | None = None
         self._spent, self._unstable = 0, False
         contacts = system.forces.contacts
@@ -356,6 +357,8 @@ class Search:
             if result is not None:
                 self._note(strategy.name)
                 return self._done(result)
+        if self._folded is not None:
+            return self._done(self._folded)
         if self.other is not None:
             self.other.doubt = self.other.doubt or (
                 "of several stable equilibria this one may not be that to which the loads drive "
@@ -530,8 +533,11 @@ class Search:
             raise _Failed("the loads do not hold what the supports leave free")
         if self.rules.method == "auto" and any(
                 folded(b, result.u[self.system.of(b)]) for b in self.system.beams):
-            self.other = self.other or result
-            raise _Failed("the axis turns back within an element")
+            again = self._folded is not None and np.allclose(
+                result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
+            self._folded = self._folded or result
+            if not again:  # where two come to it the mesh is too coarse, which a warning says
+                raise _Failed("the axis turns back within an element")
 
     def _elsewhere(self, route, found):
         """True if a strategy but the first comes to where the load does not drive the scene."""
