@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import InputError
 from .base import Motion, Scheme, contacts_of
@@ -11,7 +11,6 @@ from .differences import derivative, grown
 if TYPE_CHECKING:
     from ..equations.system import System
     from ..core.types import Array
-    from .integrator import Integrator
 
 #: Parts of a step of fourth order, all of whose ends lie within it.
 LONG = 1.0 / (4.0 - 4.0**(1.0 / 3.0))
@@ -91,7 +90,7 @@ class EnergyMomentum4(EnergyMomentum):
                              "and friction drive: take 'energy-momentum', or 'radau' for high "
                              "order")
 
-    def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
+    def step(self, integrator: Any, y: Motion, dt: float) -> Motion:
         begin, lost = y.t, y.dissipated
         for part in PARTS:
             y = integrator.take(y, part * dt)
