@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, InputError, KelvinVoigt,
-                        Line, MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
-                        SupportError)
+                        Line, MeshBeam, MeshError, ModelWarning, NameUnknown, RigidBody, Scene,
+                        StVenantKirchhoff, SupportError)
 from skfem_ancf.dynamics import SCHEMES
 from skfem_ancf.core.errors import AncfError, CallbackError, CheckpointError, ImmutableError
 
@@ -987,3 +987,65 @@ def test_a_slider_crank_passes_where_it_folds_up(start, scheme, dt):
     x, y = history.position(B, bar).T
     assert_allclose(x, 2.0 * np.cos(start + history.t), rtol=0, atol=1e-5)
     assert_allclose(y, 0.0, rtol=0, atol=1e-9)
+
+
+def three_cranks(angle):
+    """The parallelogram with a third crank in its middle, which its other joints do not need."""
+    _, crank, coupler, rocker = parallelogram(angle)
+    A = (0.5 + np.cos(angle), np.sin(angle))
+    third = rod((0.5, 0.0), A)
+    scene = Scene(crank, coupler, rocker, third)
+    scene.pin((0, 0), crank).pin((1, 0), rocker).pin((0.5, 0), third)
+    first, second = (np.cos(angle), A[1]), (1.0 + np.cos(angle), A[1])
+    scene.hinge((crank, first), (coupler, first))
+    scene.hinge((coupler, second), (rocker, second))
+    scene.hinge((coupler, A), (third, A))
+    return scene, crank, coupler, rocker, third
+
+
+@pytest.mark.parametrize("dt", [np.pi / 150, 0.02])
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau"])
+def test_three_cranks_turn_past_positions_in_line(scheme, dt):
+    scene, *bodies = three_cranks(np.pi / 3)
+    scene.motor(bodies[0], speed=1.0)
+    with pytest.warns(ModelWarning, match="^1 of 17 equations of joints repeat others"):
+        history = scene.integrate(3.0, dt, scheme=scheme)
+    for body, rate in zip(bodies, (1.0, 0.0, 1.0, 1.0)):
+        assert_allclose(history.angle(body), history.angle(body)[0] + rate * history.t, rtol=0,
+                        atol=1e-5)
+
+
+def test_three_cranks_carry_a_load():
+    """On the coupler, held by a guide on the first crank, which takes all of it."""
+    scene, *bodies = three_cranks(np.pi / 3)
+    top = (0.5, np.sin(np.pi / 3))  # of the first crank
+    scene.joint("line", beam=bodies[0], at=top, direction=(0, 1))
+    scene.point_force((4.0, 0.0), at=(1.5, top[1]), beam=bodies[1])
+    with pytest.warns(ModelWarning):
+        state = scene.solve_static()
+    assert abs(state.joint_force(scene.joints[-1])[0]) == pytest.approx(4.0, abs=1e-9)
+
+
+def plates(way):
+    """A pendulum of two bodies that are one, by a weld or by two hinges."""
+    a = RigidBody(1.0, 0.1, position=(0.5, 0.0))
+    b = RigidBody(1.0, 0.2, position=(1.5, 0.0))
+    scene = Scene(a, b).pin((0, 0), a)
+    scene.point_force((0.0, -9.81), at=(0.5, 0.0), beam=a)
+    scene.point_force((0.0, -9.81), at=(1.5, 0.0), beam=b)
+    if way == "weld":
+        return scene, [scene.joint("weld", beams=(a, b), at=(1.0, 0.0))]
+    return scene, [scene.hinge((a, x), (b, x)) for x in ((0.9, 0.0), (1.1, 0.02))]
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_two_hinges_are_a_weld(scheme):
+    one, (weld,) = plates("weld")
+    two, hinges = plates("hinges")
+    a = one.integrate(1.0, 0.01, scheme=scheme)
+    with pytest.warns(ModelWarning, match="^1 of 8 equations"):
+        b = two.integrate(1.0, 0.01, scheme=scheme)
+    assert_allclose(b.u[-1], a.u[-1], rtol=0, atol=1e-8)
+    force = a.joint_force(weld)[-1, :2]
+    assert_allclose(sum(b.joint_force(hinge)[-1] for hinge in hinges), force, rtol=0,
+                    atol=1e-5 * np.abs(force).max())

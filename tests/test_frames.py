@@ -10,7 +10,7 @@ from scipy import sparse
 
 from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.equations import constraints, signature as rank
-from skfem_ancf.core.errors import SupportError
+from skfem_ancf.core.errors import ModelWarning
 from skfem_ancf.actions.joints import Joint, OnCircle
 from skfem_ancf.actions.joints.base import point
 import itertools
@@ -210,12 +210,18 @@ def test_a_large_frame_stands_without_dense_matrices():
     assert np.abs(system.constraint(state.u, 1.0)).max() < 1e-12
 
 
-def test_a_weld_too_many_in_a_large_frame_is_named():
+def test_a_weld_too_many_in_a_large_frame_is_named_and_shares():
     scene = frame(7, 7)
     first = scene.joints[40]
     scene.joint("weld", beams=first.beams, at=first.at, name="twice")
-    with pytest.raises(SupportError, match="Weld twice.*'force along x'.*repeats"):
-        scene.solve_static()
+    with pytest.warns(ModelWarning, match="^3 of .*repeat.*Weld twice.*force along x, "):
+        state = scene.solve_static()
+    plain = frame(7, 7)
+    one = plain.solve_static()
+    assert_allclose(state.u, one.u, rtol=0, atol=1e-9 * np.abs(one.u).max())
+    pull = one.joint_force(plain.joints[40])
+    for joint in (scene.joints[40], scene.joints[-1]):
+        assert_allclose(2.0 * state.joint_force(joint), pull, rtol=0, atol=1e-6 * max(abs(pull)))
 
 
 def test_free_motions_of_many_beams():

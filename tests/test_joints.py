@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
-                        RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.core.errors import InputError, NameUnknown, SupportError
+                        ElementBeamPatelShabana, EnergyMomentum, Gauss, GeneralizedAlpha,
+                        MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf.core.errors import InputError, ModelWarning, NameUnknown, SupportError
 from skfem_ancf.actions.joints import JOINTS, get_joint
 from skfem_ancf.core.linalg import dense
 from skfem_ancf.equations.system import System
@@ -597,28 +598,115 @@ def test_williams_toggle_below_the_limit_point():
         assert abs(state.displacement((0, rise), beam=left)[0]) < 1e-9
 
 
+# equations that repeat others
+
+
+def repeated(more):
+    """The elbow, pinned at its end, with its joint and what repeats that; all joints."""
+    a, b = elbow()
+    scene = Scene(a, b).clamp("left", beam=a).pin((1.4, 0.9), beam=b)
+    scene.point_force((-30.0, -50.0), at=(1.2, 0.45), beam=b)
+    if more.startswith("line"):
+        held = [scene.joint("line", beam=b, at=(1.2, 0.45), direction=(1, d)) for d in (1, -1)]
+        if more == "line, third":
+            held.append(scene.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 0.3)))
+        scene.joint("hinge", beams=(a, b), at=(1, 0))
+    elif more.startswith("weld"):
+        held = [scene.joint("weld", beams=(a, b), at=("right", "left"))]
+        if more == "weld, hinge":
+            held.append(scene.joint("hinge", beams=(a, b), at=(1, 0)))
+    else:
+        held = [scene.joint("hinge", beams=(a, b), at=(1, 0))]
+        for _ in range({"hinge": 0, "hinge, twice": 1, "hinge, three times": 2}.get(more, 0)):
+            held.append(scene.joint("hinge", beams=(a, b), at=(1, 0)))
+        if more == "hinge, clamp":
+            held.append(scene.joint("line", beam=a, at=(0, 0.02), direction=(1, 1)))
+    return scene, held
+
+
+#: What is repeated, by what, and how many equations repeat others.
+REPEATED = [("hinge", "hinge, twice", 2), ("hinge", "hinge, three times", 4),
+            ("weld", "weld, hinge", 2), ("line", "line, third", 1), ("hinge", "hinge, clamp", 1)]
+
+
+def pull(state, held):
+    """The sum of what joints do to the first beam, along x and y, of lines to the second one."""
+    forces = [state.joint_force(joint) for joint in held if len(joint.equations) > 1]
+    return np.sum([force[:2] for force in forces], axis=0)
+
+
+@pytest.mark.parametrize("once, more, number", REPEATED)
+def test_repeated_joints_change_nothing_in_statics(once, more, number):
+    (plain, one), (scene, held) = repeated(once), repeated(more)
+    with pytest.warns(ModelWarning, match=f"^{number} of .* repeat others"):
+        assert scene.system.m == plain.system.m
+    a, b = plain.solve_static(), scene.solve_static()
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
+    assert_allclose(pull(b, held), pull(a, one), rtol=0, atol=1e-7)
+    assert_allclose(b.reactions("left", beam=0).force, a.reactions("left", beam=0).force, rtol=0,
+                    atol=1e-7)
+    assert_allclose(scene.modes(3).frequencies, plain.modes(3).frequencies, rtol=1e-8)
+    assert_allclose(scene.modes(3, state=b).frequencies, plain.modes(3, state=a).frequencies,
+                    rtol=1e-7)
+    if once != "line":  # whose load goes to the ground
+        assert_allclose(scene.buckling(1).factors, plain.buckling(1).factors, rtol=1e-7)
+
+
+def test_forces_of_repeated_joints_are_the_smallest():
+    """Shared evenly by hinges at one place; a line that a clamp holds already has none."""
+    scene, held = repeated("hinge, three times")
+    with pytest.warns(ModelWarning):
+        state = scene.solve_static()
+    first, *others = (state.joint_force(joint) for joint in held)
+    for force in others:
+        assert_allclose(force, first, rtol=0, atol=1e-9)
+    scene, (_, line) = repeated("hinge, clamp")
+    with pytest.warns(ModelWarning):
+        state = scene.solve_static()
+    assert abs(state.joint_force(line)[0]) < 1e-12
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau",
+                                    "energy-momentum-4"])
+def test_repeated_joints_change_nothing_in_motion(scheme):
+    (plain, one), (scene, held) = repeated("weld"), repeated("weld, hinge")
+    a = plain.integrate(0.02, 0.001, scheme=scheme)
+    with pytest.warns(ModelWarning, match="Hinge at"):
+        b = scene.integrate(0.02, 0.001, scheme=scheme)
+    assert np.abs(a.u[-1]).max() > 1e-3
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
+    force = pull(a.state(-1), one)
+    assert_allclose(pull(b.state(-1), held), force, rtol=0, atol=1e-6 * np.abs(force).max())
+
+
+def test_repeated_joints_change_nothing_by_gauss_points():
+    (plain, _), (scene, _) = repeated("hinge"), repeated("hinge, twice")
+    a = plain.integrate(0.01, 0.001, scheme=Gauss(2))
+    with pytest.warns(ModelWarning):
+        b = scene.integrate(0.01, 0.001, scheme=Gauss(2))
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
+
+
+def test_a_body_on_two_pins():
+    """Five equations for four coordinates: half of what pulls along the pins each."""
+    body = RigidBody(1.0, 0.1, position=(0.5, 0.0))
+    scene = Scene(body).pin((0, 0), body).pin((1, 0), body)
+    scene.point_force((3.0, -10.0), at=(0.7, 0.0), beam=body)
+    with pytest.warns(ModelWarning, match="^1 of 5 equations"):
+        state = scene.solve_static()
+    first, second = (state.joint_force(joint) for joint in scene.joints)
+    assert_allclose(first, (1.5, -3.0), rtol=0, atol=1e-10)
+    assert_allclose(second, (1.5, -7.0), rtol=0, atol=1e-10)
+
+
 # what is refused
 
 
-def test_redundant_and_contradictory_joints():
+def test_contradictory_joints():
     a, b = elbow()
 
     def scene():
         return Scene(a, b).clamp("left", beam=a)
-
-    s = scene()
-    s.joint("hinge", beams=(a, b), at=(1, 0), name="first")
-    s.joint("hinge", beams=(a, b), at=(1, 0), name="second")
-    with pytest.raises(SupportError, match="Hinge second.*'force along x'.*repeats"):
-        s.solve_static()
-    with pytest.raises(SupportError, match="repeats"):
-        s.integrate(0.1, 0.01)
-
-    s = scene()
-    s.joint("weld", beams=(a, b), at=("right", "left"), name="corner")
-    s.joint("hinge", beams=(a, b), at=(1, 0), name="pin")
-    with pytest.raises(SupportError, match="Hinge pin.*repeats"):
-        s.solve_static()
 
     s = scene()
     s.joint("line", beam=b, at=(1.4, 0.9), direction=(1, 1))
@@ -626,18 +714,16 @@ def test_redundant_and_contradictory_joints():
     with pytest.raises(SupportError, match="OnLine guide.*contradicts"):
         s.solve_static()
 
-    # three lines through one point: the third repeats the other two, or contradicts them
-    for through, word in ((None, "repeats"), ((1.4, 1.0), "contradicts")):
-        s = scene()
-        s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 1))
-        s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, -1))
-        s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 0.3), through=through, name="third")
-        with pytest.raises(SupportError, match=f"OnLine third.*{word}"):
-            s.solve_static()
+    s = scene()  # the third of three lines through one point
+    s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 1))
+    s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, -1))
+    s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 0.3), through=(1.4, 1.0), name="third")
+    with pytest.raises(SupportError, match="OnLine third.*contradicts"):
+        s.solve_static()
 
     s = scene()
-    s.joint("line", beam=a, at=(0, 0.02), direction=(1, 1), name="on the clamp")
-    with pytest.raises(SupportError, match="on the clamp.*the supports"):
+    s.joint("line", beam=a, at=(0, 0.02), direction=(1, 1), through=(0, 0.3), name="on the clamp")
+    with pytest.raises(SupportError, match="on the clamp.*contradicts what the supports"):
         s.solve_static()
 
     s = scene()

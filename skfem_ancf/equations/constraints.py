@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
 
-from ..core.errors import InputError, SupportError, shown
+from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..actions.joints.base import Joint, same_joint
+from ..actions.joints.director import UnitDirector
 from ..actions.joints.nodes import Nodes, chain_ends
+from ..actions.joints.part import Part
 from ..actions.joints.settlements import HELD
-from ..core.kept import cached_property
+from ..core.kept import cached_property, twin_of
+from .redundancy import repeated, shared
 from .signature import DENSE, FREE, first_dependent, null_space, row_sizes, unit_rows
 from ..beam.rigid import RigidBody
 
@@ -23,6 +27,10 @@ if TYPE_CHECKING:
 
 #: Columns of a border above which sparse LU is faster.
 WIDE_BORDER = 96
+#: By how much equations left out may be open, over their sizes.
+OPENED = 1e-5
+#: What is kept of the joints, and changes where equations are left out.
+KEPT_OF_JOINTS = "slopes", "_at_rest", "frame", "_limited", "stiff", "_held_alone"
 #: No rows, columns and values.
 _NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
@@ -68,6 +76,10 @@ class Constraints:
         self.N = slices[-1].stop
         self._independent = False
         self._eliminate(fixed, values, joints)
+        #: numbers of equations left out, and those of each joint
+        self._left_out = np.zeros(0, dtype=int)
+        self._unasked: list[tuple[Joint, Array, Array]] = []
+        self._leave_out()
 
     def _eliminate(self, fixed, values, joints):
         """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
@@ -91,6 +103,9 @@ class Constraints:
                 continue
             dofs, factors = found
             if not self.free.take(dofs).all():
+                if not joint.moving:
+                    self.joints.append(joint)
+                    continue
                 clash = np.sort(dofs[~self.free[dofs]])
                 raise SupportError(
                     f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
@@ -105,6 +120,41 @@ class Constraints:
             self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
             self.given = np.concatenate([self.given, np.zeros(first - len(self.given))])
         self._moving = [item for item in self._fixing if item[0].moving]
+
+    def _leave_out(self):
+        """Leave out equations of joints that repeat others, and say so."""
+        if not self.joints or self.condensable:
+            return
+        self._independent = self._apart or self._dependent() is None
+        if self._independent:
+            return
+        found = repeated(self)
+        if found is None or not len(found):
+            return
+        parts, first, said, unasked = [], 0, [], []
+        sizes = self.equation_sizes(*self.slopes)
+        for joint in self.joints:
+            m = len(joint.equations)
+            out = found[(found >= first) & (found < first + m)] - first
+            first, size = first + m, sizes[first + out]
+            if not len(out):
+                parts.append(joint)
+                continue
+            if isinstance(joint, Nodes):
+                return
+            unasked.append((joint, out, size))
+            said.append(f"{joint!r} ({', '.join(joint.equations[k] for k in out)})")
+            if len(out) < m:
+                parts.append(Part(joint, np.setdiff1d(np.arange(m), out)))
+        warnings.warn(
+            f"{len(found)} of {self.m} equations of joints repeat others or supports: "
+            f"{', '.join(said)}. The scene moves as without them; joint_force shares the forces "
+            "by least squares", ModelWarning, stacklevel=5)
+        self._whole = twin_of(self)
+        self.joints, self.m = parts, self.m - len(found)
+        self._left_out, self._unasked = found, unasked
+        for name in KEPT_OF_JOINTS:
+            vars(self).pop(name, None)
 
     def describe_dof(self, k: int) -> str:
         """What coordinate number k is, in words."""
@@ -365,6 +415,9 @@ class Constraints:
         u
             Displacement of the coordinates, shape (N,).
         """
+        for joint, out, size in self._unasked:
+            if (np.abs(joint.value(u, 0.0)[out]) > OPENED * size).any():
+                return f"{joint!r} cannot hold beside the other joints: it contradicts them here"
         return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
 
     def first_lost(self, rows: Array) -> tuple[int, str]:
@@ -375,7 +428,7 @@ class Constraints:
         rows
             Displacements of the coordinates, shape (n, N).
         """
-        for k, u in enumerate(rows if self._limited else ()):
+        for k, u in enumerate(rows if self._limited or self._unasked else ()):
             text = self.lost(u)
             if text:
                 return k, text
@@ -388,7 +441,8 @@ class Constraints:
         ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
         return np.split(multipliers, ends)
 
-    def joint_force(self, joint: Joint, multipliers: Array, reaction: Array) -> Array:
+    def joint_force(self, joint: Joint, multipliers: Array, reaction: Array, u: Array,
+                    t: float) -> Array:
         """What a joint does to its first beam, in the order of ``joint.equations``.
 
         Parameters
@@ -399,12 +453,24 @@ class Constraints:
             Of the equations, shape (m,).
         reaction
             Force of the supports on the coordinates, shape (N,).
+        u, t
+            Where joints act: displacement of the coordinates, shape (N,), and time.
 
         Returns
         -------
         ndarray
             A number for each equation.
         """
+        if len(self._left_out):
+            whole = self._whole
+            sizes = whole.equation_sizes(*whole.slopes)
+            rows = sparse.csr_array(sparse.diags(1.0 / sizes) @ whole.sparse_jacobian(u, t)
+                                    @ sparse.diags(self.coordinate_sizes))
+            all_of = np.zeros(whole.m)
+            all_of[np.setdiff1d(np.arange(whole.m), self._left_out)] = multipliers
+            inner = [isinstance(j, UnitDirector) for j in whole.joints for _ in j.equations]
+            multipliers = shared(rows, sizes * all_of, self._left_out, np.array(inner)) / sizes
+            return whole.joint_force(joint, multipliers, reaction, u, t)
         for known, part in zip(self.joints, self.multipliers_of(multipliers)):
             if same_joint(known, joint):
                 return -part
@@ -452,16 +518,17 @@ class Constraints:
                 f"frame.settle({node}, {HELD[k]}=lambda t: {value:g} * min(t, 1.0)); or lambda t: "
                 f"{value:g} if it stays as it was in the static state at the start")
 
+    def _dependent(self):
+        """The first equation that those before it hold, see :func:`.signature.first_dependent`."""
+        zero = np.zeros(self.N)
+        return first_dependent(self._at_rest * self.coordinate_sizes, self.free,
+                               lambda: self.constraint(zero, 0.0))
+
     def require_independent_joints(self) -> None:
-        """Raise SupportError if joints repeat or contradict each other or the supports."""
+        """Raise SupportError if joints contradict each other or the supports, or depend on them."""
         if self._independent or not self.joints or self.condensable:
             return
-        self._independent = self._apart
-        if self._independent:
-            return
-        zero = np.zeros(self.N)
-        found = first_dependent(self._at_rest * self.coordinate_sizes, self.free,
-                                lambda: self.constraint(zero, 0.0))
+        found = self._dependent()
         self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return

@@ -733,7 +733,9 @@ class State(Frozen):
 
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""
-        return self.system.joint_force(joint, self.multipliers, self._support_force())
+        t = self.load if self.t is None else self.t
+        return self.system.joint_force(joint, self.multipliers, self._support_force(), self._acted,
+                                       t)
 
     # files and pictures
 
