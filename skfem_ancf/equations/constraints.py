@@ -148,7 +148,7 @@ class Constraints:
                 parts.append(Part(joint, np.setdiff1d(np.arange(m), out)))
         warnings.warn(
             f"{len(found)} of {self.m} equations of joints repeat others or supports: "
-            f"{', '.join(said)}. The scene moves as without them; joint_force shares the forces "
+            f"{', '.join(said[:4])}{f' and {len(said) - 4} more' * (len(said) > 4)}. The scene moves as without them; joint_force shares the forces "
             "by least squares", ModelWarning, stacklevel=5)
         self._whole = twin_of(self)
         self.joints, self.m = parts, self.m - len(found)
