@@ -21,7 +21,7 @@ from skfem import LinearForm
 
 from skfem_ancf import (AncfError, ConvergenceError, ElementBeamANCF, MeshBeam, MissingExtra,
                         ModelWarning, NameUnknown, StVenantKirchhoff)
-from skfem_ancf.core.errors import CallbackError, CallError, ModelWarning
+from skfem_ancf.core.errors import CallbackError, CallError
 
 SECONDS = 5.0  # of the processor that a call with a bad argument may take
 
