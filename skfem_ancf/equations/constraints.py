@@ -146,10 +146,11 @@ class Constraints:
             said.append(f"{joint!r} ({', '.join(joint.equations[k] for k in out)})")
             if len(out) < m:
                 parts.append(Part(joint, np.setdiff1d(np.arange(m), out)))
+        more = f" and {len(said) - 4} more" if len(said) > 4 else ""
         warnings.warn(
             f"{len(found)} of {self.m} equations of joints repeat others or supports: "
-            f"{', '.join(said[:4])}{f' and {len(said) - 4} more' * (len(said) > 4)}. The scene moves as without them; joint_force shares the forces "
-            "by least squares", ModelWarning, stacklevel=5)
+            f"{', '.join(said[:4])}{more}. The scene moves as without them; joint_force shares "
+            "the forces by least squares", ModelWarning, stacklevel=5)
         self._whole = twin_of(self)
         self.joints, self.m = parts, self.m - len(found)
         self._left_out, self._unasked = found, unasked
