@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from skfem.assembly import Basis, FacetBasis, asm
+from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
-from ..forms import weak as forms
 from ..materials.damping import KelvinVoigt
 from ..elements import ElementBeam, choose_element
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
@@ -23,6 +22,7 @@ from ..core.kept import cached_property
 from .kinematics import KINEMATICS
 from ..materials import Material
 from ..mesh.mesh_beam import MeshBeam, reach
+from .inertia import of_sections
 from .interpolation import Part
 from ..mesh.places import as_point, facets_of, node_of
 from ..core.quadrature import gauss, tensor
@@ -254,8 +254,15 @@ class Beam(Frozen):
                      quadrature=self.terms[0].quadrature)
 
     def exact_basis(self) -> Basis:
-        """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
-        return Basis(self.mesh, self.vector_element, quadrature=self.exact_rule())
+        """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass.
+
+        Its ``dx`` are volumes as of the mass: sections have their height between nodes too.
+        """
+        X, W = self.exact_rule()
+        basis = Basis(self.mesh, self.vector_element, quadrature=(X, W))
+        if not self.mesh.is_straight:
+            basis.dx = self.mesh.mapping().full_volume(X) * W
+        return basis
 
     def exact_rule(self) -> Rule:
         """Points and weights of the quadrature of :meth:`exact_basis`."""
@@ -720,7 +727,10 @@ class Beam(Frozen):
         slab = self.across.slabs[0]
         if len(self.across.slabs) == 1 and not callable(slab.density):
             return self.across.density(slab, np.zeros((2, 0)))
-        return self.total_mass / self.kernel.volume
+        if not self.has_sections:
+            return self.total_mass / self.kernel.volume
+        volume = float(np.sum(of_sections(self, "").mass))
+        return self.total_mass / (volume * (self.mesh.nelements if self.across.uniform else 1))
 
     @cached_property
     def inertia(self) -> Inertia:
@@ -764,12 +774,12 @@ class Beam(Frozen):
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""
-        if self.across.simple:
-            return asm(forms.mass(self.density, self.across.slabs[0].width), self.exact_basis())
         dofs = self.basis.element_dofs.T
         rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
-        return sparse.coo_matrix((self.mass_elements().ravel(), (rows.ravel(), columns.ravel())),
-                                 shape=(self.N, self.N)).tocsr()
+        M = sparse.coo_matrix((self.mass_elements().ravel(), (rows.ravel(), columns.ravel())),
+                              shape=(self.N, self.N)).tocsr()
+        M.eliminate_zeros()
+        return M
 
 
 def _section(section, width):

@@ -95,13 +95,15 @@ def points_along(beam: Interior) -> int:
     return beam.element.axis_degree + 1 + more
 
 
-def of_sections(beam: Interior) -> Inertia:
-    """The Inertia of a beam with sections.
+def of_sections(beam: Interior, times: str = "density") -> Inertia:
+    """The Inertia of a beam with sections, of their full height between nodes too.
 
     Parameters
     ----------
     beam
         A :class:`~skfem_ancf.Beam`.
+    times
+        "" for volumes in place of masses.
     """
     across, axis = beam.across, gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
@@ -109,7 +111,7 @@ def of_sections(beam: Interior) -> Inertia:
     for slab, rule in across.rules(beam.element.order + 1, inertia=True):
         X, W = product_rule(axis, rule)
         parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
-                      across.volume(slab, X, W, tind, times="density")))
+                      across.volume(slab, X, W, tind, times=times, full=True)))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 

@@ -281,6 +281,9 @@ def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> Bilinea
 def mass(density: float, width: float = 1.0) -> BilinearForm:
     """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion.
 
+    On curved meshes with linear sections the volumes of a stock ``Basis`` are too small by
+    theta^2 / 12, theta the angle of an element: take :meth:`~skfem_ancf.Beam.exact_basis`.
+
     Parameters
     ----------
     density
@@ -299,6 +302,8 @@ def mass(density: float, width: float = 1.0) -> BilinearForm:
 
 def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
     """Dead load ``int rho g . v dV``, a ``LinearForm``.
+
+    The volumes are those of the basis, see :func:`mass`.
 
     Parameters
     ----------

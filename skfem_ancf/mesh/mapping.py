@@ -436,6 +436,29 @@ class MappingBeam(Mapping):
         a, b, _ = self._derivatives(X, tind)
         return cross(a, b)
 
+    def full_volume(self, X: Array, tind: Array | None = None) -> Array:
+        """The determinant of :meth:`DF` with directors of length 1.
+
+        Those that are interpolated between nodes are shorter: halfway between two that differ by
+        an angle theta by the factor cos(theta / 2). Bodies weigh what their height says.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints).
+        """
+        if self.mesh.is_straight:
+            return self.detDF(X, tind)
+        along, across, axis = self._derivatives(X, tind)
+        size = np.hypot(*across) / self.height(X[0], tind)[0]
+        of_axis = cross(axis, across)
+        return (of_axis + (cross(along, across) - of_axis) / size) / size
+
     def invDF(self, X: Array, tind: Array | None = None) -> Array:
         """The inverse of :meth:`DF`.
 

@@ -113,6 +113,12 @@ class Sections:
         X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
         return X, mapping.DF(X, self.e)
 
+    @property
+    def full_volume(self) -> Array:
+        """Of bodies that weigh what their height says, see :meth:`.MappingBeam.full_volume`."""
+        mesh = self.forces.beam.mesh
+        return self.volume if mesh.is_straight else mesh.mapping().full_volume(self.X, self.e)
+
     @cached_property
     def _functions(self):
         """Local functions and their slopes."""
@@ -299,7 +305,7 @@ class SectionForces:
             inside = Sections(self, e, xi, eta, self.lifted, slab)
             body = inside.body
             if np.any(body):
-                size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
+                size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.full_volume
                 parts.append((inside, size * body))
         for side in (0, 1):
             if any(np.any(load.faces[side]) for _, load in self.faces) or any(

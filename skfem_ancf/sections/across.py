@@ -222,7 +222,7 @@ class Across(Frozen):
         return out
 
     def volume(self, slab: Slab, X: Array, W: Array, tind: Array | None = None,
-               whole: bool = False, times: str = "") -> Array:
+               whole: bool = False, times: str = "", full: bool = False) -> Array:
         """Volumes that the points of a rule of a slab stand for, shape (nelements, npoints).
 
         Parameters
@@ -237,11 +237,16 @@ class Across(Frozen):
             The points stand for their sections.
         times
             "grade" or "density" for the integrals of these; "" for volumes.
+        full
+            Of the body whose sections have their height between nodes too, see
+            :meth:`~skfem_ancf.mesh.mapping.MappingBeam.full_volume`.
         """
         if self.simple and self.uniform and tind is not None:
             size = slab.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
             return size * self.density(slab, X, tind) if times == "density" else size
-        return self.breadth(slab, X, tind, whole, times) * W * self.mesh.mapping().detDF(X, tind)
+        mapping = self.mesh.mapping()
+        of_cell = (mapping.full_volume if full else mapping.detDF)(X, tind)
+        return self.breadth(slab, X, tind, whole, times) * W * of_cell
 
     def breadth(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False,
                 times: str = "") -> Any:
