@@ -162,7 +162,7 @@ def projected(beam: Interior, field: Callable[[Array], Array]) -> Array:
     X, W = beam.exact_rule()
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
     N = element.values(mapping, X).transpose(1, 0, 2)
-    weighted, back = N * (mapping.detDF(X) * W)[:, None], N.transpose(0, 2, 1)
+    weighted, back = N * (mapping.full_volume(X) * W)[:, None], N.transpose(0, 2, 1)
     gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
     gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])
     rest, v = field(mapping.F(X)).transpose(1, 2, 0), np.zeros((beam.N // 2, 2))
