@@ -1049,3 +1049,17 @@ def test_two_hinges_are_a_weld(scheme):
     force = a.joint_force(weld)[-1, :2]
     assert_allclose(sum(b.joint_force(hinge)[-1] for hinge in hinges), force, rtol=0,
                     atol=1e-5 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau"])
+def test_a_parallelogram_may_begin_in_line(scheme):
+    """Where its velocity says which way it goes on; it has no equilibrium there to be found."""
+    scene, crank, coupler, rocker = parallelogram(0.0)
+    scene.initial_velocity(lambda x: np.array([-x[1], x[0]]), beam=crank)
+    scene.initial_velocity(lambda x: np.array([-x[1], x[0] - 1.0]), beam=rocker)
+    scene.initial_velocity((0.0, 1.0), beam=coupler)
+    history = scene.integrate(2.0, 0.02, scheme=scheme)
+    for body, rate in ((crank, 1.0), (coupler, 0.0), (rocker, 1.0)):
+        assert_allclose(history.angle(body), rate * history.t, rtol=0, atol=1e-3)
+    with pytest.raises(SupportError, match="depends in this position"):
+        scene.solve_static()

@@ -127,7 +127,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         *breakpoints, *_samples(system, t_start, t_end)])
     if not (in_steps(scheme) and system.by_nodes):
         _require_room(system)
-    system.require_independent_joints()
+    if not system.constraints.passing:
+        system.require_independent_joints()
     system.constraints.require_motion()
     if until is not None:
         if checkpoint is not None:

@@ -74,7 +74,7 @@ class Constraints:
                  stiffness: Callable[[], Any] | None) -> None:
         self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
         self.N = slices[-1].stop
-        self._independent = False
+        self._independent = self.passing = False
         self._eliminate(fixed, values, joints)
         #: numbers of equations left out, and those of each joint
         self._left_out = np.zeros(0, dtype=int)
@@ -128,7 +128,7 @@ class Constraints:
         self._independent = self._apart or self._dependent() is None
         if self._independent:
             return
-        found = repeated(self)
+        found, self.passing = repeated(self)
         if found is None or not len(found):
             return
         parts, first, said, unasked = [], 0, [], []
@@ -537,6 +537,10 @@ class Constraints:
         joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
         size = self.equation_sizes(*self.slopes)[k]
         kind = "repeats" if abs(gap) <= 1e-9 * size else "contradicts"
+        if self.passing and kind == "repeats":
+            raise SupportError(f"{joint!r}, equation {equation!r}, depends in this position on "
+                               "what the supports and the joints before it hold: begin in "
+                               "another one, or solve in time with scene.integrate")
         raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
                            "joints before it hold already: remove one of them")
 

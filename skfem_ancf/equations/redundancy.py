@@ -22,7 +22,7 @@ CLOSED = 1e-10
 CORRECTIONS = 12
 
 
-def repeated(constraints: Any) -> Array | None:
+def repeated(constraints: Any) -> tuple[Array | None, bool]:
     """The equations of joints that repeat others, or None where that cannot be said of all.
 
     An equation repeats others if its row of the Jacobian is a sum of theirs at the start and after
@@ -39,8 +39,10 @@ def repeated(constraints: Any) -> Array | None:
     -------
     ndarray or None
         Numbers of the equations, increasing; None where equations depend on others otherwise.
+    bool
+        True if the others do so in this position alone, and are closed in it.
     """
-    c, found = constraints, []
+    c, found, passing = constraints, [], False
     start = np.zeros(c.N)
     start[c.fixed] = c.values(1.0)
     J = _scaled(c, start)
@@ -60,8 +62,11 @@ def repeated(constraints: Any) -> Array | None:
         if not len(rest):
             continue
         u = _beside(c, start, move, rows, len(kept))
+        if u is None and _closed(c, start, rows, len(kept)) is None:
+            return None, False
         if u is None:
-            return None
+            passing = True
+            continue
         for J1 in (J, _scaled(c, u)):
             A = J1[rows].toarray() / size[:, None]
             C = np.linalg.lstsq(A[kept][:, c.free].T, A[rest][:, c.free].T, rcond=None)[0].T
@@ -70,9 +75,11 @@ def repeated(constraints: Any) -> Array | None:
                     or np.abs(gap[:, driven]).max(initial=0.0) > DEPENDENT
                     or moving[rows[rest]].any()
                     or moving[rows[kept]][np.abs(C).max(axis=0) > DEPENDENT].any()):
-                return None
+                return None, False
         found.append(rows[rest])
-    return np.sort(np.concatenate([np.zeros(0, dtype=int), *found]))
+    if passing:
+        return None, True
+    return np.sort(np.concatenate([np.zeros(0, dtype=int), *found])), False
 
 
 def shared(J: sparse.csr_array, multipliers: Array, left: Array, inner: Array) -> Array:
