@@ -295,8 +295,7 @@ def test_beams_held_by_springs_only():
         scene.solve_static()
     scene.spring(50.0, (("lower", (0, 0)), (0.0, 1.0)))
     scene.spring(50.0, (("lower", (1, 0)), ("upper", (0.5, 0.5))))
-    with pytest.raises(SupportError):
-        scene.solve_static()
+    assert scene.solve_static().stability == "stable"  # it hangs on them
     scene.torsional_spring(1.0, "left", beam="lower").spring(1.0, (("lower", (0, 0)), (-1.0, 0.0)))
     state = scene.solve_static()
     left, right = (state.position((x, 0), beam="lower") for x in (0, 1))

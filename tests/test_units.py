@@ -146,8 +146,8 @@ def test_many_lines_do_not_make_a_scene_larger(L, origin, order):
     """The error of a motion and its steps are those of one line, wherever and in which order."""
     frames = side_by_side(1, L, origin), side_by_side(12, L, origin, order)
     assert np.isclose(frames[1].beams[0].size, np.hypot(1.0, 0.011) * L, rtol=1e-12)
-    one, many = (frame.integrate(t_end=0.3, dt="auto", rtol=1e-3, scheme="generalized-alpha")
-                 for frame in frames)
+    one, many = (frame.integrate(t_end=0.3, dt="auto", rtol=1e-3, scheme="generalized-alpha",
+                                 check=True) for frame in frames)
     assert len(many.t) == len(one.t)
     assert np.isclose(many.error, one.error, rtol=1e-3)
 

@@ -649,11 +649,10 @@ def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
     Examples
     --------
     >>> from skfem_ancf.core.errors import ask
-    >>> ask("amplitude(t={:g})", lambda t: 1 / t, 0.0)
+    >>> ask("amplitude(t={:g})", lambda t: 1 / t, 0.0)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    skfem_ancf.core.errors.CallbackError: amplitude(t=0) raised ZeroDivisionError: float division by
-    zero
+    skfem_ancf.core.errors.CallbackError: amplitude(t=0) raised ZeroDivisionError: ...
     """
     try:
         return function(*args)

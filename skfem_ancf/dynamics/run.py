@@ -78,8 +78,14 @@ class Task:
         return self.t_end - self.t_start
 
 
-def task_of(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
+def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
+            breakpoints: Any) -> Task:
     """What is asked for, checked: arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`.
+
+    Parameters
+    ----------
+    t_start, t_end, dt, t_eval, tol, rtol, breakpoints
+        As for that function; ``t_eval`` and ``breakpoints`` of shape (n,).
 
     Raises
     ------

@@ -997,7 +997,7 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     Examples
     --------
     >>> from skfem_ancf import Frame, StVenantKirchhoff
-    >>> from skfem_ancf.mesh import reach
+    >>> from skfem_ancf.mesh.mesh_beam import reach
     >>> points, lines = [(0, 0), (3, 0), (3, 4), (0, 4)], [(0, 1), (1, 2), (2, 3), (3, 0)]
     >>> steel = StVenantKirchhoff(E=2e11, nu=0.3)
     >>> frame = Frame.from_lines(points, lines, height=0.1, width=0.1, material=steel)

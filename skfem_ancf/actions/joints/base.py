@@ -602,7 +602,7 @@ def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
     Parameters
     ----------
     layout, at
-        As for :func:`members_at`.
+        As for :func:`members_at`: a point, shape (2,), or the name of a place.
     found
         What that returned.
     """

@@ -14,7 +14,7 @@ from numba import __version__, cfunc, njit, typeof, version_info
 from ...core.archive import replacing
 from ...core.origin import ours
 from ...core.source import column, lanes
-from . import cannot_keep, key
+from . import can_keep, cannot_keep, key
 from .flags import Known, KnownOfOthers, TextFlags
 from .loops import counted
 from .records import record_type
@@ -133,7 +133,7 @@ def _kept_on_disk(function, compiled):
             logger.warning("compiled code in %s is not what was written there: it is compiled anew",
                            folder)
             for path in _all_of(folder, name):
-                path.unlink()
+                path.unlink(missing_ok=True)
             before = None
         found = compiled(cache=True)
         now = _hash_of(folder, name)
@@ -141,8 +141,11 @@ def _kept_on_disk(function, compiled):
             with replacing(note) as new:
                 new.write_text(now)
         return found
-    except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
-        cannot_keep(error)
+    except (RuntimeError, *_SPOILT) as error:
+        if can_keep():  # another process writes the same files just now
+            logger.info("compiled code is not taken from disk this time: %s", error)
+        else:
+            cannot_keep(error)
     return compiled()
 
 
