@@ -62,7 +62,7 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
     if p.t_end is not None:
         words.append({"energy-momentum": "EM", "generalized-alpha": "g-alpha"}.get(scheme, scheme)
                      + (f" of {points}" if points else ""))
-    words += [f"{k} {v:g}" for k, v in options.items()]
+    words += [f"{k} {v}" for k, v in options.items()]
 
     def build():
         s = scene(p, element, n, formulation, compiled, grade)

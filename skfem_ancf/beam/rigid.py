@@ -84,8 +84,11 @@ class RigidBody(Frozen):
     def __init__(self, mass: float, inertia: float, position: ArrayLike = (0.0, 0.0),
                  angle: float = 0.0, name: str | None = None,
                  outline: ArrayLike | None = None) -> None:
-        self.mass, self.inertia = require_positive("mass", mass), require_positive("inertia",
-                                                                                  inertia)
+        self.mass = require_positive("mass", mass)
+        self.inertia = require_positive("inertia", inertia)
+        for name_of, value in (("mass", self.mass), ("inertia", self.inertia)):
+            if value < np.finfo(float).tiny:
+                raise InputError(f"{name_of} must be a number whose inverse is one, got {value!r}")
         self.position = require_finite("position", position, (2,))
         self.angle = require_finite_scalar("angle", angle)
         self.name = require_label("name", name)
