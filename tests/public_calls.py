@@ -447,8 +447,8 @@ call("scene.point_mass", lambda **k: moved(clamped().point_mass(**k)),
      dict(mass=1.0, at=(1.0, 0.0), inertia=0.1, beam=0), mass="not negative", at="vector",
      inertia="not negative", beam="beam?")
 call("scene.follower_force", lambda **k: moved(clamped().follower_force(**k)),
-     dict(force=(0.0, -0.1), at=(1.0, 0.0), beam=0, amplitude=amplitude), force="vector",
-     at="vector", beam="beam?", amplitude="function?")
+     dict(force=(0.0, -0.1), at=(1.0, 0.0), beam=0, amplitude=amplitude, line=0), force="vector",
+     at="vector", beam="beam?", amplitude="function?", line="nodes?")
 call("scene.line_load", lambda **k: moved(clamped().line_load(**k)),
      dict(force=(0.0, -0.1), beam=0, amplitude=amplitude), force="vector", beam="beam?",
      amplitude="function?")

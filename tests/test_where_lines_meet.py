@@ -103,6 +103,33 @@ def test_the_node_is_read_from_each_line(case):
                     history.state(-1).resultants((0, 4), line=0, recover=False).N, rtol=1e-9)
 
 
+def test_a_follower_force_at_a_node_turns_with_the_line_that_is_named():
+    """A weak column that leans as the girder on it is pushed: the force turns with either."""
+    for groups in ("together", "apart"):
+        frame = joint(ElementBeamCable(5), groups)
+        with pytest.raises(InputError, match=r"axes of lines \[0, 1, 2\].*line=0"
+                           if groups == "together" else "beam"):
+            frame.follower_force((0.0, -F), at=(0, 4))
+        if groups == "apart":
+            with pytest.raises(InputError, match=r"axes of lines \[1, 2\].*line=1"):
+                frame.follower_force((0.0, -F), at=(0, 4), beam="girder")
+        for line in range(3):
+            loads = joint(ElementBeamCable(5), groups).follower_force(
+                (0.0, -F), at=(0, 4), line=line).loads
+            beam, force = loads[0].beam, loads[0].force(np.zeros(loads[0].beam.N))
+            assert_allclose(force @ beam.rigid_motions()[:, :2], [0, -F], atol=1e-9)
+            # the slope that turns it is that of the end of the line
+            _, j, v = loads[0].stiffness(np.zeros(beam.N))
+            at = beam.finder.find(np.array([[0.0], [4.0]]), line if groups == "together" else
+                                  max(0, line - 1))
+            node = beam.mesh.t[round(at[1][0, 0]), at[0][0]]
+            assert set(np.unique(j[np.abs(v) > 1e-9 * np.abs(v).max()]) // beam.nd) == {node}
+    with pytest.raises(InputError, match="lines are numbered 0 to 2"):
+        joint(ElementBeamCable(5), "together").follower_force((0, -F), at=(0, 4), line=3)
+    # away from the node nothing is asked
+    joint(ElementBeamCable(5), "apart").follower_force((0, -F), at=(1, 4)).solve_static()
+
+
 def test_no_points_are_none_of_them(case):
     _, state = case
     none = np.zeros((2, 0))

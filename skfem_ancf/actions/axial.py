@@ -10,8 +10,10 @@ from ..core.errors import ask_field, require_finite
 from ..beam.kernels.section import beam_gradients
 from .loads import DeadLoad, Load
 from ..core.quadrature import gauss
+from ..beam.points import Points
 from ..beam.rigid import RigidBody
 from ..beam.distribution import AXIS, Sampled, Spread
+from ..mesh.places import as_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,6 +38,8 @@ class FollowerForce(Load):
         The point: its place (x, y) in the stress-free body, shape (2,).
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
+    line
+        The number of the chain of elements of the beam whose tangent it is, where several meet.
     """
 
     constant = False
@@ -51,23 +55,24 @@ class FollowerForce(Load):
     _turn: Any
 
     def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
-                 amplitude: TimeFunction = None) -> None:
+                 amplitude: TimeFunction = None, line: int | None = None) -> None:
         super().__init__(beam, amplitude)
-        self.total, self.at = require_finite("force", force, (2,)), at
+        self.total, self.at, self.line = require_finite("force", force, (2,)), at, line
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         bound = cast("FollowerForce", super().bind(cast("Beam", beam)))
-        bound._dofs, weights = beam.probe(self.at)
-        bound._weights = np.broadcast_to(weights, bound._dofs.shape)
         if isinstance(beam, RigidBody):
+            bound._dofs, weights = beam.probe(self.at)
             bound._stations, bound._start = (), beam.q0[2:]
             bound._along, bound._slopes = beam.section_direction(0)
         else:
-            e, X = beam.locate(self.at)
+            e, X = _place(beam, self.at, self.line)
+            bound._dofs, weights = beam.probe_at(self.at, e, X)
             bound._stations, bound._along = (e + float(X[0]),), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
                                            np.array([e]))
             bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
+        bound._weights = np.broadcast_to(weights, bound._dofs.shape)
         # the force is a matrix times the unit tangent
         (x, y), n = self.total, bound._start / np.hypot(*bound._start)
         a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
@@ -94,6 +99,13 @@ class FollowerForce(Load):
 
     def spread(self, u: Array) -> Spread:
         return Spread(stations=self._stations)
+
+
+def _place(beam, at, line):
+    """Element and reference point (2,) of a point; asks for the line where several meet."""
+    point = as_point(at, beam.mesh)
+    part, = Points([beam], [slice(beam.N)]).find(point, beam, line, ask=True).parts
+    return int(part.e[0]), part.X[:, 0]
 
 
 class LineLoad(Load):

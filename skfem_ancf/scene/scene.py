@@ -39,7 +39,7 @@ from ..actions.loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Tr
                              bind_load)
 from ..results.path import CriticalPoint, Path
 from ..core.pickling import functions_of, require_picklable
-from ..mesh.places import on_other_mesh
+from ..mesh.places import as_point, on_other_mesh
 from .plan import make_plan
 from ..results.state import State
 from ..beam.rigid import RigidBody, on_body
@@ -724,7 +724,7 @@ class Scene:
         return self._put(loads=[(k, PointForce(force, at, None, amplitude))])
 
     def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
-                       amplitude: TimeFunction = None) -> Scene:
+                       amplitude: TimeFunction = None, line: int | None = None) -> Scene:
         """A force on a material point that turns with the tangent of the axis, or with a body.
 
         Parameters
@@ -737,15 +737,29 @@ class Scene:
             The beam, its name or its number, where several have the point.
         amplitude
             A function of time by which the force is multiplied in a motion.
+        line
+            The number of the line whose tangent it is, of a frame where lines meet; of another
+            scene that of the chain of elements of the beam.
 
         Returns
         -------
         Scene
             Itself.
+
+        Raises
+        ------
+        InputError
+            If the axes of several lines are nearest to the point and none is named.
         """
         at, beam = on_body(at, beam)
+        chain = None
+        if line is not None:
+            beam, chain = self.system.points.chain_of(line, beam)
         k = self._number_at(at, beam)
-        return self._put(loads=[(k, FollowerForce(force, at, None, amplitude))])
+        one = self.members[k]
+        if chain is None and isinstance(one, Beam) and not one.mesh.is_chain:
+            self.system.points.find(as_point(at, one.mesh), one, ask=True)
+        return self._put(loads=[(k, FollowerForce(force, at, None, amplitude, chain))])
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
                   amplitude: TimeFunction = None) -> Scene:
