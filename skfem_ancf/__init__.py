@@ -1,31 +1,121 @@
 """Planar ANCF beams of any order as scikit-fem elements."""
 
-from .forms import weak as forms
+from .actions.axial import FollowerForce, LineLoad
+from .actions.eigenstrain import EigenStrain, Temperature
+from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
+                             TorsionalSpring)
+from .actions.joints import (Hinge, Joint, OnCircle, OnLine, PlaneSection, PrescribedAngle,
+                             PrescribedPosition, PrescribedTurn, Sleeve, Slot, Weld)
+from .actions.loads import (DeadLoad, EndMoment, FormLoad, Load, PointForce, Pressure, Traction,
+                            Weight)
+from .actions.obstacles import Circle, Line, Polygon, SignedDistance
+from .actions.supports import Support
 from .beam.beam import Beam, reference_coordinates
-from .materials.damping import KelvinVoigt
-from .dynamics import HHT, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark, Radau
-from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
-                       ElementBeamCable, ElementBeamPatelShabana)
-from .core.errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError,
+from .beam.rigid import RigidBody
+from .core.errors import (AncfError, CallError, CallbackError, ConvergenceError, FileError,
                           InputError, MeshError, MissingExtra, ModelWarning, NameUnknown,
                           StabilityWarning, SupportError)
-from .scene.frame import Frame
-from .materials import NeoHookean, StVenantKirchhoff
+from .dynamics import EnergyMomentum, Gauss, GeneralizedAlpha, HHT, Newmark, Radau, Scheme
+from .dynamics.history import History
+from .elements import (ElementBeam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                       ElementBeamCable, ElementBeamPatelShabana)
+from . import forms
+from .formulations import Formulation
+from .materials import Material, NeoHookean, StVenantKirchhoff
+from .materials.damping import KelvinVoigt
 from .mesh.mesh_beam import MeshBeam
-from .actions.obstacles import Circle, Line, Polygon, SignedDistance
-from .beam.rigid import RigidBody
+from .recovery.resultants import Resultants
+from .results.path import CriticalPoint, Path
+from .results.state import Reaction, State
+from .scene.frame import Frame
 from .scene.scene import Scene
 from .sections import Section
+from .solvers.eigen import Buckling, Modes
 from .sweeps.parameter_sweep import sweep
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "HHT", "AncfError", "Beam", "CallError", "CallbackError", "Circle", "ConvergenceError",
-    "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamANCFHermite", "ElementBeamCable",
-    "ElementBeamPatelShabana", "EnergyMomentum", "FileError", "Frame", "Gauss", "GeneralizedAlpha",
-    "InputError", "KelvinVoigt", "Line", "MeshBeam", "MeshError", "MissingExtra", "ModelWarning",
-    "NameUnknown", "NeoHookean", "Newmark", "Polygon", "Radau", "RigidBody", "Scene", "Section",
-    "SignedDistance", "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms",
-    "reference_coordinates", "sweep",
+                             "HHT",
+                             "AncfError",
+                             "Beam",
+                             "Buckling",
+                             "CallError",
+                             "CallbackError",
+                             "Circle",
+                             "Control",
+                             "ConvergenceError",
+                             "CriticalPoint",
+                             "DeadLoad",
+                             "Drag",
+                             "EigenStrain",
+                             "ElementBeam",
+                             "ElementBeamANCF",
+                             "ElementBeamANCFCubic",
+                             "ElementBeamANCFHermite",
+                             "ElementBeamCable",
+                             "ElementBeamPatelShabana",
+                             "EndMoment",
+                             "EnergyMomentum",
+                             "FileError",
+                             "FollowerForce",
+                             "ForceElement",
+                             "FormLoad",
+                             "Formulation",
+                             "Foundation",
+                             "Frame",
+                             "Gauss",
+                             "GeneralizedAlpha",
+                             "Hinge",
+                             "History",
+                             "InputError",
+                             "Joint",
+                             "KelvinVoigt",
+                             "Line",
+                             "LineLoad",
+                             "Load",
+                             "Material",
+                             "MeshBeam",
+                             "MeshError",
+                             "MissingExtra",
+                             "ModelWarning",
+                             "Modes",
+                             "NameUnknown",
+                             "NeoHookean",
+                             "Newmark",
+                             "OnCircle",
+                             "OnLine",
+                             "Path",
+                             "PlaneSection",
+                             "PointForce",
+                             "PointMass",
+                             "Polygon",
+                             "PrescribedAngle",
+                             "PrescribedPosition",
+                             "PrescribedTurn",
+                             "Pressure",
+                             "Radau",
+                             "Reaction",
+                             "Resultants",
+                             "RigidBody",
+                             "Scene",
+                             "Scheme",
+                             "Section",
+                             "SignedDistance",
+                             "Sleeve",
+                             "Slot",
+                             "Spring",
+                             "StVenantKirchhoff",
+                             "StabilityWarning",
+                             "State",
+                             "Support",
+                             "SupportError",
+                             "Temperature",
+                             "TorsionalSpring",
+                             "Traction",
+                             "Weight",
+                             "Weld",
+                             "forms",
+                             "reference_coordinates",
+                             "sweep",
 ]
