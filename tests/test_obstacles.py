@@ -1188,7 +1188,7 @@ def turned(history):
     return np.unwrap(np.arctan2(history.u[:, 3], 1.0 + history.u[:, 2]))
 
 
-@pytest.mark.parametrize("scheme, small", [("energy-momentum", 1e-12), ("generalized-alpha", 5e-3)])
+@pytest.mark.parametrize("scheme, small", [("energy-momentum", 1e-10), ("generalized-alpha", 5e-3)])
 def test_a_torque_that_drives_against_friction_is_in_the_balance(scheme, small):
     """Its work is what vibrates, moves and is lost; its moment turns the arm and rubs."""
     history, _ = driven_arm(scheme, torque=60.0)
