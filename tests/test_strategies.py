@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp, trapezoid
 from scipy.optimize import brentq, root
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam,
@@ -170,7 +170,7 @@ def test_a_mooring_line_on_the_sea_bed_is_a_catenary_where_it_is_lifted():
     w, EA = 7800 * h**2 * 9.81, 2e9 * h**2
     s = np.linspace(0, V / w, 2001)  # from where it is lifted
     T = np.hypot(H, w * s)
-    x, y = (np.trapezoid(c * (1 / T + 1 / EA), s) for c in (H, w * s))
+    x, y = (trapezoid(c * (1 / T + 1 / EA), s) for c in (H, w * s))
     end = 100 - V / w + H / EA * (100 - V / w) + x, y
     assert state.stability == "stable"
     assert np.allclose(state.position((100, 0)), end, rtol=0, atol=0.02)

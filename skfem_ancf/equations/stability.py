@@ -41,6 +41,8 @@ LARGEST, ASTRAY = 0.5, 20.0
 HALVED = 8
 #: Stiffness that holds what supports leave free, over that of the loads.
 HELD = 1e-6
+#: Forces that are zero, over those that a strain of one would cause.
+NOTHING = 1e-20
 #: Largest difference of a tangent from its transpose, relative, that is round-off.
 ROUND_OFF = 1e-10
 
@@ -182,7 +184,10 @@ def is_held(system: Any, u: Array, multipliers: Array) -> bool:
     fix(system.K.band, system.fixed)
     loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
     weights = position_weights(system) * system.mask
-    least = HELD * np.max(loads * weights) / (system.size * max(1.0, np.sum(weights)))
+    acting = np.max(loads * weights)
+    if acting * system.size <= NOTHING * system.energy_of_strains:
+        return False
+    least = HELD * acting / (system.size * max(1.0, np.sum(weights)))
     system.K.add_diagonal(-least * weights)
     try:
         system.factorize(u, 1.0, multipliers)
