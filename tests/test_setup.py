@@ -112,7 +112,7 @@ def test_equal_elements_have_the_forces_of_elements_one_by_one(monkeypatch, elem
     def beam(alike):
         mesh = MeshBeam.init_line(np.linspace(0.5, 2.0, 4), 0.07, angle=0.6)
         if not alike:
-            vars(mesh)["_is_uniform"] = False
+            vars(mesh)["is_uniform"] = False
         return Beam(mesh, element, StVenantKirchhoff(2e9, 0.3, 7800.0, plane), 0.02, formulation)
 
     one, other = beam(True), beam(False)
@@ -209,23 +209,6 @@ def test_curves_are_asked_at_all_points_at_once():
         assert not kept.flags.writeable and kept.flags.c_contiguous
     assert np.allclose(mesh.p_XY, mesh.curve.turning(x), rtol=1e-15, atol=1e-15)
     assert np.allclose(mesh.lengths, mesh.curve.lengths(x[:-1], x[1:]), rtol=1e-15)
-
-
-def test_meshes_made_by_their_class_are_not_asked_again(monkeypatch):
-    """What a class of one's own asks for is asked: it has all that is known by then."""
-    class Own(MeshBeam):
-        def __post_init__(self):
-            super().__post_init__()
-            self.seen = self.lengths.sum()
-
-    asked = counted(monkeypatch, MeshBeam, "__post_init__")
-    arc = (lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), np.linspace(0, 1, 4), 0.1)
-    mesh = MeshBeam.init_curve(*arc).with_sections("cubic")
-    MeshBeam.init_line([0, 1, 2], lambda x: 0.2 - 0.05 * x)
-    assert not asked
-    own = Own.init_curve(*arc)
-    assert len(asked) == 1 and own.seen == pytest.approx(1.0) and own.boundaries
-    assert np.array_equal(own.p, mesh.p) and np.array_equal(own.p_XY, mesh.p_XY)
 
 
 def test_arrays_are_tried_before_their_heads_are_read(needs_compiled, monkeypatch):

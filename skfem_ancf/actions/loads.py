@@ -6,8 +6,12 @@ again for the same scene on other meshes.
 
 from __future__ import annotations
 
+import copyreg
 import re
+import sys
 from functools import partial
+from importlib import import_module
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -24,7 +28,6 @@ from ..core.frozen import Sealable, read_only
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.kept import cached_property
 from ..core.origin import ours
-from ..core.pickling import picklable_form
 from ..mesh.places import facets_of
 from ..beam.rigid import RigidBody
 from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
@@ -459,6 +462,20 @@ def _warn_of_lever(beam, surfaces, forces):
             "give an end its moment by scene.moment", ModelWarning)
 
 
+def _form_of(module, name):
+    return attrgetter(name)(import_module(module))
+
+
+def _reduced(form):
+    """For pickle: by its name what a decorator made, since its function has the same name."""
+    module, name = form.form.__module__, form.form.__qualname__
+    named = getattr(sys.modules.get(module), name, None) is form
+    return (_form_of, (module, name)) if named else object.__reduce_ex__(form, 4)
+
+
+copyreg.pickle(LinearForm, _reduced)
+
+
 class FormLoad(Load):
     """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary.
 
@@ -471,12 +488,6 @@ class FormLoad(Load):
     beam, amplitude
         As for :class:`Load`.
     """
-
-    def __getstate__(self):
-        return {**vars(self), "form": picklable_form(self.form)}
-
-    def __setstate__(self, state):
-        vars(self).update(state, form=state["form"].form)
 
     def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:

@@ -1,40 +1,16 @@
-"""Tables that are kept for the next time, a few of them."""
+"""Older names for ``functools.cached_property`` and ``copy.copy``, until everything has moved."""
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Hashable
-from typing import TYPE_CHECKING, Any
+from copy import copy
+from functools import cached_property
+from typing import Any
 
-if TYPE_CHECKING:
-    cached_property = functools.cached_property
-else:
-    class cached_property(functools.cached_property):
-        """That of ``functools``, without the lock that it has before Python 3.12."""
-
-        def __get__(self, instance, owner=None):
-            if instance is None:
-                return self
-            value = vars(instance)[self.attrname] = self.func(instance)
-            return value
-
+__all__ = ["cached_property", "kept", "twin_of"]
 
 def twin_of(thing: Any) -> Any:
-    """Another object with the same attributes: ``copy`` of one without slots, many times faster.
-
-    Examples
-    --------
-    >>> class Point:
-    ...     x = 1.0
-    >>> p = Point()
-    >>> p.y = 2.0
-    >>> q = twin_of(p)
-    >>> q is p, vars(q)
-    (False, {'y': 2.0})
-    """
-    other = object.__new__(type(thing))
-    other.__dict__.update(thing.__dict__)
-    return other
+    return copy(thing)
 
 
 def kept(store: dict, key: Hashable, make: Callable[[], Any], most: int = 32) -> Any:

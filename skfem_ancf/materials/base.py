@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
                            require_positive, require_slope, shown)
-from ..core.frozen import Frozen, rebuilt
-from ..core.kept import cached_property, kept
+from ..core.immutable import Immutable, rebuilt
 from ..core.origin import ours
-from ..core.pickling import require_picklable
 from ..core.quadrature import gauss
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 PLANES = ("stress", "strain")
 
 
-class Material(Frozen):
+class Material(Immutable):
     """An isotropic hyperelastic material in plane stress or plane strain.
 
     A material does not change; :meth:`replace` returns a changed copy.
@@ -69,30 +68,21 @@ class Material(Frozen):
         If ``plane`` or ``shear_correction`` is a name that is not known.
     """
 
-    E: Any
-    nu: float
-    density: Any
-    plane: str
-    shear_correction: str | float
-    thermal_expansion: float
-
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
-        E, nu = _number_or_function("E", E), require_finite_scalar("nu", nu)
-        density = None if density is None else _number_or_function("density", density)
-        plane = require_option("plane", plane, PLANES)
-        if not (-1.0 < nu < 0.5 or (nu == 0.5 and plane == "stress")):
+        self.E = _number_or_function("E", E)
+        self.nu = require_finite_scalar("nu", nu)
+        self.density = None if density is None else _number_or_function("density", density)
+        self.plane = require_option("plane", plane, PLANES)
+        if not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")):
             raise InputError(
                 f"the Poisson ratio nu must lie in (-1, 0.5), or be 0.5 in plane stress, got "
                 f"{nu!r} in plane {plane}")
-        if isinstance(shear_correction, str):
-            shear_correction = require_option("shear correction", shear_correction,
-                                              ("auto", "paper"))
-        else:
-            shear_correction = require_positive("shear_correction", shear_correction)
-        vars(self).update(
-            E=E, nu=nu, density=density, plane=plane, shear_correction=shear_correction,
-            thermal_expansion=require_finite_scalar("thermal_expansion", thermal_expansion))
+        self.shear_correction = (
+            require_option("shear correction", shear_correction, ("auto", "paper"))
+            if isinstance(shear_correction, str) else
+            require_positive("shear_correction", shear_correction))
+        self.thermal_expansion = require_finite_scalar("thermal_expansion", thermal_expansion)
 
     @property
     def graded(self) -> bool:
@@ -105,11 +95,6 @@ class Material(Frozen):
         Of a modulus that is a number itself and None.
         """
         return (self.replace(E=1.0), self.E) if callable(self.E) else (self, None)
-
-    def __getstate__(self):
-        require_picklable([(f"the {what} of {self!r}", f) for what, f in (
-            ("modulus E(x, y)", self.E), ("density(x, y)", self.density)) if callable(f)])
-        return super().__getstate__()
 
     @property
     def G(self) -> float:
@@ -392,7 +377,6 @@ class LinearLaw:
 
     def __init__(self, D: ArrayLike) -> None:
         self.D = np.asarray(D)
-        self._compliances: dict = {}
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
@@ -412,7 +396,7 @@ class LinearLaw:
         ndarray
             Shape (n, n).
         """
-        return kept(self._compliances, rows, lambda: np.linalg.inv(self.D[np.ix_(rows, rows)]))
+        return np.linalg.inv(self.D[np.ix_(rows, rows)])
 
     def energy(self, strain: Array) -> Array:
         return 0.5 * np.sum(strain * self.stress(strain), axis=0)

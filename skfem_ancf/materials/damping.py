@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.errors import InputError, require_finite, require_not_negative, shown
-from ..core.frozen import Frozen
+from ..core.immutable import Immutable
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-class KelvinVoigt(Frozen):
+class KelvinVoigt(Immutable):
     """A material with a stress in proportion to the rate of its strain: a dashpot beside a spring.
 
     ``S = S(eps) + time C : d eps / dt`` with the Green-Lagrange strain and the moduli C that the
@@ -51,7 +51,7 @@ class KelvinVoigt(Frozen):
         return f"<KelvinVoigt {self.time:g}>"
 
 
-class Damping(Frozen):
+class Damping(Immutable):
     """The damping of a whole scene, of :meth:`skfem_ancf.Scene.damping`.
 
     Parameters

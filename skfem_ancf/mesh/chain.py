@@ -65,9 +65,6 @@ class Chain(Protocol):
     def sections(self) -> Any: ...
 
     @property
-    def on_line(self) -> Any: ...
-
-    @property
     def is_straight(self) -> Any: ...
 
     @property

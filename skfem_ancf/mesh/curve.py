@@ -151,16 +151,6 @@ class Curve:
         """
         return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
 
-    def functions(self) -> list[tuple[str, Callable[[Array], Any]]]:
-        """Pairs of a description and a function, for those that the curve was given."""
-        r, rate = self.r, self.derivative
-        while isinstance(r, _Moved):
-            r, rate = r.function.r, r.function.derivative
-        items = [("the curve r(s) of the mesh", r)]
-        if not isinstance(rate, (_ComplexStep, _Differences)):
-            items.append(("the derivative dr of the curve of the mesh", rate))
-        return items
-
 
 class _Moved:
     """``A f(s) + shift`` for a function f of parameters."""

@@ -65,8 +65,6 @@ class Finder:
         mesh = self.mesh
         if not mesh.is_straight:
             return None
-        if mesh.on_line:
-            return mesh.p[:, 0], mesh.p_X[:, 0], (mesh.s - mesh.s[0])[mesh.t]
         start, d = mesh.p[:, mesh.t[0, 0]], mesh.p_X[:, mesh.t[0, 0]]
         x, y = mesh.p - start[:, None]
         along, off = d[0] * x + d[1] * y, d[0] * y - d[1] * x

@@ -176,7 +176,3 @@ class Axes:
         """
         return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
                     A @ self.start + shift[:, None], A @ self.way)
-
-    def functions(self) -> list[tuple[str, Callable[[Array], Any]]]:
-        """Pairs of a description and a function, for those that the curves were given."""
-        return [item for arc in self.arcs.values() for item in arc.functions()]

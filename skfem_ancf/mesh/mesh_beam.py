@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copyreg
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -18,11 +21,9 @@ from ..core.errors import (CallbackError, FileError, InputError, MeshError, Name
                            require_option, require_options, require_path, require_positive, shown,
                            require_unmasked)
 from .location import Finder
-from ..core.frozen import Frozen, ReadOnlyDict
-from ..core.kept import twin_of
+from ..core.immutable import Immutable, read_only
 from .mapping import MappingBeam
 from ..core.origin import ours
-from ..core.pickling import require_picklable
 from .places import is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
@@ -47,8 +48,12 @@ IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
 MAX_SUBDIVISION = 1000
 
 
+# a view of an array, as which pickle takes it, has no orientation
+copyreg.pickle(OrientedBoundary, lambda f: (OrientedBoundary, (np.asarray(f), f.ori)))
+
+
 @dataclass(repr=False, eq=False)
-class MeshBeam(Frozen, Mesh2D):
+class MeshBeam(Immutable, Mesh2D):
     """A planar beam in its stress-free state, divided into elements along its axis.
 
     A mesh does not change; its methods return other meshes.
@@ -224,30 +229,12 @@ class MeshBeam(Frozen, Mesh2D):
 
         Without a curve the axis is straight, and ``lengths`` are those between the nodes.
         """
-        frame, (height, heights, taper) = np.empty((2, *p.shape)), heights
-        frame[0], frame[1, 0], frame[1, 1] = tangent, 0.0 - tangent[1], tangent[0]
-        given = dict(doflocs=p, t=t, height=height, p_X=frame[0], p_Y=frame[1], lengths=lengths,
-                     s=s, curve=curve, p_XY=np.zeros(p.shape) if turning is None else turning,
-                     heights=heights, taper=taper)
-        if cls.__post_init__ is not MeshBeam.__post_init__:
-            mesh = cls(**given)
-            mesh._boundaries = mesh._build_default_tags()
-            return mesh
-        for array in (frame, *given.values()):
-            if isinstance(array, np.ndarray):
-                array.flags.writeable = False
-        mesh = object.__new__(cls)
-        vars(mesh).update(given, _sealed=True)
-        vars(mesh).update(_boundaries=ReadOnlyDict(mesh._build_default_tags()))
-        d, far = p[:, 1:] - p[:, :-1], np.abs(p).max()
-        mesh._require_length((np.hypot(d[0], d[1]) > 4 * EPS * far) & (lengths > 0.0))
-        if curve is None:
-            even, low, high = heights is None, lengths.min(), lengths.max()
-            vars(mesh).update(_is_straight=True, _on_one_line=even, _is_uniform=even and bool(
-                high - low <= 1e-13 * high + 8 * EPS * far))
-        if curve is not None or heights is not None:
-            require_finite("lengths", lengths)
-            mesh._mapping().check()
+        height, heights, taper = heights
+        tangent = np.broadcast_to(tangent, p.shape)
+        mesh = cls(p, t, height=height, p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
+                   lengths=lengths, s=s, curve=curve, heights=heights, taper=taper,
+                   p_XY=np.zeros(p.shape) if turning is None else turning)
+        mesh._boundaries = mesh._build_default_tags()
         return mesh
 
     @classmethod
@@ -338,11 +325,7 @@ class MeshBeam(Frozen, Mesh2D):
         require_option("interpolation of the sections", sections, SECTIONS)
         if sections == self.sections:
             return self
-        mesh = twin_of(self)
-        vars(mesh).update(sections=sections)
-        vars(mesh).pop("_cached_mapping", None)
-        mesh._check_sections()
-        return mesh
+        return replace(self, sections=sections)
 
     def replace(self, **changes: Any) -> MeshBeam:
         """The mesh with another ``height``, a number or a function, or without its ``curve``.
@@ -399,23 +382,30 @@ class MeshBeam(Frozen, Mesh2D):
 
     def __setattr__(self, name, value):
         if name in ("_boundaries", "_subdomains") and value is not None:
-            value = ReadOnlyDict(value)
+            value = {name: read_only(numbers) for name, numbers in value.items()}
         super().__setattr__(name, value)
 
     def __getstate__(self):
-        if self.curve is not None:
-            require_picklable(self.curve.functions())
-        if self.taper is not None:
-            require_picklable([("the function height(x) of the mesh", self.taper)])
-        names = {field.name for field in fields(self)}
-        return {name: value for name, value in vars(self).items() if name in names}
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def boundaries(self) -> MappingProxyType[str, Any] | None:
+        """Numbers of facets by name, see :meth:`with_boundaries`."""
+        return None if self._boundaries is None else MappingProxyType(self._boundaries)
+
+    @property
+    def subdomains(self) -> MappingProxyType[str, Array] | None:
+        """Numbers of elements by name, see :meth:`with_subdomains`."""
+        return None if self._subdomains is None else MappingProxyType(self._subdomains)
 
     # topology
 
+    @cached_property
+    def _own_mapping(self):
+        return MappingBeam(self)
+
     def _mapping(self):
-        if not hasattr(self, "_cached_mapping"):
-            self._cached_mapping = MappingBeam(self)
-        return self._cached_mapping
+        return self._own_mapping
 
     def _init_facets(self):
         """Sections first, one for each node, then the bottom and the top of each element."""
@@ -519,31 +509,21 @@ class MeshBeam(Frozen, Mesh2D):
         """Length of the longest element."""
         return float(np.max(self.lengths))
 
-    @property
-    def on_line(self) -> bool:
-        """True if it was made as one straight line, with ``s`` the lengths along it."""
-        return getattr(self, "_on_one_line", False)
-
-    @property
+    @cached_property
     def is_straight(self) -> bool:
         """True if every element is straight with sections normal to it."""
-        if not hasattr(self, "_is_straight"):
-            d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
-            tol = 1e-12 + 8 * np.finfo(float).eps * np.max(np.abs(self.p)) / np.min(self.lengths)
-            self._is_straight = bool(
-                all(np.all(np.abs(self.p_X[:, t] - d) <= tol) for t in self.t)
-                and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
-        return self._is_straight
+        d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
+        tol = 1e-12 + 8 * EPS * np.max(np.abs(self.p)) / np.min(self.lengths)
+        return bool(all(np.all(np.abs(self.p_X[:, t] - d) <= tol) for t in self.t)
+                    and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
 
-    @property
+    @cached_property
     def is_uniform(self) -> bool:
         """True if one table does for all elements: straight, of one length, height and direction.
 
         The chains that they make are of one length, too.
         """
-        if not hasattr(self, "_is_uniform"):
-            self._is_uniform = self.is_straight and self.heights is None and self._are_equal()
-        return self._is_uniform
+        return self.is_straight and self.heights is None and self._are_equal()
 
     def _are_equal(self):
         """True if straight elements are of one length and direction, as their chains are."""

@@ -38,7 +38,6 @@ from ..actions.joints.prescribed import Turned
 from ..actions.loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
                              bind_load)
 from ..results.path import CriticalPoint, Path
-from ..core.pickling import functions_of, require_picklable
 from ..mesh.places import as_point, on_other_mesh
 from .plan import make_plan
 from ..results.state import State
@@ -144,14 +143,6 @@ class Scene:
 
     def __getstate__(self):
         """What was given and bound: the equations are built again."""
-        given = [*(load for _, load, _ in self._loads), *(joint for joint, _ in self._joints),
-                 *(element for element, _ in self._elements), *self._sensors.values()]
-        require_picklable([*functions_of([*self._supports, *given]), *(
-            (f"the initial velocity of beam {k}", v) for k, (v, _) in self._velocities.items()
-            if callable(v))])
-        return self._parts()
-
-    def _parts(self):
         return {name: value for name, value in vars(self).items()
                 if name not in ("_lock", "_system", "_places", "N")}
 

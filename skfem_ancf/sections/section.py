@@ -14,7 +14,6 @@ from ..core.errors import (CallError, InputError, ask_array, require_flag, requi
                            require_positive, shown)
 from ..core.frozen import Frozen
 from ..materials import Material, StVenantKirchhoff
-from ..core.pickling import require_picklable
 from .measure import MORE, WHOLE, Piece, Uniform, Weighted
 from .moving import Moving
 
@@ -213,14 +212,6 @@ class Section(Frozen):
         """
         raise NotImplementedError
 
-    def functions(self) -> list[tuple[str, Callable[..., Any]]]:
-        """Pairs of a description and a function, for those that it was given."""
-        return []
-
-    def __getstate__(self):
-        require_picklable(self.functions())
-        return super().__getstate__()
-
 
 class Rectangle(Section):
     """A full section of one width: what ``Beam(..., width=...)`` has.
@@ -237,10 +228,6 @@ class Rectangle(Section):
 
     def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
         return [slab_of(material, self.width)]
-
-    def functions(self) -> list[tuple[str, Callable[..., Any]]]:
-        return [("the function width(x, y) of the section", self.width)] if callable(
-            self.width) else []
 
     def __repr__(self) -> str:
         return f"<rectangle of width {shown(self.width)}>"
@@ -367,10 +354,6 @@ class Layers(Section):
         return [slab_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
                 for a, b, (_, law, width) in zip(ends[:-1].tolist(), ends[1:].tolist(),
                                                  self.parts)]
-
-    def functions(self) -> list[tuple[str, Callable[..., Any]]]:
-        return [(f"the function width(x, y) of layer {k}", width)
-                for k, (_, _, width) in enumerate(self.parts) if callable(width)]
 
     def __repr__(self) -> str:
         return f"<{len(self.parts)} layers of " + ", ".join(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 from collections import deque
@@ -16,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import AncfError, CallbackError, InputError, PickleError, require_like, shown
-from ..core.pickling import require_picklable
 from ..core.switch import expecting
 
 if TYPE_CHECKING:
@@ -183,8 +183,13 @@ def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int],
 
 def _require_sendable(task):
     named = [("build", task.build), ("measure", task.measure)]
-    require_picklable(named)
     for what, function in named:
+        try:
+            pickle.dumps(function)
+        except Exception as error:  # what a function holds may raise anything
+            raise PickleError(
+                f"{what}, {shown(function)}, cannot be sent to another process: {error}. Define "
+                "it by def at the top of a module") from error
         main = sys.modules["__main__"]
         if getattr(function, "__module__", None) == "__main__" and not hasattr(main, "__file__"):
             raise PickleError(f"{what}, {shown(function)}, was typed where other processes cannot "

@@ -1,0 +1,146 @@
+"""Objects that do not change once they are made; functions of arrays with a cache."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from copy import copy
+from functools import cached_property, lru_cache, wraps
+from typing import Any, TypeVar
+
+import numpy as np
+
+from .errors import ImmutableError, InputError, NameUnknown
+
+T = TypeVar("T")
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def read_only(value: T) -> T:
+    """A value; in place of an array that can be written to a copy that cannot."""
+    if not isinstance(value, np.ndarray) or not value.flags.writeable:
+        return value
+    array = value.copy()
+    array.flags.writeable = False
+    return array
+
+
+class _Freezing(type):
+    """Freezes an object after the constructor of its class, which may be a user's subclass."""
+
+    def __call__(cls, *args, **kwargs):
+        made = super().__call__(*args, **kwargs)
+        made._freeze()
+        return made
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """That of the constructor, for ``help`` and :func:`rebuilt`."""
+        arguments = inspect.signature(cls.__init__).parameters.values()  # type: ignore[misc]
+        return inspect.Signature(list(arguments)[1:])
+
+
+class Immutable(metaclass=_Freezing):
+    """Base class of descriptions: public attributes are set by constructors alone.
+
+    Arrays become read-only. Private attributes and cached properties, which are not pickled, may
+    be set later.
+    """
+
+    _frozen = False
+
+    def _freeze(self):
+        vars(self).update({name: read_only(value) for name, value in vars(self).items()})
+        self._frozen = True
+
+    def _thawed(self):
+        """A copy whose attributes may be set, until it is frozen."""
+        other = copy(self)
+        other._frozen = False
+        return other
+
+    def _require_thawed(self, name):
+        if self._frozen and not name.startswith("_"):
+            instead = (f"use replace({name}=...), which returns a changed copy"
+                       if hasattr(self, "replace") else "make a new one")
+            raise ImmutableError(f"a {type(self).__name__} does not change, and {name!r} cannot be "
+                                 f"set: {instead}")
+
+    def __setattr__(self, name, value):
+        self._require_thawed(name)
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name):
+        self._require_thawed(name)
+        super().__delattr__(name)
+
+    def __getstate__(self):
+        return {name: value for name, value in vars(self).items()
+                if not isinstance(getattr(type(self), name, None), cached_property)}
+
+    def __setstate__(self, state):
+        vars(self).update(state)
+        self._freeze()
+
+    def __deepcopy__(self, memo):
+        return self
+
+
+def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
+    """``thing`` made anew with some arguments changed; the others are its attributes of that name.
+
+    A constructor that passes ``**kwargs`` on takes the names ``more`` by them.
+    """
+    arguments = inspect.signature(type(thing)).parameters.values()
+    names = [a.name for a in arguments if a.kind in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY)]
+    if any(a.kind == a.VAR_KEYWORD for a in arguments):
+        names += [name for name in more if name not in names]
+    for name in changes:
+        if name not in names:
+            raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
+    missing = [name for name in names if name not in changes and not hasattr(thing, name)]
+    if missing:
+        raise InputError(f"{thing!r} does not keep the argument {missing[0]!r} it was made with: "
+                         "keep it as an attribute of that name, or give it to replace")
+    return type(thing)(**{name: getattr(thing, name) for name in names if name not in changes},
+                       **changes)
+
+
+class _Numbers:
+    """An array as a key: equal to others of the same shape, type and numbers."""
+
+    def __init__(self, array):
+        self.array, self.key = array, (array.shape, array.dtype.str, array.tobytes())
+
+    def __eq__(self, other):
+        return isinstance(other, _Numbers) and self.key == other.key
+
+    def __hash__(self):
+        return hash(self.key)
+
+
+def array_cache(maxsize: int) -> Callable[[Function], Function]:
+    """``functools.lru_cache`` for functions of arrays, whose results must be read-only.
+
+    Examples
+    --------
+    >>> @array_cache(maxsize=8)
+    ... def total(x):
+    ...     print("computed")
+    ...     return x.sum()
+    >>> total(np.ones(3)) == total(np.ones(3))
+    computed
+    True
+    """
+    def decorate(function):
+        @lru_cache(maxsize)
+        def of_keys(*keys):
+            return function(*(k.array if isinstance(k, _Numbers) else k for k in keys))
+
+        @wraps(function)
+        def cached(*args):
+            return of_keys(*(_Numbers(a) if isinstance(a, np.ndarray) else a for a in args))
+
+        return cached
+
+    return decorate
