@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from .immutable import Immutable, _Numbers, read_only, rebuilt
 
 __all__ = ["Content", "Frozen", "Sealable", "read_only", "rebuilt"]
@@ -21,7 +23,7 @@ Sealable = Frozen
 class Content:
     """Arrays as the key of a cache: equal where they have the same numbers."""
 
-    def __init__(self, *arrays):
+    def __init__(self, *arrays: Any) -> None:
         self.arrays = arrays
         self._key = tuple(map(_Numbers, arrays))
 
