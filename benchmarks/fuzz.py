@@ -320,11 +320,11 @@ def tangent(bodies, state):
     K = np.imag(internal_force(bodies, system, state.u + 1j * step * np.eye(N))).T / step
     for j in range(N) if not all(load.constant for load in system.loads) else ():
         K[:, j] -= np.imag(external_force(system, state.u + 1j * step * np.eye(N)[j])) / step
-    if system.joints:
+    if system.constraints.joints:
         h = 1e-3 * system.size
         for j in range(N):
-            a, b = (state.multipliers @ system.full_jacobian(state.u + x * np.eye(N)[j], state.load)
-                    for x in (-h, h))
+            a, b = (state.multipliers @ system.constraints.full_jacobian(
+                state.u + x * np.eye(N)[j], state.load) for x in (-h, h))
             K[:, j] += (b - a) / (2 * h)  # exact: the joints are quadratic at most
     return K
 
@@ -353,31 +353,31 @@ def check(scene, state, tol=1e-5):
                     * beam.width * beam.mesh.height:
                 raise Wrong("the textbook's form gives another force")
     external = external_force(system, u) * state.load
-    R = external - force - state.multipliers @ system.full_jacobian(u, state.load)
+    R = external - force - state.multipliers @ system.constraints.full_jacobian(u, state.load)
     K = tangent(bodies, state)
     scale = 1.0 / np.maximum(np.abs(np.diag(K)), 1e-300)
-    free = system.free
+    free = system.constraints.free
     rho = np.sqrt(np.sum((R**2 * scale)[free]))
     size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
     if rho > tol * size + 100.0 * system.work_noise * system.noise:
         raise Wrong(f"the residual is {rho / size:.3g} of the forces")
-    gap = np.max(np.abs(system.constraint(u, state.load)), initial=0.0)
+    gap = np.max(np.abs(system.constraints.constraint(u, state.load)), initial=0.0)
     if gap > 1e-9 * system.size:
         raise Wrong(f"a joint is open by {gap:.3g}")
-    if np.max(np.abs(u[system.fixed] - system.values(state.load)), initial=0.0) > 1e-12 * (
-            system.size):
+    held = u[system.constraints.fixed] - system.constraints.values(state.load)
+    if np.max(np.abs(held), initial=0.0) > 1e-12 * system.size:
         raise Wrong("a support is not where it should be")
     return _stability(system, state, K, scale)
 
 
 def verdict_of(system, state, K, scale):
     """What the dense eigenvalues say, whether K is symmetric, and the lowest of them."""
-    free = np.nonzero(system.free)[0]
+    free = np.nonzero(system.constraints.free)[0]
     d = np.sqrt(scale[free])
     A = d[:, None] * K[np.ix_(free, free)] * d
     symmetric = np.abs(A - A.T).max(initial=0.0) < 1e-8 * np.abs(A).max(initial=1.0)
-    if system.m:
-        Z = null_space(system.jacobian(state.u, state.load)[:, free] * d)
+    if system.constraints.m:
+        Z = null_space(system.constraints.jacobian(state.u, state.load)[:, free] * d)
         A = Z.T @ A @ Z
     values = np.linalg.eigvalsh(0.5 * (A + A.T))
     # the diagonal is 1; bending of a slender beam is small beside it

@@ -169,7 +169,7 @@ def smooth(damping):
 @pytest.fixture(scope="module")
 def by_scipy():
     scene = smooth(0.1)
-    s, free = scene.system, np.nonzero(scene.system.free)[0]
+    s, free = scene.system, np.nonzero(scene.system.constraints.free)[0]
     M = np.linalg.inv(s.mass.tocsc()[free][:, free].toarray())
 
     def rate(t, y):

@@ -345,7 +345,7 @@ def test_the_residual_is_below_the_tolerance_whatever_it_is(compiled):
                 scene = loaded(P, element, n=4, compiled=compiled)
                 state, s = scene.solve_static(tol=tol), scene.system
                 f = s.internal_force(state.u)
-                R = (s.external_force(state.u) - f) * s.mask
+                R = (s.external_force(state.u) - f) * s.constraints.mask
                 s.assemble(state.u)
                 scale = 1.0 / np.abs(s.K.diagonal())
                 assert R @ (R * scale) <= 1.05 * tol**2 * (f @ (f * scale))
@@ -480,8 +480,9 @@ def test_what_a_unit_of_load_drives():
     system, load = scene.system, 0.7
     u = 1e-3 * np.random.default_rng(1).standard_normal(system.N)
     moved = np.zeros(system.N)
-    moved[system.fixed] = system.values(1.0) - system.values(0.0)
-    assert moved.any() and system.drives
+    c = system.constraints
+    moved[c.fixed] = c.values(1.0) - c.values(0.0)
+    assert moved.any() and system.constraints.drives
     external = system.external_force(u)
     system.assemble(u, load)
     drive, gap = Tracer(system, 1e-9, 20)._drive(external, u, load)
@@ -490,7 +491,7 @@ def test_what_a_unit_of_load_drives():
         return (load + s) * external - system.internal_force(u + s * moved, load + s)
 
     def phi(s):
-        return system.constraint(u + s * moved, load + s)
+        return system.constraints.constraint(u + s * moved, load + s)
 
     h = 1e-5
     expected = (residual(h) - residual(-h)) / (2 * h)
@@ -509,10 +510,10 @@ def test_second_differences_of_the_nodes_of_a_frame():
     """Equations of nodes are quadratic: second differences are exact."""
     system = bent().system
     u, v = 0.1 * np.random.default_rng(2).standard_normal((2, system.N))
-    phi = [system.constraint(u + s * v, 0.0) for s in (-1.0, 0.0, 1.0)]
+    phi = [system.constraints.constraint(u + s * v, 0.0) for s in (-1.0, 0.0, 1.0)]
     expected = phi[0] - 2.0 * phi[1] + phi[2]
     assert np.abs(expected).max() > 1e-3
-    assert_allclose(system.quadratic(u, 0.0, v), expected, rtol=0, atol=1e-13)
+    assert_allclose(system.constraints.quadratic(u, 0.0, v), expected, rtol=0, atol=1e-13)
 
 
 def test_a_moment_at_a_node_turns_as_its_node():

@@ -31,7 +31,7 @@ def theory(ends, n):
 
 
 def matrices(scene):
-    system, free = scene.system, scene.system.free
+    system, free = scene.system, scene.system.constraints.free
     system.assemble(np.zeros(system.N))
     K, M = system.K.tocsc().toarray(), system.mass.tocsc().toarray()
     return K[np.ix_(free, free)], M[np.ix_(free, free)]
@@ -155,13 +155,13 @@ def test_all_modes(element, slenderness):
     modes = scene.modes(len(K))
     values = scipy.linalg.eigh(K, M, eigvals_only=True)
     np.testing.assert_allclose(modes.frequencies**2, values, rtol=1e-8, atol=1e-11 * values[-1])
-    X = modes.shapes[:, scene.system.free]
+    X = modes.shapes[:, scene.system.constraints.free]
     np.testing.assert_allclose(X @ M @ X.T, np.eye(len(K)), rtol=0, atol=1e-6)
 
 
 def test_too_many_modes_of_a_beam_too_slender():
     scene = cantilever(ElementBeamANCF(3), 6, 1e6)
-    n = int(scene.system.free.sum())
+    n = int(scene.system.constraints.free.sum())
     with pytest.raises(InputError, match="told from round-off"):
         scene.modes(n)
 

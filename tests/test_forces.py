@@ -281,7 +281,7 @@ def test_a_far_spring_is_that_of_one_s_own_and_of_a_sparse_solution():
     own = weighing().add(Own(5.0, 0.0, 0.8, between)).solve_static()
     assert_allclose(ours.u, own.u, rtol=0, atol=1e-9)
     residual = ours.internal_force - ours.system.external_force(ours.u)
-    assert np.abs(residual[ours.system.free]).max() < 1e-9
+    assert np.abs(residual[ours.system.constraints.free]).max() < 1e-9
     assert ours.stability == own.stability
 
 
@@ -473,7 +473,7 @@ def soft():
 @pytest.fixture(scope="module")
 def by_scipy():
     s = soft().system
-    free = np.nonzero(s.free)[0]
+    free = np.nonzero(s.constraints.free)[0]
     M = np.linalg.inv(s.mass.tocsc()[free][:, free].toarray())
 
     def rate(t, y):

@@ -76,7 +76,7 @@ def test_a_foreign_error_is_seen_and_so_is_an_open_joint():
         "scene.joint('line', at=(1.0, 0.0), direction=(1, 1))\n")
     scene, state, _ = fuzz.solve(script, False)
     assert fuzz.check(scene, state) == "stable"
-    object.__setattr__(state.system.joints[0], "normal", np.array([1.0, 0.0]))
+    object.__setattr__(state.system.constraints.joints[0], "normal", np.array([1.0, 0.0]))
     with pytest.raises(fuzz.Wrong, match="open by"):
         fuzz.check(scene, state)
 

@@ -66,8 +66,9 @@ def joint(request):
 def test_joints_are_tables_where_they_say_so(joint):
     joint, scene = joint
     tables = scene.system.machine.tables
-    assert tables.are_joints(tables.plain.joints) == (joint.tabled or not scene.system.m)
-    assert bool(tables.plain.joints.own) == bool(scene.system.m and not joint.tabled)
+    m = scene.system.constraints.m
+    assert tables.are_joints(tables.plain.joints) == (joint.tabled or not m)
+    assert bool(tables.plain.joints.own) == bool(m and not joint.tabled)
 
 
 def test_value_is_zero_at_the_start(joint):
@@ -132,15 +133,17 @@ def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeyp
     s = held(name, pressure).system
     rng = np.random.default_rng(4)
     # the prescribed joints leave the forearm of the elbow one motion: a stress holds it
-    u, m, t = 0.02 * rng.standard_normal(s.N), rng.standard_normal(s.m), 0.7
+    u, m, t = 0.02 * rng.standard_normal(s.N), rng.standard_normal(s.constraints.m), 0.7
     s.assemble(u, 1.0)
-    K, J = s.K.tocsc().toarray() + s.curvature(u, t, m).toarray(), dense(s.jacobian(u, t))
-    K[s.fixed], K[:, s.fixed] = 0.0, 0.0
-    K[s.fixed, s.fixed] = 1.0
-    b, c = rng.standard_normal(s.N) * s.free, rng.standard_normal(s.m)
-    expected = np.linalg.solve(np.block([[K, J.T], [J, np.zeros((s.m, s.m))]]), np.append(b, c))
+    K = s.K.tocsc().toarray() + s.constraints.curvature(u, t, m).toarray()
+    J = dense(s.constraints.jacobian(u, t))
+    K[s.constraints.fixed], K[:, s.constraints.fixed] = 0.0, 0.0
+    K[s.constraints.fixed, s.constraints.fixed] = 1.0
+    b, c = rng.standard_normal(s.N) * s.constraints.free, rng.standard_normal(s.constraints.m)
+    expected = np.linalg.solve(np.block([[K, J.T], [J, np.zeros((len(c), len(c)))]]),
+                               np.append(b, c))
     s.factorize(u, t, m)
-    assert s.bordered == border
+    assert s.constraints.bordered == border
     assert s.symmetric == (not pressure)
     assert len(s.constraints.stiff[1]) == 4  # nothing but joints holds the forearm
     x, l = s.solve(b, c)
@@ -247,8 +250,9 @@ def test_drift_over_a_long_run(scheme, steps):
     history = scene.integrate(steps * dt, dt, scheme=scheme,
                               t_eval=np.arange(0, steps + 1, 10) * dt)
     s = scene.system
-    phi = [np.abs(s.constraint(u, 0.0)).max() for u in history.u]
-    rate = [np.abs(s.full_jacobian(u, 0.0) @ v).max() for u, v in zip(history.u, history.v)]
+    phi = [np.abs(s.constraints.constraint(u, 0.0)).max() for u in history.u]
+    rate = [np.abs(s.constraints.full_jacobian(u, 0.0) @ v).max()
+            for u, v in zip(history.u, history.v)]
     assert np.abs(history.v).max() > 0.1
     assert max(phi) < 1e-10 and max(rate) < 1e-11
     if isinstance(scheme, EnergyMomentum):
@@ -361,7 +365,7 @@ def test_roller(tilt):
     beam = between((0, 0), (1, 0), 2, E=1e8)
     scene = Scene(beam).pin("left").gravity(GRAVITY)
     joint = scene.joint("line", at=(1, 0), direction=(np.cos(tilt), np.sin(tilt)))
-    assert scene.system.m == (0 if tilt == 0 else 1)  # along x it only fixes r^2
+    assert scene.system.constraints.m == (0 if tilt == 0 else 1)  # along x it only fixes r^2
     state = scene.solve_static()
     W = beam.total_mass * 9.81
     N = W / 2 / np.cos(tilt)
@@ -391,7 +395,7 @@ def test_prescribed_position_in_statics(at, m):
     scene = Scene(beam).clamp("left")
     end = np.array(at) + [-0.1, 0.3]
     joint = scene.joint("position", at=at, r=lambda t: np.array(at) + t * np.array([-0.1, 0.3]))
-    assert scene.system.m == m
+    assert scene.system.constraints.m == m
     state = scene.solve_static()
     assert np.allclose(state.position(at), end, rtol=0, atol=1e-12)
     # the force is what would move the point there
@@ -426,7 +430,7 @@ def test_elimination_does_not_change_the_motion():
         scene = Scene(beam).gravity(GRAVITY)
         joint = pin(scene)
         history = scene.integrate(0.3, 0.01)
-        return history, scene.system.m, joint
+        return history, scene.system.constraints.m, joint
 
     support, m0, _ = motion(lambda s: s.pin("left"))
     eliminated, m1, joint = motion(lambda s: s.joint("position", at=(0, 0), r=lambda t: (0, 0)))
@@ -639,7 +643,7 @@ def pull(state, held):
 def test_repeated_joints_change_nothing_in_statics(once, more, number):
     (plain, one), (scene, held) = repeated(once), repeated(more)
     with pytest.warns(ModelWarning, match=f"^{number} of .* repeat others"):
-        assert scene.system.m == plain.system.m
+        assert scene.system.constraints.m == plain.system.constraints.m
     a, b = plain.solve_static(), scene.solve_static()
     assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
     assert_allclose(pull(b, held), pull(a, one), rtol=0, atol=1e-7)

@@ -71,7 +71,7 @@ def test_a_beam_clamped_at_an_angle_needs_no_sparse_matrix(monkeypatch, element)
     scene = cantilever(element(), angle=0.6)
     made = counted(monkeypatch, sparse.csr_array, "__init__")
     assert scene.solve_static().displacement(scene.beams[0].mesh.p[:, -1])[1] < 0
-    assert scene.system.joints and not made
+    assert scene.system.constraints.joints and not made
     loose = Scene(scene.beams[0])
     loose.joint("angle", at="left", angle=lambda t: 0.1 * t)
     with pytest.raises(SupportError, match="translation along .*; translation"):
@@ -239,8 +239,8 @@ def test_what_joints_hold_beside_supports_is_seen_without_matrices(monkeypatch):
     dense = counted(monkeypatch, Constraints, "_dense")
     for element in (ElementBeamCable(5), ElementBeamANCF(2)):
         system = cantilever(element, angle=0.6).system
-        assert system.joints
-        system.require_supports()
+        assert system.constraints.joints
+        system.constraints.require_supports()
         assert not dense
         system.constraints.require_supports()
     rng = np.random.default_rng(0)
@@ -264,7 +264,7 @@ def test_equations_that_share_coordinates_are_still_tried(more):
     scene = cantilever(ElementBeamCable(5), angle=0.6)
     if more == "apart":
         scene.joint("angle", at="right", angle=lambda t: 0.0)
-        return scene.system.require_supports()
+        return scene.system.constraints.require_supports()
     scene.clamp((0.0, 0.0) if more == "same" else "left", thickness="free")
     with pytest.warns(ModelWarning, match="^1 of 2 equations of joints repeat"):
         state = scene.solve_static()
@@ -694,7 +694,7 @@ def test_factors_tell_whether_what_a_border_holds_gives_way(seed):
 def test_later_solutions_held_at_an_angle_ask_factors_alone(monkeypatch):
     scene = cantilever(ElementBeamCable(5), angle=0.6)
     first = scene.solve_static()
-    assert scene.system.joints and len(scene.system.constraints.stiff[0])
+    assert scene.system.constraints.joints and len(scene.system.constraints.stiff[0])
     asked = [counted(monkeypatch, Constraints, name) for name in ("_entries", "_curvature")]
     assert np.array_equal(scene.solve_static().u, first.u) and not any(asked)
 
@@ -714,9 +714,9 @@ def test_what_joints_hold_at_an_angle_needs_neither_springs_nor_sparse_factors(m
     assert not any(asked) and found.iterations < 8
     assert system.machine.tables.plain.border.springs == 0 < len(system.constraints.stiff[0])
     rest = system.external_force(found.u) - system.internal_force(found.u)
-    rest -= found.multipliers @ system.full_jacobian(found.u, 1.0)
-    assert np.allclose(rest * system.mask, 0.0, rtol=0, atol=1e-3 * 1e4 * height**3)
-    assert np.max(np.abs(system.constraint(found.u, 1.0))) < 1e-12
+    rest -= found.multipliers @ system.constraints.full_jacobian(found.u, 1.0)
+    assert np.allclose(rest * system.constraints.mask, 0.0, rtol=0, atol=1e-3 * 1e4 * height**3)
+    assert np.max(np.abs(system.constraints.constraint(found.u, 1.0))) < 1e-12
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -768,4 +768,4 @@ def test_a_first_solve_asks_its_joints_once(monkeypatch):
     asked = counted(monkeypatch, Joint, "slope_entries")
     for _ in range(2):
         scene.solve_static()
-        assert len(asked) == len(scene.system.joints) > 0
+        assert len(asked) == len(scene.system.constraints.joints) > 0

@@ -48,11 +48,11 @@ def scene_of(kind, n, h, element):
 
 def dense_eigenvalues(system, u, multipliers=None):
     """Of the tangent at free coordinates and J x = 0, scaled to a unit diagonal."""
-    multipliers = np.zeros(system.m) if multipliers is None else multipliers
+    multipliers = np.zeros(system.constraints.m) if multipliers is None else multipliers
     system.assemble(u)
-    K = (system.K.tocsc() + system.curvature(u, 0.0, multipliers)).toarray()
-    free = np.nonzero(system.free)[0]
-    A, J = K[np.ix_(free, free)], dense(system.jacobian(u, 0.0))[:, free]
+    K = (system.K.tocsc() + system.constraints.curvature(u, 0.0, multipliers)).toarray()
+    free = np.nonzero(system.constraints.free)[0]
+    A, J = K[np.ix_(free, free)], dense(system.constraints.jacobian(u, 0.0))[:, free]
     if len(J):
         Z = scipy.linalg.null_space(J / np.linalg.norm(J, axis=1)[:, None])
         A = Z.T @ A @ Z
@@ -61,7 +61,7 @@ def dense_eigenvalues(system, u, multipliers=None):
 
 
 def factorized(system, u, multipliers=None):
-    multipliers = np.zeros(system.m) if multipliers is None else multipliers
+    multipliers = np.zeros(system.constraints.m) if multipliers is None else multipliers
     system.assemble(u)
     system.factorize(u, 0.0, multipliers)
     return system.inertia()
@@ -78,7 +78,7 @@ def test_inertia_is_that_of_the_dense_matrix_on_the_tangent_space(kind, border, 
         scene = scene_of(kind, int(rng.integers(1, 6)), 10 ** rng.uniform(-2.5, -1), element)
         system = scene.system
         u = rng.standard_normal(system.N) * 10 ** rng.uniform(-4, -0.5)
-        multipliers = rng.standard_normal(system.m) * 10 ** rng.uniform(0, 6)
+        multipliers = rng.standard_normal(system.constraints.m) * 10 ** rng.uniform(0, 6)
         values = dense_eigenvalues(system, u, multipliers)
         if np.min(np.abs(values)) < 1e-10:  # on which side of zero is for round-off to say
             continue
@@ -151,7 +151,7 @@ def test_sign_of_the_determinant_counts_the_negative_eigenvalues_by_twos(kind):
     seen = set()
     for k in range(8):
         system = scene_of(kind, 3, 0.02, ELEMENTS[k % 4]).system
-        multipliers = np.zeros(system.m)
+        multipliers = np.zeros(system.constraints.m)
         system.assemble(0.02 * rng.standard_normal(system.N))
         system.factorize(np.zeros(system.N), 0.0, multipliers)
         sign = system.determinant_sign()
@@ -325,7 +325,7 @@ def test_a_shallow_arch_snaps_through(element):
     u = state.displacement((0.5, 0.1))
     assert abs(u[0]) < 1e-6 and -0.22 < u[1] < -0.2
     missing = scene.system.external_force(state.u) - scene.system.internal_force(state.u)
-    assert np.max(np.abs(missing[scene.system.free])) < 1e-9
+    assert np.max(np.abs(missing[scene.system.constraints.free])) < 1e-9
 
 
 def test_from_an_unstable_state_on_to_a_stable_one():

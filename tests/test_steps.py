@@ -116,7 +116,7 @@ def test_few_iterations_where_the_axis_is_stiff(slenderness, element, scheme):
     assert np.ptp(history.total_energy) < 2e-12 * history.kinetic_energy.max()
     system, (u0, u1), (v0, v1) = scene.system, history.u[-2:], history.v[-2:]
     inertia, weight = system.mass.multiply((v1 - v0) / 1e-2), system.external_force(u1, 0.2)
-    missing = (inertia + system.mean_internal_force(u0, u1) - weight)[system.free]
+    missing = (inertia + system.mean_internal_force(u0, u1) - weight)[system.constraints.free]
     assert np.abs(missing).max() < 1e-6 * np.abs(weight).max()
 
 

@@ -164,7 +164,7 @@ def test_what_is_damped_away_is_not_added_up():
     integrator = Integrator(s, Radau())
     y = integrator.start(np.zeros(s.N), np.zeros(s.N), 0.0, 0.01)
     integrator.step(y, 0.01)
-    du = np.random.default_rng(2).normal(size=s.N) * s.free
+    du = np.random.default_rng(2).normal(size=s.N) * s.constraints.free
     assert_allclose(integrator.scheme.lasting(integrator, du, 0.5), du / 11.0, rtol=1e-9)
     free = Integrator(swinging().system, Radau())
     assert free.scheme.lasting(free, du, 0.5) is du
@@ -177,7 +177,7 @@ def test_as_many_steps_as_scipy_at_the_same_error(name, rtol, tol):
     times, u = known(name)
     scene = build()
     history = scene.integrate(t_end, "auto", scheme="radau", rtol=rtol, t_eval=times)
-    s, free = scene.system, np.nonzero(scene.system.free)[0]
+    s, free = scene.system, np.nonzero(scene.system.constraints.free)[0]
     M = np.linalg.inv(s.mass.tocsc()[free][:, free].toarray())
 
     def rate(t, y):
@@ -393,8 +393,8 @@ def test_instants_within_steps_have_closed_joints(dt):
     history = scene.integrate(0.1, dt, t_eval=times, rtol=1e-3)
     s = scene.system
     for t, u, v in zip(times, history.u, history.v):
-        assert np.abs(s.constraint(u, t)).max() < 1e-12
-        assert_allclose(u[s.fixed], s.values(1.0, t), rtol=0, atol=1e-14)
+        assert np.abs(s.constraints.constraint(u, t)).max() < 1e-12
+        assert_allclose(u[s.constraints.fixed], s.constraints.values(1.0, t), rtol=0, atol=1e-14)
     assert np.array_equal(history.t, times)
 
 
@@ -434,9 +434,9 @@ def test_collocation_has_the_acceleration_everywhere_in_a_step(scheme, part):
     s = scene.system
     for u, a, force in zip(history.u, history.acceleration, history.multipliers):
         inertia, pushed = s.mass.multiply(a), s.external_force(u) - s.internal_force(u)
-        if s.m:
-            pushed = pushed - s.full_jacobian(u, 0.0).T @ force
-        assert np.abs((inertia - pushed)[s.free]).max() < 1e-10 * np.abs(pushed).max()
+        if s.constraints.m:
+            pushed = pushed - s.constraints.full_jacobian(u, 0.0).T @ force
+        assert np.abs((inertia - pushed)[s.constraints.free]).max() < 1e-10 * np.abs(pushed).max()
 
 
 def test_instants_close_to_a_step():

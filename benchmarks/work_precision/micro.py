@@ -75,7 +75,7 @@ def iteration(about, watch):
     for formulation in watch(("assumed", "continuum"), "iteration"):
         s = scene(PROBLEMS["5.2"], ElementBeamANCF(ORDER), n, formulation)
         system, u = s.system, bent(s)
-        residual = system.external_force(u) * system.mask
+        residual = system.external_force(u) * system.constraints.mask
         points = np.shape(s.beams[0].kernel.tables[0].points)[1]
 
         def step(u=u, system=system, residual=residual):

@@ -79,7 +79,8 @@ def textbook(problem, order, n, steps, tol=1e-7):
         def evaluate(u):
             return asm(force, basis, r=q0 + u), asm(stiffness, basis, r=q0 + u)
 
-        return Solver(lambda: newton(np.zeros(s.N), load, system.fixed, steps, evaluate, p.L, tol),
+        fixed = system.constraints.fixed
+        return Solver(lambda: newton(np.zeros(s.N), load, fixed, steps, evaluate, p.L, tol),
                       lambda result: (result[0][dofs] @ weights, steps, result[1]), s.N)
 
     return Run(p, TEXTBOOK, f"ancf {order}, continuum, {steps} load steps", n, f"section {order}",

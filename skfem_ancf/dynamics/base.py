@@ -396,7 +396,7 @@ class Scheme:
         if not integrator.ready:
             return du
         s = integrator.system
-        return integrator.solve(integrator.mass_factor() * s.mass.multiply(du) * s.free)
+        return integrator.solve(integrator.mass_factor() * s.mass.multiply(du) * s.constraints.free)
 
 
 def in_steps(scheme: Scheme) -> bool:

@@ -90,7 +90,8 @@ def fingerprint(system: System) -> dict[str, str]:
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
     for k, body in enumerate(system.bodies):
         parts[f"rigid body {body.name or k}"] = _digest(body.mass, body.inertia, body.q0)
-    parts["supports"] = _digest(system.fixed, system.values(1.0, 0.0)[:0], system.given)
+    held = system.constraints
+    parts["supports"] = _digest(held.fixed, held.values(1.0, 0.0)[:0], held.given)
     damping = system.damping
     parts["damping"] = _digest(damping.mass, damping.stiffness, damping.modal)
     for k, load in enumerate(system.loads):
@@ -98,7 +99,7 @@ def fingerprint(system: System) -> dict[str, str]:
         u = 1e-3 * size * probe[system.of(load)]
         parts[f"load {k}"] = _digest(type(load).__name__, system.members.index(load.beam),
                                      load.amplitude is None, load.force(0.0 * u), load.force(u))
-    for k, joint in enumerate(system.all_joints):
+    for k, joint in enumerate(system.constraints.all_joints):
         J = [] if joint.moving else [a for u in (0.0 * probe, probe)
                                      for a in joint.entries(u, 0.0)]
         J += [] if joint.moving else [joint.value(0.0 * probe, 0.0)]
@@ -142,7 +143,7 @@ def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
     for k, load in enumerate(system.loads):
         if load.amplitude is not None:
             found[f"amplitude of load {k}"] = np.array([[load.factor(t)] for t in times])
-    for k, joint in enumerate(system.all_joints):
+    for k, joint in enumerate(system.constraints.all_joints):
         if joint.moving:
             found[f"motion of joint {k}"] = np.asarray(joint.offset(times, system.N), dtype=float)
     for k, one in enumerate(system.forces.contacts.obstacles):
@@ -178,8 +179,8 @@ def same_problem(system: System, start: State, t: float) -> bool:
         return False
     now, then = np.array([t]), np.array([start.t])
     pairs = [(system.external_force(u, t), other.external_force(u, start.t)),
-             (system.values_at(now), other.values_at(then)),
-             (system.constraint(u, t), other.constraint(u, start.t))]
+             (system.constraints.values_at(now), other.constraints.values_at(then)),
+             (system.constraints.constraint(u, t), other.constraints.constraint(u, start.t))]
     if system.forces.own:  # which may depend on time
         pairs.append((system.internal_force(u, t), other.internal_force(u, start.t)))
     return all(np.array_equal(a, b) for a, b in pairs)

@@ -64,8 +64,8 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
         if system.damped:
             return Choice(GeneralizedAlpha(), f"{asked}, damping")
         return Choice(EnergyMomentum(), f"{asked}, nothing is lost")
-    found = [text for text, there in (("joints", system.m > 0), ("damping", system.damped))
-             if there]
+    found = [text for text, there in (("joints", system.constraints.m > 0),
+                                      ("damping", system.damped)) if there]
     if not found and stiffness_ratio(system) > STIFF:
         found = ["vibrations that no step resolves"]
     if found:

@@ -129,7 +129,7 @@ class Collocation(Scheme):
         return f"<{type(self).__name__}, {len(self.points)} points>"
 
     def require(self, system: System) -> None:
-        if system.m and not (self.joined or system.machine.tables.linear_joints):
+        if system.constraints.m and not (self.joined or system.machine.tables.linear_joints):
             raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
                              "rigid bodies: take 'radau', or 'energy-momentum', which conserves "
                              "energy with them")
@@ -168,13 +168,13 @@ class Collocation(Scheme):
         system
             A :class:`~skfem_ancf.equations.system.System`.
         """
-        return NEAR if system.moves or system.machine.tables.motion_varies else 0.0
+        return NEAR if system.constraints.moves or system.machine.tables.motion_varies else 0.0
 
     def resolved(self, integrator: Integrator, du: Array) -> Array:
         s, w = integrator.system, integrator.room
         k = int(np.argmin(np.abs(w.method.values[1])))
         mu = complex(*w.method.values[:, k]) / integrator.dt
-        x = mu**2 * s.mass.multiply(du) * s.free
+        x = mu**2 * s.mass.multiply(du) * s.constraints.free
         x, y = np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
         solve_for(w, k, x, y)
         return x
@@ -184,10 +184,10 @@ class Collocation(Scheme):
         if not s.damped:
             return du
         A = M._replace(flat=M.flat + 0.5 * time * integrator.room.D.flat, pivots=M.pivots.copy())
-        fix(A, s.fixed)
+        fix(A, s.constraints.fixed)
         if not factorize(A):
             return du
-        x = s.mass.multiply(du) * s.free
+        x = s.mass.multiply(du) * s.constraints.free
         solve(A, x)
         return x
 
@@ -218,7 +218,7 @@ class Collocation(Scheme):
             given = given._replace(begun=1, ahead=ahead)
         rows, stages = np.empty((n + 1, 3, s.N)), np.empty((n, len(method.points), s.N))
         rows[0, 0], rows[0, 1] = y.u, y.v
-        forces = np.empty((n, len(method.points) + 1, s.m))
+        forces = np.empty((n, len(method.points) + 1, s.constraints.m))
         memories = np.empty((n, 1 + (contacts.tables.memory.size if contacts.lasting else 0)))
         with contacts.lent(contacts_of(y)):
             done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
@@ -234,7 +234,7 @@ class Collocation(Scheme):
         if integrator.room is None:
             M, size, n = s.mass.band, s.machine.tables.stresses.size, len(table.points)
             rows = len(integrator.matrices.rows.P)
-            integrator.room = room_for_points(table.method, s.N, s.m, rows, size,
+            integrator.room = room_for_points(table.method, s.N, s.constraints.m, rows, size,
                                               gradients_size(s.machine.tables.plain.body),
                                               M._replace(flat=np.zeros(M.flat.size)))
             integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
@@ -275,7 +275,7 @@ class Collocation(Scheme):
             times = np.minimum(times, limit)
         tables = s.machine.tables
 
-        moves, drives, at = s.moves, int(tables.motion_varies), times
+        moves, drives, at = s.constraints.moves, int(tables.motion_varies), times
         if moves or drives:  # where the functions are asked, those times first
             at = np.append(times, np.minimum(start + h * (steps + table.samples).ravel(), limit))
 
@@ -291,12 +291,12 @@ class Collocation(Scheme):
 
         held = np.zeros((len(times) if moves else 1, 3, s.N))
         if moves:
-            held[:, :, s.fixed] = moving(s.values_at)
+            held[:, :, s.constraints.fixed] = moving(s.constraints.values_at)
         c, g = tables.still
         if drives and not tables.plain.joints.own:
             found = moving(tables.driven)
-            c = found[:, :, :s.m].copy()
+            c = found[:, :, :s.constraints.m].copy()
             if tables.turns:
-                g = np.ascontiguousarray(found[:, [0, 0, 1, 2], s.m:])
+                g = np.ascontiguousarray(found[:, [0, 0, 1, 2], s.constraints.m:])
         return Interval(h, 0, table.method.ahead, times, tables.factors(times), held,
                         JointMotions(c, g, drives))

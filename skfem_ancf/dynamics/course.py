@@ -83,11 +83,11 @@ class Courses:
 
     def _supports(self, times, dt):
         s = self.system
-        if not s.moves:
+        if not s.constraints.moves:
             return np.zeros((1, 3, s.N))
-        found = of_step(dt)[END:] @ steps_of(s.values_at(times))
+        found = of_step(dt)[END:] @ steps_of(s.constraints.values_at(times))
         out = np.zeros((len(found), 3, s.N))
-        out[:, :, s.fixed] = found
+        out[:, :, s.constraints.fixed] = found
         return out
 
     def asked(self, t: float, dt: float, ahead: bool, limit: float) -> Any:

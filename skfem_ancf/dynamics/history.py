@@ -142,7 +142,7 @@ class History:
         """What was stored, as arrays by their names in :attr:`COLUMNS`."""
         stored = self._stored()
         if not stored:
-            N, m = self.system.N, self.system.m
+            N, m = self.system.N, self.system.constraints.m
             sizes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,),
                      "turns": (self._turns.number,)}
             return {name: np.zeros((0, *sizes.get(name, (N,)))) for name in self.COLUMNS}

@@ -128,7 +128,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     if not (in_steps(scheme) and system.by_nodes):
         _require_room(system)
     if not system.constraints.passing:
-        system.require_independent_joints()
+        system.constraints.require_independent_joints()
     system.constraints.require_motion()
     if until is not None:
         if checkpoint is not None:
@@ -197,14 +197,14 @@ def _samples(system, t_start, t_end):
 
 def _require_room(system):
     """Raise InputError if the joints' dense matrices would fill the memory."""
-    size = 24e-9 * system.m * system.N
+    size = 24e-9 * system.constraints.m * system.N
     if size > LARGEST:
         raise InputError(
-            f"a motion keeps the derivatives of {system.m} equations of joints by {system.N} "
-            f"coordinates as dense matrices, {size:.3g} GB: a Frame of lines eliminates its nodes "
-            "in 'energy-momentum' and 'generalized-alpha', if it is held at nodes, without other "
-            "joints, springs between points far apart and modal damping; else take fewer or longer "
-            "beams, or the frequencies and shapes of scene.modes(k)")
+            f"a motion keeps the derivatives of {system.constraints.m} equations of joints by "
+            f"{system.N} coordinates as dense matrices, {size:.3g} GB: a Frame of lines eliminates "
+            "its nodes in 'energy-momentum' and 'generalized-alpha', if it is held at nodes, "
+            "without other joints, springs between points far apart and modal damping; else take "
+            "fewer or longer beams, or the frequencies and shapes of scene.modes(k)")
 
 
 def _goes_on(system, scheme, start, t):

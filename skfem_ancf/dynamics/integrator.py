@@ -107,8 +107,8 @@ class Integrator:
     @cached_property
     def _work(self):
         """Work arrays of the steps of :mod:`~skfem_ancf.dynamics.steps`."""
-        s = self.system
-        return room_for_steps(s.N, s.m, s.machine.tables.stresses.size, 0 if self._nodes else s.m)
+        s, m = self.system, self.system.constraints.m
+        return room_for_steps(s.N, m, s.machine.tables.stresses.size, 0 if self._nodes else m)
 
     def _begin(self, system, scheme, tol):
         """As if nothing had been integrated yet."""
@@ -188,9 +188,9 @@ class Integrator:
             As for :meth:`start`.
         """
         s = self.system
-        if not s.moves:
-            return np.zeros((2, len(s.fixed)))
-        return rates(s.values_at, t, dt, ahead, self.limit)
+        if not s.constraints.moves:
+            return np.zeros((2, len(s.constraints.fixed)))
+        return rates(s.constraints.values_at, t, dt, ahead, self.limit)
 
     def ask(self, start: float, dt: float, n: int) -> None:
         """Ask the functions of joints for the first steps: the start has its rates from there.
@@ -200,7 +200,7 @@ class Integrator:
         start, dt, n
             Where the steps begin, their size, and how many there will be.
         """
-        if self.scheme.text == "steps" and self.system.drives:
+        if self.scheme.text == "steps" and self.system.constraints.drives:
             block = 0, min(n, self.longest)
             with suppress(AncfError):  # what fails is said where the motion comes to it
                 self._courses.of(start, dt, 0, block[1], block, self.limit)
@@ -224,7 +224,7 @@ class Integrator:
         """
         s = self.system
         instant = t, dt, ahead, self.limit
-        asked = self._courses.asked(*instant) if s.m else None
+        asked = self._courses.asked(*instant) if s.constraints.m else None
         # it is that of the motion before from the same place with the same motion of joints
         steady = not (s.varies or s.forces.elements or s.machine.tables.asks)
         key = (u.tobytes(), v.tobytes(), *(() if asked is None else (
@@ -242,15 +242,18 @@ class Integrator:
         """The same, with the strain energy, the kinetic one and half its two derivatives."""
         s, contacts, (t, dt, ahead, _) = self.system, self.system.forces.contacts, instant
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
-                   np.zeros(s.m))
-        if s.moves:
-            y.u[s.fixed] = s.values(1.0, t)
-            y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
+                   np.zeros(s.constraints.m))
+        fixed = s.constraints.fixed
+        if s.constraints.moves:
+            y.u[fixed] = s.constraints.values(1.0, t)
+            y.v[fixed], y.acceleration[fixed] = self.support_rates(t, dt, ahead)
         else:
-            y.u[s.fixed] = y.v[s.fixed] = 0.0
+            y.u[fixed] = y.v[fixed] = 0.0
         self._require_held(y.u - u, t)
         rate, J = y.multipliers, None
-        joined = Joined(s, self._courses.joints(*instant), y.u, instant) if s.m else None
+        joined = None
+        if s.constraints.m:
+            joined = Joined(s, self._courses.joints(*instant), y.u, instant)
         if joined is not None:
             gap = np.abs(joined.gap())
             if np.any(gap > 1e-8 * s.machine.tables.plain.joints.sizes):
@@ -271,7 +274,7 @@ class Integrator:
                 now = contacts.begin(y.u, t) if memory is None else memory
                 y.memory = {"contacts": contacts.tables.memory.copy() if now is None else now}
             force = s.external_force(y.u, t) - s.internal_force(y.u, t)
-            if s.moves:
+            if s.constraints.moves:
                 force -= s.mass.multiply(y.acceleration)
             if s.damped:
                 force = force - s.damping_force(y.u, y.v, t)
@@ -329,7 +332,8 @@ class Integrator:
         course = self._courses.of(begun, dt, first, n, block, self.limit)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
-        rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
+        rows, works = np.empty((n, 4, s.N)), np.empty(n)
+        multiplier_rows = np.empty((n, 2, s.constraints.m))
         memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
@@ -370,7 +374,7 @@ class Integrator:
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
             raise
-        done, self._lost = s.first_lost(rows[:done, 0])
+        done, self._lost = s.constraints.first_lost(rows[:done, 0])
         if done and s.forces.contacts.sweeps:
             done, self._lost = self._swept(y, dt, rows[:done], self._lost)
         if done < len(rows):
@@ -441,7 +445,7 @@ class Integrator:
         y, dt
             Where the motion is, and the size of a step that has failed.
         """
-        if not self.system.m or self.system.forces.contacts.obstacles:
+        if not self.system.constraints.m or self.system.forces.contacts.obstacles:
             return None
         other = self if in_steps(self.scheme) else Integrator.lent(self.system, EnergyMomentum(),
                                                                    None)
@@ -543,7 +547,7 @@ class Integrator:
         s = self.system
         if self.ready:
             steps.factorize(recalled(memory, "at", (s.N,)),
-                            recalled(memory, "multipliers at", (s.m,)))
+                            recalled(memory, "multipliers at", (s.constraints.m,)))
         if np.shape(memory.get("mass at")) != (0,):
             mass.factorize(recalled(memory, "mass at", (s.N,)))
 

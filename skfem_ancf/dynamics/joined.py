@@ -35,13 +35,14 @@ class Joined:
         self._system, self._u, self._instant = system, u, instant
         self._tables = system.machine.tables.plain.joints
         if self._tables.own and motion.drives:
-            c = rates(lambda times: np.array([system.constraint(u, t) for t in times]), *instant)
+            c = rates(lambda times: np.array([system.constraints.constraint(u, t)
+                                              for t in times]), *instant)
             motion = JointMotion(np.vstack([motion.c[:1], c]), motion.g, 0)
         self._motion = motion
 
     def gap(self) -> Array:
         """Phi, shape (m,)."""
-        out, motion = np.empty(self._system.m), self._motion
+        out, motion = np.empty(self._system.constraints.m), self._motion
         constraint(self._tables, motion.c[0], motion.g[0], self._instant[0], self._u, out)
         return out
 
@@ -49,9 +50,9 @@ class Joined:
     def J(self) -> Any:
         """The derivative of Phi, shape (m, N), as of ``full_jacobian``."""
         s = self._system
-        if not s.bordered:
-            return s.sparse_jacobian(self._u, self._instant[0])
-        J = np.empty((s.m, s.N))
+        if not s.constraints.bordered:
+            return s.constraints.sparse_jacobian(self._u, self._instant[0])
+        J = np.empty((s.constraints.m, s.N))
         joint_directions(self._tables, self._motion.g[0], self._instant[0], self._u, J)
         return J
 
@@ -63,7 +64,7 @@ class Joined:
         v
             Velocity, shape (N,).
         """
-        out, (t, dt, *_) = np.empty(self._system.m), self._instant
+        out, (t, dt, *_) = np.empty(self._system.constraints.m), self._instant
         drive_rate(self._tables, self._motion, t, dt, self._u, out)
         return out + self.J @ v
 
@@ -75,9 +76,9 @@ class Joined:
         v, a
             Velocity and acceleration, shape (N,).
         """
-        s, out, (t, dt, *_) = self._system, np.empty(self._system.m), self._instant
+        s, out, (t, dt, *_) = self._system, np.empty(self._system.constraints.m), self._instant
         acceleration_of_joints(self._tables, self._motion, t, dt, self._u, v, out)
-        if self._tables.own and s.drives:
+        if self._tables.own and s.constraints.drives:
             out += 2.0 * rates(lambda times: np.array([
-                s.full_jacobian(self._u, t) @ v for t in times]), *self._instant)[0]
+                s.constraints.full_jacobian(self._u, t) @ v for t in times]), *self._instant)[0]
         return out + self.J @ a

@@ -85,7 +85,7 @@ class StepSize:
         for load in s.loads:
             if load.amplitude is not None:
                 columns.append(sample(load.amplitude, self.times).reshape(-1, 1))
-        for joint in s.all_joints:
+        for joint in s.constraints.all_joints:
             if joint.moving:
                 columns.append(joint.moved(self.times, s.N))
         values = np.hstack(columns)
@@ -141,7 +141,7 @@ class StepSize:
         float
             Above 1 it adds more than its share.
         """
-        de = self.scheme.local_error(old, new, dt) * self.system.free
+        de = self.scheme.local_error(old, new, dt) * self.system.constraints.free
         for _ in range(self.scheme.filtered):
             de = self.scheme.resolved(integrator, de)
         power = self.scheme.order + 1
@@ -159,9 +159,9 @@ class StepSize:
     def _free(self, y, de):
         """What of a change of the displacement joints do not undo."""
         s = self.system
-        if not s.m or s.by_nodes:
+        if not s.constraints.m or s.by_nodes:
             return de
-        J = s.full_jacobian(y.u, y.t)
+        J = s.constraints.full_jacobian(y.u, y.t)
         return de + s.mass_solver(y.u, y.t, J)(np.zeros(s.N), -(J @ de))[0]
 
     def begin(self) -> None:

@@ -235,7 +235,7 @@ class Constraints:
         out[out == 0.0] = self.size
         return out
 
-    def constraint(self, u: Array, t: float) -> Array:
+    def constraint(self, u: Array, t: float | None) -> Array:
         """Phi of the joints with multipliers, shape (m,).
 
         Parameters

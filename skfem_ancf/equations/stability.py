@@ -122,7 +122,7 @@ def verdict_of_factors(system: Any) -> Verdict:
 
 def _is_symmetric(system):
     """True if the tangent of loads that follow is symmetric all the same."""
-    skew, size = system.K.skew_size(system.constraints.coordinate_sizes * system.mask)
+    skew, size = system.K.skew_size(system.constraints.coordinate_sizes * system.constraints.mask)
     return skew <= ROUND_OFF * size
 
 
@@ -141,7 +141,7 @@ def has_potential(system: Any, u: Array, load: float) -> bool:
     if system.symmetric:
         return True
     system.assemble(u, load)
-    fix(system.K.band, system.fixed)
+    fix(system.K.band, system.constraints.fixed)
     return _is_symmetric(system)
 
 
@@ -181,9 +181,9 @@ def is_held(system: Any, u: Array, multipliers: Array) -> bool:
         The equilibrium at full load, shapes (N,) and (m,).
     """
     force, _ = system.assemble(u)
-    fix(system.K.band, system.fixed)
+    fix(system.K.band, system.constraints.fixed)
     loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
-    weights = position_weights(system) * system.mask
+    weights = position_weights(system) * system.constraints.mask
     acting = np.max(loads * weights)
     if acting * system.size <= NOTHING * system.energy_of_strains:
         return False
@@ -212,7 +212,7 @@ def weak_at_rest(system: Any) -> str:
                     if np.linalg.eigvalsh(term.law.moduli(at_rest)[..., 0])[0] < 0.0})
     if not names:
         return ""
-    found = verdict(system, np.zeros(system.N), 0.0, np.zeros(system.m))
+    found = verdict(system, np.zeros(system.N), 0.0, np.zeros(system.constraints.m))
     if found.stability != "unstable":
         return ""
     return (f"the scene gives way at rest, without any load ({found}): the strain energy of "
@@ -241,14 +241,15 @@ def heads_on(system: Any, result: Any, u: Array, load: float) -> bool:
     if system.forces.contacts.moving:
         return True  # the tangent does not know where obstacles go
     du = np.zeros(system.N)
-    du[system.fixed] = system.values(load) - result.u[system.fixed]
+    fixed = system.constraints.fixed
+    du[fixed] = system.constraints.values(load) - result.u[fixed]
     force, _ = system.assemble(result.u, result.load)
-    J = system.full_jacobian(result.u, load)
+    J = system.constraints.full_jacobian(result.u, load)
     residual = (load * system.external_force(result.u) - force - system.multiply(du)
                 - result.multipliers @ J)
     try:
         system.factorize(result.u, load, result.multipliers)
-        du += system.solve(residual, -system.constraint(result.u, load) - J @ du)[0]
+        du += system.solve(residual, -system.constraints.constraint(result.u, load) - J @ du)[0]
     except NO_FACTORS:
         return True
     return bool(du @ (position_weights(system) * (u - result.u)) >= 0.0)
@@ -268,7 +269,7 @@ def gives_way(system: Any, result: Any, load: float) -> bool:
     load
         The next load factor.
     """
-    descent, none, ratio = Descent(system), np.zeros(system.m), []
+    descent, none, ratio = Descent(system), np.zeros(system.constraints.m), []
     if result.load == 0.0:
         return False
     try:
@@ -349,15 +350,15 @@ class Descent:
     def _bounded(self, factorize, R, phi):
         """The correction with the least stiffness added that will do, to a factor of ten or so."""
         band, system = self.system.K.band, self.system
-        fix(band, system.fixed)
+        fix(band, system.constraints.fixed)
         tangent = band.flat.copy()
-        scale = max(np.mean(np.abs(system.K.diagonal()) * self._sizes**2 * system.mask),
+        scale = max(np.mean(np.abs(system.K.diagonal()) * self._sizes**2 * system.constraints.mask),
                     np.max(np.abs(R * self._sizes)))
 
         def correction(shift):
             band.flat[:] = tangent
             if shift > 0.0:
-                system.K.add_diagonal(shift * system.mask / self._sizes**2)
+                system.K.add_diagonal(shift * system.constraints.mask / self._sizes**2)
             try:
                 factorize()
                 du, dm = system.solve(R, phi)
@@ -413,8 +414,8 @@ class Descent:
         return float(np.max(values, initial=0.0))
 
     def _inverse_eigenvectors(self, count, which):
-        at = np.nonzero((self._weights > 0) & self.system.free)[0]
-        none, N = np.zeros(self.system.m), self.system.N
+        at = np.nonzero((self._weights > 0) & self.system.constraints.free)[0]
+        none, N = np.zeros(self.system.constraints.m), self.system.N
 
         def inverse(y):
             b = np.zeros(N)

@@ -63,7 +63,7 @@ class Eliminated:
     def __init__(self, system: Any, A: BandMatrix) -> None:
         self.A, self._condensed = A, condensed(system)
         #: what it was factorised at: displacement and multipliers
-        self.at = np.zeros(system.N), np.zeros(system.m)
+        self.at = np.zeros(system.N), np.zeros(system.constraints.m)
 
     def factorize(self, u: Array, multipliers: Array) -> None:
         """Make factors of what A holds.
@@ -134,7 +134,7 @@ class EliminatedMass:
     def factorize(self, u: Array) -> None:
         """Make factors at a displacement (N,)."""
         self.at = u.copy()
-        self._condensed.factorize(self._M, self.at, np.zeros(self._system.m))
+        self._condensed.factorize(self._M, self.at, np.zeros(self._system.constraints.m))
 
     def forget(self, factors: bool = True) -> None:
         """Begin anew: what is solved next does not depend on what was solved before.

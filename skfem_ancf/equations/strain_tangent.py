@@ -54,7 +54,7 @@ class StrainTangent:
 
     def __init__(self, system: Any, u: Array, load: float, t: float | None,
                  multipliers: Array) -> None:
-        self.system, self.free = system, np.nonzero(system.free)[0]
+        self.system, self.free = system, np.nonzero(system.constraints.free)[0]
         self._at = u, load, t, load if t is None else t
         parts = [_beam_rows(beam, u[s]) for beam, s in zip(system.beams, system.slices)]
         rigid = system.N - sum(beam.N for beam in system.beams)
@@ -69,7 +69,7 @@ class StrainTangent:
         self.stress = np.concatenate([part[2] for part in parts])
         #: where the stresses of the other beams begin
         self._first = np.cumsum([len(part[2]) for part in parts[:len(system.beams)]])[:-1]
-        self.J = sparse.csr_matrix(system.jacobian(u, self._at[-1])[:, self.free])
+        self.J = sparse.csr_matrix(system.constraints.jacobian(u, self._at[-1])[:, self.free])
         self._set_stress(self.stress, multipliers)
 
     def _set_stress(self, stress, multipliers):
@@ -114,7 +114,7 @@ class StrainTangent:
         if rigid:
             S.append(sparse.csr_matrix((rigid, rigid)))
         S = (_joined(S) + load_stiffness(self.system, u, load, t)
-             + self.system.curvature(u, time, multipliers))
+             + self.system.constraints.curvature(u, time, multipliers))
         return S[self.free][:, self.free]
 
     def response(self) -> tuple[Array, Array, Array]:
@@ -127,10 +127,10 @@ class StrainTangent:
         """
         system, u = self.system, self._at[0]
         du = np.zeros(system.N)
-        du[system.fixed] = system.values(1.0)
+        du[system.constraints.fixed] = system.constraints.values(1.0)
         rest = (system.external_force(u)[self.free] - self._element_force()
                 - self.B.T @ (self._rows[1] @ du))
-        gap = -system.constraint(u + du, 1.0)
+        gap = -system.constraints.constraint(u + du, 1.0)
         x, multipliers = Inverse(self).solve_both(rest[:, None], gap[:, None])
         du[self.free] = x[:, 0]
         return du, self._rows[1] @ du, multipliers[:, 0]

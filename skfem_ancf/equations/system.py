@@ -50,20 +50,6 @@ MANY = 48
 DENSE = 100
 
 
-class _OfConstraints(cached_property):
-    """What the constraints have by its name, which is found once; they do not change."""
-
-    def __init__(self) -> None:
-        def found(system: System) -> Any:
-            return getattr(system.constraints, str(self.attrname))
-
-        super().__init__(found)
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        super().__set_name__(owner, name)
-        self.__doc__ = f"See :class:`~skfem_ancf.equations.constraints.Constraints`, ``{name}``."
-
-
 class System:
     """The discrete equations of a scene.
 
@@ -129,36 +115,6 @@ class System:
                 s = self.of(load)
                 self.constant_force[s] += load.force(np.zeros(s.stop - s.start))
 
-    fixed: Any = _OfConstraints()
-    free: Any = _OfConstraints()
-    mask: Any = _OfConstraints()
-    values: Any = _OfConstraints()
-    values_at: Any = _OfConstraints()
-    given: Any = _OfConstraints()
-    moves: Any = _OfConstraints()
-    all_joints: Any = _OfConstraints()
-    joints: Any = _OfConstraints()
-    m: Any = _OfConstraints()
-    constraint: Any = _OfConstraints()
-    drives: Any = _OfConstraints()
-    full_jacobian: Any = _OfConstraints()
-    sparse_jacobian: Any = _OfConstraints()
-    jacobian: Any = _OfConstraints()
-    quadratic: Any = _OfConstraints()
-    curvature: Any = _OfConstraints()
-    lost: Any = _OfConstraints()
-    first_lost: Any = _OfConstraints()
-    mean_jacobian: Any = _OfConstraints()
-    mean_turning: Any = _OfConstraints()
-    multipliers_of: Any = _OfConstraints()
-    joint_force: Any = _OfConstraints()
-    loose: Any = _OfConstraints()
-    bordered: Any = _OfConstraints()
-    free_rigid_motions: Any = _OfConstraints()
-    require_independent_joints: Any = _OfConstraints()
-    missing_supports: Any = _OfConstraints()
-    require_supports: Any = _OfConstraints()
-
     def _directors(self, fixed):
         """The conditions of the bodies' directors, but of those that are held fast."""
         return [UnitDirector(body, self.of(body).start) for body in self.bodies
@@ -221,7 +177,7 @@ class System:
     @cached_property
     def varies(self) -> bool:
         """True if supports or loads may ask functions of time."""
-        return bool(self._varying) or self.moves
+        return bool(self._varying) or self.constraints.moves
 
     def _require_coordinates(self, u):
         if u.shape != (self.N,):
@@ -554,7 +510,7 @@ class System:
         Of rigid bodies, whose directions are unit vectors, and where functions of time are places:
         joints close to eps times these, however little has moved.
         """
-        if not self.bodies and not self.drives:
+        if not self.bodies and not self.constraints.drives:
             return 0.0
         turn = np.concatenate([b.rigid_motions() @ (-b.origin[1], b.origin[0], 1.0)
                                for b in self.members])
@@ -662,20 +618,20 @@ class System:
             What is set, or added to, shape (m,), (N,) or (m N,).
         """
         if what == 0:
-            out[:] = self.constraint(u, t)
+            out[:] = self.constraints.constraint(u, t)
         elif what == 1:
-            out += self.full_jacobian(u, t) @ v
+            out += self.constraints.full_jacobian(u, t) @ v
         elif what == 2:
-            out += v @ self.full_jacobian(u, t)
+            out += v @ self.constraints.full_jacobian(u, t)
         elif what == 3:
-            out += dense(self.full_jacobian(u, t)).ravel()
+            out += dense(self.constraints.full_jacobian(u, t)).ravel()
         elif what == 4:
-            out += self.quadratic(u, t, v)
+            out += self.constraints.quadratic(u, t, v)
         elif what == 5:
-            out += self.mean_jacobian(v, u, t).ravel()
+            out += self.constraints.mean_jacobian(v, u, t).ravel()
         else:
             v0, v1, u0 = v[:3 * self.N].reshape(3, self.N)
-            out += self.mean_turning(u0, u, v0, v1, t, v[3 * self.N:])
+            out += self.constraints.mean_turning(u0, u, v0, v1, t, v[3 * self.N:])
 
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:
@@ -718,7 +674,7 @@ class System:
     def mass_factors(self) -> BandMatrix:
         """The factors of the mass matrix with its supports fixed; made once."""
         M = self.new_band().combine(1.0, self.mass, 0.0, self.mass)
-        fix(M.band, self.fixed)
+        fix(M.band, self.constraints.fixed)
         if not factorize(M.band):
             if self.forces.masses:
                 raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
@@ -751,10 +707,11 @@ class System:
                 return mass.solve(u, t, b, rate)
 
             return solve_by_nodes
-        M, free = self.mass_factors, self.free
-        if not self.m:
+        M, free = self.mass_factors, self.constraints.free
+        if not self.constraints.m:
             return lambda b, rate: (M.solve(b * free), _NONE)
-        J = J * self.mask if isinstance(J, np.ndarray) else self.jacobian(u, t)
+        J = (J * self.constraints.mask if isinstance(J, np.ndarray)
+             else self.constraints.jacobian(u, t))
         Y = M.solve(J.T if isinstance(J, np.ndarray) else dense(J.T))
         S = J @ Y
 
@@ -855,7 +812,7 @@ class System:
         multipliers
             Theirs, shape (m,).
         """
-        fix(self.K.band, self.fixed)
+        fix(self.K.band, self.constraints.fixed)
         if not self.coupled:
             self.K.factorize()
             return
@@ -864,15 +821,15 @@ class System:
             return
         if u is not None:
             self._assembled = np.array(u), float(t)
-        self._J = self.jacobian(u, t)
+        self._J = self.constraints.jacobian(u, t)
         i, j, v = (np.append(a, b) for a, b in zip(
             self.constraints.curvature_entries(u, t, multipliers), self._far_entries()))
         self._outside, self._sparse = (i, j, v), None
-        if self.bordered:
+        if self.constraints.bordered:
             along, springs = self.constraints.stiff
-            self._factors = BorderedMatrix(self.K, self._J, i, j, v, springs,
-                                           self.constraints.coordinate_sizes * self.mask,
-                                           self.loose, along)
+            sizes = self.constraints.coordinate_sizes * self.constraints.mask
+            self._factors = BorderedMatrix(self.K, self._J, i, j, v, springs, sizes,
+                                           self.constraints.loose, along)
             self._border = self._factors.factors
         else:
             self._sparse = self._sparse_factors(self._whole())
@@ -889,7 +846,7 @@ class System:
     @cached_property
     def by_nodes(self) -> bool:
         """True if steps of a motion eliminate the nodes of a frame; few equations are a border."""
-        return (self.constraints.condensable and not self.forces.far and self.m > MANY
+        return (self.constraints.condensable and not self.forces.far and self.constraints.m > MANY
                 and not len(self.damping.modal))
 
     @cached_property
@@ -899,7 +856,7 @@ class System:
     @property
     def coupled(self) -> bool:
         """True if the equations have more than a band: multipliers, or elements far apart."""
-        return bool(self.joints) or self.forces.far
+        return bool(self.constraints.joints) or self.forces.far
 
     def _far_entries(self):
         """What force elements have outside of the band, at free coordinates, where it was made."""
@@ -908,7 +865,7 @@ class System:
             return i, j, w
         u, t = self._assembled
         D = self.forces.stiffness(self.machine.tables.plain.forces, t, u, 0.0 * u, 0.0)
-        return i, j, w * D[place] * (self.free[i] & self.free[j])
+        return i, j, w * D[place] * (self.constraints.free[i] & self.constraints.free[j])
 
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of the tangent that :meth:`factorize` has factorised.
@@ -943,7 +900,7 @@ class System:
             return K.inertia()
         if self.condensed is not None:
             return self.condensed.inertia()
-        if self.bordered and self._factors.is_definite():
+        if self.constraints.bordered and self._factors.is_definite():
             return Inertia(0, False)
         K = self._reduced()
         return inertia_of(0.5 * (K + K.T))
@@ -968,10 +925,10 @@ class System:
         if self.condensed is not None:
             return self.condensed.ready and self.condensed.inertia() == Inertia(0, False)
         if (not K.definite or self.forces.far or self.bodies
-                or (self.joints and not self.bordered)):
+                or (self.constraints.joints and not self.constraints.bordered)):
             return False
         # what is definite is so on the tangent space of the joints
-        return not self.joints or not len(self._border.S) or not gives_way(self._border)
+        return not self.constraints.joints or not len(self._border.S) or not gives_way(self._border)
 
     def determinant_sign(self) -> int:
         """The sign of the determinant of what :meth:`inertia` counts: 1 or -1.
@@ -986,7 +943,7 @@ class System:
 
     def _whole(self):
         """The tangent with what joints add to it, sparse."""
-        if self.bordered:
+        if self.constraints.bordered:
             return self._factors.tocsc()
         i, j, v = self._outside
         return self.K.tocsc() + sparse.csc_array((v, (i, j)), shape=(self.N, self.N))
@@ -998,7 +955,7 @@ class System:
         slender beams that is more than bending.
         """
         size = self.constraints.coordinate_sizes
-        if self.bordered and self.N <= DENSE:
+        if self.constraints.bordered and self.N <= DENSE:
             T = null_basis(self._J * size) * size[:, None]
             return T.T @ self._factors.toarray() @ T
         T = sparse.csr_array(null_basis(sparse.csr_array(self._J * size)).multiply(size[:, None]))
@@ -1007,7 +964,7 @@ class System:
     def _sparse_factors(self, K):
         """Of K with the joints, all rows and columns over their sizes: pivots need one unit."""
         J, size = sparse.csr_array(self._J), self.constraints.coordinate_sizes
-        root = np.sqrt(np.mean((np.abs(K.diagonal()) * size**2)[self.free])) or 1.0
+        root = np.sqrt(np.mean((np.abs(K.diagonal()) * size**2)[self.constraints.free])) or 1.0
         self._sizes = np.append(size / root, root / row_sizes(J.multiply(size)))
         S = sparse.dia_array((self._sizes[None], 0), shape=2 * self._sizes.shape)
         return splu((S @ sparse.block_array([[K, J.T], [J, None]]) @ S).tocsc())
@@ -1027,7 +984,7 @@ class System:
         du, multipliers
             The increments; the second is empty without joints.
         """
-        b = residual * self.mask
+        b = residual * self.constraints.mask
         if not self.coupled:
             return self.K.solve(b), _NONE
         phi = _NONE if phi is None else phi
@@ -1040,7 +997,7 @@ class System:
             logger.debug("border inaccurate by %.3g: sparse LU", error)
             self._sparse = self._sparse_factors(self._factors.tocsc())
         x = self._sizes * self._sparse.solve(self._sizes * np.append(b, phi))
-        if self.bordered:
+        if self.constraints.bordered:
             x[self.N:] += self._factors.factors.stiffness * phi
         return x[:self.N], x[self.N:]
 

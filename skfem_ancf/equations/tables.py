@@ -111,12 +111,12 @@ class Tables:
         self._words: list[Words] = []
         self._words_of_loads: list[Words] = []
         self._sort(system.loads)
-        self.motion_varies = any(joint.moving for joint in system.joints)
-        self.turns = any(joint.turning for joint in system.joints)
+        self.motion_varies = any(joint.moving for joint in system.constraints.joints)
+        self.turns = any(joint.turning for joint in system.constraints.joints)
         joints = self._joints()
         body = body_of(system.beams, system.slices)
         self.plain = Equations(body, self._load_tables(), joints,
-                               system.fixed, system.mask, system.K.band,
+                               system.constraints.fixed, system.constraints.mask, system.K.band,
                                self._border(joints),
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes)
@@ -370,15 +370,16 @@ class Tables:
         s = self.system
         #: g at the time 0
         self._slope = np.zeros((1, 0))
-        if not s.joints:
+        if not s.constraints.joints:
             return _NO_JOINTS
-        k, i, j, v = s.constraints.in_order([joint.second_entries(s.N) for joint in s.joints])
+        joints = s.constraints.joints
+        k, i, j, v = s.constraints.in_order([joint.second_entries(s.N) for joint in joints])
         gk, gi, g = s.constraints.slopes
         k, i, j, gk, gi = (packed(x, np.int64) for x in (k, i, j, gk, gi))
         self._slope = packed(g)[None]
         tables = JointTables(k, i, j, packed(v), gk, gi,
                              s.constraints.equation_sizes(gk, gi, g), 0)
-        tabled = (all(joint.tabled for joint in s.joints) if all(map(ours, s.joints))
+        tabled = (all(joint.tabled for joint in joints) if all(map(ours, joints))
                   else self.are_joints(tables))
         return tables if tabled else tables._replace(own=self.handle)
 
@@ -397,17 +398,17 @@ class Tables:
             Of the system's joints.
         """
         s = self.system
-        if not s.m:
+        if not s.constraints.m:
             return True
         k, i, j, v, gk, gi, sizes, _ = tables
         all_sizes = s.constraints.coordinate_sizes
         for t, x in zip(TRIED, np.random.default_rng(0).standard_normal((2, s.N))):
             u = 0.1 * all_sizes * x
             c, g = self.offsets(np.array([t]))[0], self.slopes(np.array([t]))[0]
-            slope = sparse.csr_array((g, (gk, gi)), shape=(s.m, s.N))
+            slope = sparse.csr_array((g, (gk, gi)), shape=(s.constraints.m, s.N))
             J = slope + sparse.csr_array((v * u[j], (k, i)), shape=slope.shape)
-            phi, gap = c + 0.5 * (J + slope) @ u, J - s.sparse_jacobian(u, t)
-            if not (np.all(np.abs(phi - s.constraint(u, t)) <= 1e-9 * sizes)
+            phi, gap = c + 0.5 * (J + slope) @ u, J - s.constraints.sparse_jacobian(u, t)
+            if not (np.all(np.abs(phi - s.constraints.constraint(u, t)) <= 1e-9 * sizes)
                     and (abs(gap) @ all_sizes <= 1e-9 * (abs(J) @ all_sizes)).all()):
                 return False
         return True
@@ -415,16 +416,16 @@ class Tables:
     def offsets(self, times: Array) -> Array:
         """c of all joints at the times, shape (n, m)."""
         s = self.system
-        if not s.joints:
+        if not s.constraints.joints:
             return np.zeros((len(times), 0))
-        return _beside([joint.offset(times, s.N) for joint in s.joints])
+        return _beside([joint.offset(times, s.N) for joint in s.constraints.joints])
 
     def slopes(self, times: Array) -> Array:
         """g of all joints at the times, shape (n, k); of one row where none turns."""
         s = self.system
         if not self.turns:
             return self._slope
-        return _beside([joint.slope_entries(times, s.N)[2] for joint in s.joints])
+        return _beside([joint.slope_entries(times, s.N)[2] for joint in s.constraints.joints])
 
     def driven(self, times: Array) -> Array:
         """c of all joints at the times and behind them g, shape (n, m + k).
@@ -434,7 +435,7 @@ class Tables:
         s = self.system
         if not self.turns:
             return self.offsets(times)
-        found = [(joint.driven(times, s.N), len(joint.equations)) for joint in s.joints]
+        found = [(joint.driven(times, s.N), len(joint.equations)) for joint in s.constraints.joints]
         return found[0][0] if len(found) == 1 else np.hstack([
             *[x[:, :m] for x, m in found], *[x[:, m:] for x, m in found]])
 
@@ -443,7 +444,7 @@ class Tables:
         if not self.motion_varies and not self.plain.joints.own:
             c, g = self.still
             return c[0, 0], g[0, 0]
-        times, m = np.array([t]), self.system.m
+        times, m = np.array([t]), self.system.constraints.m
         found = self.driven(times)[0]
         return found[:m], found[m:] if self.turns else self.slopes(times)[0]
 
@@ -455,8 +456,8 @@ class Tables:
         tables, have zeros.
         """
         s, joints, first = self.system, self.plain.joints, np.zeros(1)
-        c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
-        if s.m and not joints.own:
+        c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 4, len(joints.gk)))
+        if s.constraints.m and not joints.own:
             if not self.motion_varies:
                 c[:, 0] = self.offsets(first)
             if not self.turns:
@@ -467,19 +468,19 @@ class Tables:
         s, none = self.system, _NO_INTS
         if not s.coupled:
             return _NO_BORDER
-        if not s.joints or not s.bordered or joints.own or s.forces.far:
+        if not s.constraints.joints or not s.constraints.bordered or joints.own or s.forces.far:
             return Border(none, 0, 0, none, none, none, none, int(s.coupled), _NO_ROWS)
         along, springs = s.constraints.stiff
         i, j, ns = joints.hi, joints.hj, len(springs)
         if not len(i):
-            return Border(springs, ns, s.loose, none, none, none, none, 0, along)
+            return Border(springs, ns, s.constraints.loose, none, none, none, none, 0, along)
         outside = np.abs(i - j) > s.bandwidth
         far = np.unique(np.append(i[outside], j[outside]))
         picked = np.append(springs, far)
         out, = np.nonzero(outside)
         stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
         row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
-        return Border(picked, ns, s.loose, s.K._position(i[stored], j[stored]), stored,
+        return Border(picked, ns, s.constraints.loose, s.K._position(i[stored], j[stored]), stored,
                       row * len(picked) + column, out, 0, along)
 
 

@@ -407,11 +407,11 @@ def actions(state: Configuration) -> list[list[float]]:
     system = state.system
     t = state.load if state.t is None else state.t
     held = np.zeros(system.N)
-    held[system.fixed] = 1.0
+    held[system.constraints.fixed] = 1.0
     acting = system.forces.acting_rows()
     u = state.u if state.base is None else state.base.u
-    J = sparse.vstack([system.sparse_jacobian(u, t), acting]).tocsc() if (
-        system.m or len(acting)) else None
+    J = sparse.vstack([system.constraints.sparse_jacobian(u, t), acting]).tocsc() if (
+        system.constraints.m or len(acting)) else None
     out: list[list[float]] = []
     for beam, s in zip(system.beams, system.slices):
         nodes = np.nonzero(np.any(held[s].reshape(-1, beam.nd) != 0, axis=1))[0]

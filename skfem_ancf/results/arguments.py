@@ -107,9 +107,10 @@ def configuration(system: System, state: State) -> State:
     u = displacement(system, state, "state")
     if state.system is system:
         return state
-    kinds = [[(type(j), j.equations) for j in s.joints] for s in (state.system, system)]
+    kinds = [[(type(j), j.equations) for j in s.constraints.joints] for s in (state.system, system)]
     if kinds[0] != kinds[1]:
-        raise InputError(f"state has multipliers of other joints: {list(state.system.joints)} "
-                         f"there, {list(system.joints)} in the scene; scene.state(u, multipliers) "
-                         "takes them as they are")
+        raise InputError("state has multipliers of other joints: "
+                         f"{list(state.system.constraints.joints)} there, "
+                         f"{list(system.constraints.joints)} in the scene; "
+                         "scene.state(u, multipliers) takes them as they are")
     return state.replace(system=system, u=u)

@@ -140,8 +140,9 @@ class State(Frozen):
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
                  verdict: Verdict | None = None, doubt: str = "",
                  memory: Array | None = None, base: State | None = None) -> None:
-        multipliers = np.zeros(system.m) if multipliers is None else multipliers
-        for name, value, size in (("u", u, system.N), ("multipliers", multipliers, system.m)):
+        m = system.constraints.m
+        multipliers = np.zeros(m) if multipliers is None else multipliers
+        for name, value, size in (("u", u, system.N), ("multipliers", multipliers, m)):
             if np.shape(value) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
                                  f"{np.shape(value)}")
@@ -562,7 +563,7 @@ class State(Frozen):
     def actions(self) -> list[list[float]]:
         """Where supports and joints act on each beam: element + xi, a list a beam."""
         first = self.together[0]
-        if first is not self and not self.system.joints:
+        if first is not self and not self.system.constraints.joints:
             return first.actions  # of supports: always the same
         return actions(self)
 
@@ -700,14 +701,14 @@ class State(Frozen):
         nodes, there = member.nodes(boundary), np.zeros(self.system.N, dtype=bool)
         there[s].reshape(-1, member.nd)[nodes] = True
         force, touched = self.system.constraints.force_on(there, self.multipliers)
-        total = np.where(self.system.free, 0.0, self._support_force()) + force
+        total = np.where(self.system.constraints.free, 0.0, self._support_force()) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
         q = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
         arm = q.copy()
         arm[:, 0] -= q[0, 0]
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
         by_name = dict(zip(member.dofnames, forces.sum(axis=0).ravel()))
-        holds = (~self.system.free | touched)[s].reshape(-1, member.nd)[nodes]
+        holds = (~self.system.constraints.free | touched)[s].reshape(-1, member.nd)[nodes]
         held = set(np.nonzero(holds.any(axis=0))[0])
         names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
         if frame is not None and not names:
@@ -722,8 +723,8 @@ class State(Frozen):
             system.linear_external_force(self.base.u, self.u - self.base.u))
         total = self.internal_force - self.load * loads + self._inertia
         t = self.load if self.t is None else self.t
-        if system.joints:
-            total = total + self.multipliers @ system.full_jacobian(self._acted, t)
+        if system.constraints.joints:
+            total = total + self.multipliers @ system.constraints.full_jacobian(self._acted, t)
         return total
 
     @property
@@ -734,8 +735,8 @@ class State(Frozen):
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""
         t = self.load if self.t is None else self.t
-        return self.system.joint_force(joint, self.multipliers, self._support_force(), self._acted,
-                                       t)
+        return self.system.constraints.joint_force(
+            joint, self.multipliers, self._support_force(), self._acted, t)
 
     # files and pictures
 

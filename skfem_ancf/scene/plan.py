@@ -116,8 +116,8 @@ def _forces(scene, kind):
     yield "varying loads", "computed" if rest else "skipped", (
         f"{_kinds(rest)}: they depend on displacement or time" if rest else
         "no follower load, no amplitude")
-    yield "multipliers", "computed" if s.m else "skipped", (
-        f"{s.m} equations of {_kinds(s.joints)}" if s.m else
+    yield "multipliers", "computed" if s.constraints.m else "skipped", (
+        f"{s.constraints.m} equations of {_kinds(s.constraints.joints)}" if s.constraints.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
 
 
@@ -160,16 +160,16 @@ def _linear_solver(s, dynamic):
                   "sparse LDL^T of these: no multiplier is unknown")
     elif not dynamic and s.forces.far:
         solver = "banded with a border of the points that force elements couple"
-    elif s.m and not dynamic and s.machine.tables.plain.border.wide:
+    elif s.constraints.m and not dynamic and s.machine.tables.plain.border.wide:
         solver = "sparse LU with the multipliers: " + (
-            "a joint is not quadratic, as a slider on a beam" if s.bordered else
+            "a joint is not quadratic, as a slider on a beam" if s.constraints.bordered else
             "more is joined, held or followed by loads than the nodes" if s.constraints.frame else
-            f"too many for a border ({s.m})")
+            f"too many for a border ({s.constraints.m})")
     elif not s.symmetric:
         solver = f"banded LU, half bandwidth {bandwidth}: a force has no potential"
     else:
         solver = f"banded Cholesky, half bandwidth {bandwidth}"
-    if s.m and (dynamic or s.bordered):
+    if s.constraints.m and (dynamic or s.constraints.bordered):
         springs = 0 if dynamic else len(s.constraints.stiff[1])
         solver += ", bordered by the multipliers" + (
             f" and by {springs} springs on beams that joints alone hold" if springs else "")

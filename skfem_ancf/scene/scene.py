@@ -1441,13 +1441,14 @@ class Scene:
             If the solution enters an obstacle.
         """
         system = self.system
-        system.require_supports()
-        zero, none = np.zeros(system.N), np.zeros(system.m)
+        system.constraints.require_supports()
+        zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
         system.assemble(zero, 1.0, geometric=False)
         system.factorize(zero, 1.0, none)
         u, multipliers = np.zeros(system.N), none
-        u[system.fixed] = system.values(1.0)
-        gap, J = system.constraint(zero, 1.0), system.full_jacobian(zero, 1.0)
+        u[system.constraints.fixed] = system.constraints.values(1.0)
+        gap = system.constraints.constraint(zero, 1.0)
+        J = system.constraints.full_jacobian(zero, 1.0)
         # solved again with what sums of strains leave: an assembled stiffness rounds off bending
         for _ in range(LINEAR_SOLVES if system.N <= SOLVED_AGAIN else 1):
             rest = (system.linear_external_force(zero, u) - system.linear_force(zero, u)
@@ -1554,7 +1555,8 @@ class Scene:
         system = self.system
         u = np.zeros(system.N) if u is None else np.array(require_finite("u", u, (system.N,)))
         if multipliers is not None:
-            multipliers = np.array(require_finite("multipliers", multipliers, (system.m,)))
+            m = system.constraints.m
+            multipliers = np.array(require_finite("multipliers", multipliers, (m,)))
         return State(system, u, require_finite_scalar("load", load), converged=False,
                      message="given coordinates", multipliers=multipliers)
 
@@ -1563,17 +1565,17 @@ class Scene:
                         "; first_step=0.1 begins with a tenth of the load; with adapt= those of "
                         "statics.adapt.solve_adaptive too")
         system = self.system
-        system.require_independent_joints()
+        system.constraints.require_independent_joints()
         if system.constraints.adrift:
-            system.require_supports()
+            system.constraints.require_supports()
         try:
             result = newton.solve_static(system, u, memory=memory, **options)
         except Interrupted as error:
             raise Interrupted(str(error), self._state(error.state)) from None
         except ConvergenceError as error:
-            if system.missing_supports:
-                raise SupportError(f"{system.missing_supports}. No stable equilibrium was found in "
-                                   "which the loads hold what is free") from error
+            if system.constraints.missing_supports:
+                raise SupportError(f"{system.constraints.missing_supports}. No stable equilibrium "
+                                   "was found in which the loads hold what is free") from error
             state = self._state(error.state)
             raise ConvergenceError(_with_findings(str(error), state), state) from None
         return self._state(result)
@@ -1621,7 +1623,7 @@ class Scene:
         (3.0, True)
         """
         system = self.system
-        system.require_supports()
+        system.constraints.require_supports()
         system.forces.contacts.require_path()
         critical = None if branch is None else _branch(branch, system)
         try:

@@ -151,9 +151,9 @@ def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = N
     """
     system = tracer.system
     tracer.factorize(point)
-    D, none = np.abs(system.K.diagonal()) * system.mask, np.zeros(system.m)
+    D, none = np.abs(system.K.diagonal()) * system.constraints.mask, np.zeros(system.constraints.m)
     x = np.random.default_rng(0).standard_normal(system.N) if start is None else start[0]
-    x, value = x * system.mask, np.nan
+    x, value = x * system.constraints.mask, np.nan
     for _ in range(iterations + (8 if start is None else 0)):
         x = x / np.sqrt(x @ (D * x))
         y, m = system.solve(D * x, none)

@@ -133,14 +133,14 @@ class Modes:
     def _joint_forces(self, d, inertia):
         """What a displacement and its inertia change the multipliers of the joints by, (m,)."""
         state, system = self.state, self.state.system
-        if not system.m:
+        if not system.constraints.m:
             return np.zeros(0)
         u, load, t = np.array(state.u), state.load, state.load if state.t is None else state.t
         rest = (system.linear_force(u, d, load) - system.internal_force(u, None, load) + inertia
                 - load * (system.linear_external_force(u, d) - system.external_force(u))
-                + system.curvature(u, t, state.multipliers) @ d)
-        J = system.sparse_jacobian(u, t)[:, system.free].tocsr()
-        return -spsolve((J @ J.T).tocsc(), J @ rest[system.free])
+                + system.constraints.curvature(u, t, state.multipliers) @ d)
+        J = system.constraints.sparse_jacobian(u, t)[:, system.constraints.free].tocsr()
+        return -spsolve((J @ J.T).tocsc(), J @ rest[system.constraints.free])
 
 
 @dataclass(repr=False)
@@ -243,7 +243,7 @@ def rest_modes(system: System, k: int) -> tuple[Array, Array]:
     frequencies, shapes
         Shapes (k,) and (k, N).
     """
-    rigid = len(system.free_rigid_motions())
+    rigid = len(system.constraints.free_rigid_motions())
     found = modes(system, State(system, np.zeros(system.N), load=0.0), rigid + k)
     return found.frequencies[rigid:], found.shapes[rigid:]
 
@@ -312,7 +312,7 @@ def _negative(tangent, state, shift):
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
     if shift < 0.0 and not system.coupled:  # as a rule indefinite: without factors
-        fix(system.K.band, system.fixed)
+        fix(system.K.band, system.constraints.fixed)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
     system.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
     return system.inertia().negative
@@ -459,8 +459,8 @@ def buckling(system: System, k: int) -> Buckling:
     ModelWarning
         Where springs become stiffer or softer before it buckles.
     """
-    system.require_supports()
-    zero, none = np.zeros(system.N), np.zeros(system.m)
+    system.constraints.require_supports()
+    zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
     _require_unstressed(system, zero)
     tangent = StrainTangent(system, zero, 0.0, None, none)
     n, m = tangent.size
@@ -493,7 +493,7 @@ def _require_unstressed(system, zero):
     """Raise InputError where force elements push before there is any load."""
     if not len(system.forces.elements):
         return
-    push = np.abs(system.internal_force(zero, 0.0, 0.0) * system.mask).max()
+    push = np.abs(system.internal_force(zero, 0.0, 0.0) * system.constraints.mask).max()
     held = abs(system._held_by_elements())
     if push > UNSTRESSED * (held.max() if held.nnz else 0.0) * system.size:
         raise InputError(
@@ -509,7 +509,7 @@ def _require_same_springs(system, u):
     """
     if not len(system.forces.elements):
         return
-    kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.mask
+    kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.constraints.mask
     kick *= system.constraints.coordinate_sizes
     rest, here, up, down = (system.forces.firmnesses(system.machine.tables.plain.forces, x)
                             for x in (np.zeros(system.N), u, u + kick, u - kick))

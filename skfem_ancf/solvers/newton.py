@@ -320,7 +320,7 @@ class Search:
     def __init__(self, system: System, u: Array | None, memory: Array | None, steps: Steps,
                  stable: bool, progress: bool | None) -> None:
         self.system, self.rules, self.stable, self.progress = system, steps, stable, progress
-        self.held_by_loads = bool(system.missing_supports)
+        self.held_by_loads = bool(system.constraints.missing_supports)
         self.attempts: list[Attempt] = []
         self.soft = False
         self.furthest: StaticResult | None = None
@@ -334,7 +334,7 @@ class Search:
         self.route = Route(np.zeros(system.N))
         if u is not None:
             missing = system.external_force(u) - system.internal_force(u)
-            self.route = Route(u.copy(), missing * system.mask)
+            self.route = Route(u.copy(), missing * system.constraints.mask)
         self._memory = memory
 
     def find(self) -> StaticResult:
@@ -415,7 +415,7 @@ class Search:
     def pushed_at_rest(self) -> bool:
         """True if springs push the scene out of its place before any load."""
         force = self.system.internal_force(self.route.u, 0.0, 0.0)
-        return self.route.proportional and bool(np.any(force * self.system.mask))
+        return self.route.proportional and bool(np.any(force * self.system.constraints.mask))
 
     @property
     def rubs(self) -> bool:
@@ -561,8 +561,9 @@ class Search:
 
     def _beginning(self, route):
         system = self.system
-        return StaticResult(route.u.copy(), np.zeros(system.m), 0.0, np.zeros(system.N), [], False,
-                            "no load step has converged", memory=self._memory)
+        return StaticResult(route.u.copy(), np.zeros(system.constraints.m), 0.0,
+                            np.zeros(system.N), [], False, "no load step has converged",
+                            memory=self._memory)
 
     def _followed(self, result, record, found, route):
         """The result after a load step."""
@@ -806,7 +807,7 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
     target = _target(system, result, load, options.route)
     rules = rules_of(system, options.method, options.tol, max_iterations,
                      FIRST if wary else WATCHED if options.watched and descent is None else 0)
-    room, solver = machine.room(room_for_iterations, system.m), None
+    room, solver = machine.room(room_for_iterations, system.constraints.m), None
     if descent is not None:
         solver = descent
     elif tables.plain.border.wide:
@@ -833,8 +834,8 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
         raise _Failed(_ENDS[status].format(max_iterations))
     if system.inverted(x.u):
         raise _Failed("the body is turned inside out")
-    if system.lost(x.u):
-        raise _Failed(system.lost(x.u))
+    if system.constraints.lost(x.u):
+        raise _Failed(system.constraints.lost(x.u))
     if solver is None:
         if n:
             system.take_factors(room.factors)
@@ -871,13 +872,14 @@ def _target(system, result, load, route):
     """The Target of a load level."""
     tables, gap = system.machine.tables, route.gap
     full, at = route.acting(load)
-    values = system.values(at)
+    values = system.constraints.values(at)
     if gap is None:
         gap = np.zeros(system.N)
     else:
-        values = route.u[system.fixed] + load * (values - route.u[system.fixed])
+        begin = route.u[system.constraints.fixed]
+        values = begin + load * (values - begin)
         gap = (1.0 - load) * gap
     before = route.acting(result.load)[0]
     factors = tables.static_factors(full)
     return Target(factors, tables.static_factors(full, before) if tables.prestressed else factors,
-                  full, at, *tables.at(at), gap, values - result.u[system.fixed])
+                  full, at, *tables.at(at), gap, values - result.u[system.constraints.fixed])

@@ -79,7 +79,7 @@ class Tracer:
         self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
         weights = position_weights(system)
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
-        self.unit = system.values(1.0) - system.values(0.0)
+        self.unit = system.constraints.values(1.0) - system.constraints.values(0.0)
         #: what a unit of load counts in the arc length, where it hardly moves the nodes
         self.of_load: float = 0.0
 
@@ -90,7 +90,7 @@ class Tracer:
     def stress_free(self) -> Point:
         """The stress-free state as a point."""
         zero = np.zeros(self.system.N)
-        return Point(zero, np.zeros(self.system.m), 0.0, zero, 0.0, 0.0, 0)
+        return Point(zero, np.zeros(self.system.constraints.m), 0.0, zero, 0.0, 0.0, 0)
 
     def begin(self, point: Point) -> Point:
         """Find the tangent at the stress-free state, and what the load counts in the arc length.
@@ -116,16 +116,17 @@ class Tracer:
 
     def _drive(self, external, u, load):
         """What a unit of load adds to the residual and to the constraints."""
-        system, phi = self.system, np.zeros(self.system.m)
-        if system.drives:
+        system, phi = self.system, np.zeros(self.system.constraints.m)
+        if system.constraints.drives:
             h = 1e-6 * max(1.0, abs(load))
-            phi = (system.constraint(u, load + h) - system.constraint(u, load - h)) / (2.0 * h)
+            after, before = (system.constraints.constraint(u, load + x) for x in (h, -h))
+            phi = (after - before) / (2.0 * h)
         if np.any(self.unit):
             du0 = np.zeros(system.N)
-            du0[system.fixed] = self.unit
+            du0[system.constraints.fixed] = self.unit
             external = external - system.multiply(du0)
-            if system.joints:
-                phi = phi + system.full_jacobian(u, load) @ du0
+            if system.constraints.joints:
+                phi = phi + system.constraints.full_jacobian(u, load) @ du0
         return external, -phi
 
     def factorize(self, point: Point) -> tuple[Array, Array]:
@@ -153,7 +154,7 @@ class Tracer:
         """
         drive, phi = self.factorize(point)
         dF, mF = self.system.solve(drive, phi)
-        dF[self.system.fixed] += self.unit
+        dF[self.system.constraints.fixed] += self.unit
         size = np.hypot(self.norm(dF), self.of_load)
         if not size > 0 or not np.isfinite(size):
             raise Failed("the loads move nothing" if size == 0 else "the tangent is singular")
@@ -211,9 +212,9 @@ class Tracer:
                 external = system.external_force(u)
             if not np.all(np.isfinite(force)):
                 raise Failed("the strain is not finite")
-            residual, phi = load * external - force, system.constraint(u, load)
-            if system.joints:
-                residual = residual - m @ system.jacobian(u, load)
+            residual, phi = load * external - force, system.constraints.constraint(u, load)
+            if system.constraints.joints:
+                residual = residual - m @ system.constraints.jacobian(u, load)
             closed = np.all(np.abs(phi) <= CLOSED * system.machine.tables.plain.joints.sizes)
             reference = max(reference_work(force, load * external, u),
                             np.sqrt(abs(external @ step * dl)))
@@ -227,11 +228,11 @@ class Tracer:
                 dF, mF = system.solve(drive, gap)
             except NO_FACTORS:
                 raise Failed("the tangent is singular") from None
-            dF[system.fixed] += self.unit
+            dF[system.constraints.fixed] += self.unit
             dl = increment(step, load - start.load, dR, dF)
             du, dm = dR + dl * dF, mR + dl * mF
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise Failed("the iteration leaves the path")
-            work = np.sqrt(abs((residual * system.free) @ du) + abs(phi @ dm)
+            work = np.sqrt(abs((residual * system.constraints.free) @ du) + abs(phi @ dm)
                            + abs(dl * (external @ du)))
         raise Failed(f"no convergence in {rules.iterations} iterations")
