@@ -690,9 +690,6 @@ call("state.recovery", lambda **k: state().recovery(**k), dict(beam=0), beam="be
 for _name in ("balance", "eigenstrains"):
     call(f"state.{_name}", lambda _name=_name, **k: getattr(state(), _name)(**k), dict(beam=0),
          beam="beam?")
-call("state.eigen", lambda **k: state().eigen(**k), dict(
-    part=state().system.points.find([(1.0, 0.0)]).parts[0], stress=False), part="other",
-     stress="flag")
 call("scene.state", lambda **k: loaded_once().state(**k),
      dict(u=np.zeros(beam().N), multipliers=None, load=1.0),
      {"multipliers": {"[]": "there are none"}}, u="other?", multipliers="other?", load="number")

@@ -10,7 +10,7 @@ from test_sections import (BIMETAL, BRASS, PROFILES, SANDWICH, STEEL, H, cantile
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, Section)
 from skfem_ancf.materials.damping import KelvinVoigt
-from skfem_ancf.recovery.intervals import Panels
+from skfem_ancf.recovery.intervals import Intervals
 from skfem_ancf.sections.section import slab_of
 from skfem_ancf.sections.measure import Uniform
 
@@ -172,24 +172,20 @@ def test_numbers_have_section_forces_and_no_fields(element):
     assert r.shear == pytest.approx(1e-3 / GA, rel=1e-2)
 
 
-def test_panels():
+def test_intervals_across():
     """Integrals and values of polynomials, of layers and of a circle."""
     for section, material in ((SANDWICH, None), (PROFILES["circle"][0], STEEL)):
-        p = Panels(section.slabs(line(), material), 2)
+        across = Intervals(section.slabs(line(), material), 2)
+        middle = across.points(np.ones(1))
+        eta = np.array([0.0, 0.3, 0.1, 1.0])
         for k in range(4):
-            values = p.eta**k
-            assert_allclose(p.whole @ values, 1 / (k + 1), rtol=1e-10)
-            assert_allclose(p.from_axis @ values, (p.eta**(k + 1) - 0.5**(k + 1)) / (k + 1),
-                            atol=1e-10)
-            eta = np.array([0.0, 0.3, 0.1, 1.0])
-            many = np.empty(4)
-            for at, columns, weights in p.by_panel(eta):
-                many[at] = weights @ values[columns]
-            assert_allclose(many, eta**k, atol=1e-9)
-            assert_allclose([p.values(x) @ values for x in eta.tolist()], many, atol=1e-14)
-            assert p.axis @ values == pytest.approx(0.5**k)
-    whole = Panels(section.slabs(line(), material), 2)
-    assert np.sum(whole.whole * whole.width) == pytest.approx(1.0, rel=1e-12)
+            values = across.eta**k
+            assert_allclose(across.whole @ values, 1 / (k + 1), rtol=1e-10)
+            assert_allclose(across.from_bottom @ values, across.eta**(k + 1) / (k + 1), atol=1e-10)
+            assert_allclose(across.weights(eta) @ values, eta**k, atol=1e-9)
+            assert_allclose([middle.axis @ values, middle.till_axis @ values],
+                            [0.5**k, 0.5**(k + 1) / (k + 1)], atol=1e-10)
+    assert np.sum(across.whole * across.width) == pytest.approx(1.0, rel=1e-12)
 
 
 def narrower(x):

@@ -257,17 +257,6 @@ def test_bars_so_curved_that_the_rounds_contract_slowly(element):
         assert_allclose(state.stress(points), state.stress(points, recover=False), rtol=1e-12)
 
 
-def test_states_of_which_some_do_not_settle():
-    """Each of several states that are recovered together is as it is alone."""
-    arc = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]),
-                              np.linspace(0, 1.5, 13), height=1.2)
-    beam = Beam(arc, ElementBeamANCF(3), NeoHookean(1.0, NU, density=1.0), width=1.0)
-    history = Scene(beam).clamp("left").gravity((0, -0.05)).integrate(1.5, 0.5)
-    together = [state.recovered[0] for state in history.states()]
-    assert together == [history.state(k).recovered[0] for k in range(4)]
-    assert together[:2] == ["", ""] and "do not settle" in together[3]
-
-
 def test_a_point_load_in_the_span_stops_the_recovery():
     """The shear jumps at the load, at a node and inside of an element, and is right beside it."""
     for at in (0.5, 0.5625 + 0.01):

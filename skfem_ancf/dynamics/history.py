@@ -13,6 +13,7 @@ from ..actions.forces.turns import Turns
 from ..core.kept import cached_property
 from ..beam.points import require_body
 from ..recovery.resultants import over_time
+from ..results.points import MaterialPoints
 from ..results.state import Reaction, State
 from .base import Motion, contacts_of
 
@@ -39,11 +40,8 @@ _LATE = {"t", "u", "v", "acceleration", "multipliers", "dissipated", "_others", 
 #: Instants of a picture where none are named.
 STROBES = 8
 
-#: Sections of all states whose fields are recovered at once.
-SECTIONS = 2048
 
-
-class History:
+class History(MaterialPoints):
     """A motion at its stored instants.
 
     Parameters
@@ -241,7 +239,7 @@ class History:
                      origin=(self.scheme, kept), memory=memory)
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
-        """States one after the other, whose fields are recovered many at once.
+        """States one after the other.
 
         Parameters
         ----------
@@ -252,79 +250,13 @@ class History:
         -------
         iterator of State
         """
-        return self._states(range(len(self)) if instants is None else [
+        return map(self.state, range(len(self)) if instants is None else [
             require_index("instants", k, len(self)) for k in _numbers(instants)])
-
-    def _states(self, ks):
-        for first in range(0, len(ks), self._group):
-            yield from _together([self.state(k) for k in ks[first:first + self._group]])
-
-    @property
-    def _group(self):
-        """States whose fields are recovered at once."""
-        sections = sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams)
-        return max(1, SECTIONS // max(1, sections))
-
-    def instants(self, motions: Sequence[Motion]) -> Iterator[State]:
-        """States of Motions of this system, whose fields are recovered many at once.
-
-        Parameters
-        ----------
-        motions
-            Each a :class:`~skfem_ancf.dynamics.base.Motion`.
-        """
-        for first in range(0, len(motions), self._group):
-            yield from _together([self.instant(y) for y in motions[first:first + self._group]])
 
     def __iter__(self):
         return self.states()
 
     # at material points
-
-    def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Displacement of material points at all instants.
-
-        Parameters
-        ----------
-        point, beam, line
-            One point, shape (2,), or many, as for :meth:`State.displacement
-            <skfem_ancf.results.State.displacement>`.
-
-        Returns
-        -------
-        ndarray
-            Shape (nt, 2), or (nt, 2, n) for many points.
-        """
-        return self.system.points.find(point, beam, line).displacement(self.u)
-
-    def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Position of material points at all instants, (nt, 2) or (nt, 2, n).
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam
-            The beam, its name or its number; found if it is not given.
-        line
-            As for :meth:`displacement`.
-        """
-        at = self.system.points.find(point, beam, line)
-        return at.start + at.displacement(self.u)
-
-    def velocity(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Velocity of material points at all instants, (nt, 2) or (nt, 2, n).
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam
-            The beam, its name or its number; found if it is not given.
-        line
-            As for :meth:`displacement`.
-        """
-        return self.system.points.find(point, beam, line).velocity(self.u, self.v)
 
     def angle(self, body: WhichMember) -> Array:
         """The angle of a rigid body at all instants, in radians, shape (nt,); turns are counted.
@@ -337,18 +269,6 @@ class History:
         found = require_body(self.system, body)
         k = self._turns.moments + self.system.bodies.index(found)
         return found.angle + self._others[-1][:, k]
-
-    def angular_velocity(self, body: WhichMember) -> Array:
-        """The angular velocity of a rigid body at all instants, counterclockwise, shape (nt,).
-
-        Parameters
-        ----------
-        body
-            The RigidBody, its name or its number.
-        """
-        found = require_body(self.system, body)
-        s = self.system.of(found)
-        return found.angular_velocity(self.u[:, s], self.v[:, s])
 
     def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
@@ -608,10 +528,3 @@ def _numbers(instants):
     if isinstance(instants, (str, bytes, dict, set)) or not hasattr(instants, "__iter__"):
         raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
     return instants
-
-
-def _together(states):
-    """The states, each of which knows that the fields of all are recovered at once."""
-    for state in states:
-        vars(state)["together"] = states
-    return states

@@ -9,21 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                            require_flag, require_integer, require_label, require_text, shown)
-from ..core.kept import cached_property, kept
 from ..core.linear import first_order, step
 from ..beam.kernels.along import stretched
 from ..materials import LinearLaw
 from ..beam.interpolation import Part
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from ..beam.beam import Beam
     from .recovered import Recovery
@@ -31,8 +30,8 @@ if TYPE_CHECKING:
 
 COMPONENTS = ("xx", "yy", "xy")
 
-#: Grids of points that a beam keeps.
-GRIDS = 4
+#: Factors that make the components of a strain of (eps_xx, eps_yy, 2 eps_xy).
+HALF_SHEAR = np.array([[1.0], [1.0], [0.5]])
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,9 @@ class Field:
 class Values(Mapping):
     """Everything that is known at points of one beam, computed when it is asked for.
 
-    A mapping from the names of :data:`FIELDS` to arrays (n,), or (components, n).
+    A mapping from the names of :data:`FIELDS` to arrays (n,), or (components, n). Of a linear
+    solution strain and S are linear, F is one and the displacement gradient of the elements, and
+    Cauchy stress is S in global axes.
 
     Parameters
     ----------
@@ -130,8 +131,7 @@ class Values(Mapping):
     find
         Returns the recovered field of the beam, or None; None for the field of the elements.
     eigen
-        Returns the stress-free strain at points of a part, (3, n) or 0, or for a second argument
-        True what the stress of the elements is less by; None where there is none.
+        Factors and loads of eigenstrains.
 
     Attributes
     ----------
@@ -139,27 +139,25 @@ class Values(Mapping):
         The beam.
     n : int
         Number of points.
+    x, u
+        Reference positions, and their displacements, (2, n).
     strain
         Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) in the beam's frame, (3, n).
+    elastic
+        The strain less the eigenstrain, (3, n).
     S
         Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3, n).
     F
         Deformation gradient: derivatives along the axis and across it, in global axes, (2, 2, n).
     frame
-        The beam's frame in the stress-free body, ``frame[:, 0]`` along the axis, (2, 2, n).
-    x
-        Stress-free positions, (2, n); ``values.u`` are their displacements.
-
-    Of a linear solution strain and S are linear, F is one and the displacement gradient of the
-    elements, and Cauchy stress is S in global axes.
+        The beam's frame in the reference configuration, ``frame[:, 0]`` along the axis, (2, 2, n).
     """
 
-    def __init__(self, part: Part, u: Array,
-                 find: Callable[[], Recovery | None] | None = None,
-                 eigen: Callable[..., Any] | None = None) -> None:
+    def __init__(self, part: Part, u: Array, find: Callable[[], Recovery | None] | None = None,
+                 eigen: Sequence[tuple[Any, Any]] = ()) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)
-        #: It is linear about the stress-free state.
+        #: It is linear about the reference configuration.
         self._small = np.iscomplexobj(u) and not u.real.any()
         self._known: dict[str, Array] = {}
 
@@ -186,35 +184,40 @@ class Values(Mapping):
     def _recovery(self):
         return None if self._find is None else self._find()
 
-    @property
-    def _own(self):
-        return self._u[self._part.coordinates], self._part.at, self._part.e
+    def _recovered(self, rows):
+        return self._recovery.at(self._part.e, self._part.X, rows)
 
     @cached_property
     def strain(self) -> Array:
         if self._recovery is not None:
-            return self._recovery.at(self._part, slice(0, 3))
+            return self._recovered(slice(0, 3))
         return first_order(self._part.strain(self._u))
 
     @cached_property
     def S(self) -> Array:
         if self._recovery is not None:
-            return self._recovery.at(self._part, slice(3, 6))
+            return self._recovered(slice(3, 6))
         return first_order(self._stress)
 
     @property
     def _stress(self):
         """That of the elements."""
-        S = self._part.stress(self._u)
-        return S if self._eigen is None else S - self._eigen(self._part, True)
+        part, u = self._part, self._u[self._part.coordinates]
+        return part.stress(self._u) - sum(load.stress_at(u, part.at, part.e, factor)[..., 0]
+                                          for factor, load in self._eigen)
+
+    @property
+    def _eigenstrain(self):
+        """(3, n), or 0."""
+        return sum(first_order(factor) * load.strain_at(self._part.at, self._part.e)[..., 0]
+                   for factor, load in self._eigen)
 
     @cached_property
     def elastic(self) -> Array:
-        """The strain less that without stress, (3, n)."""
-        return self.strain if self._eigen is None else self.strain - self._eigen(self._part)
+        return self.strain - self._eigenstrain
 
     def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
-        """A field that the material at each point gives.
+        """A field that the material at each point gives, (n,).
 
         Parameters
         ----------
@@ -222,31 +225,27 @@ class Values(Mapping):
             Returns the field (n,) of a material.
         graded
             It is proportional to the modulus.
-
-        Returns
-        -------
-        ndarray
-            Shape (n,).
         """
         across = self.beam.across
         if across.plain:
             return ask(self.beam.material)
-        found = [partial(ask, slab.material) for slab in across.slabs]
         return across.of_slabs(self._part.at, np.zeros((self.n, 1), self._u.dtype), [
-            partial(_column, one) for one in found], self._part.e, graded)[:, 0]
+            partial(_column, ask, slab.material) for slab in across.slabs], self._part.e,
+            graded)[:, 0]
 
     @cached_property
     def F(self) -> Array:
         if self._recovery is not None and not self._small:
             with np.errstate(invalid="ignore"):
-                return self._recovery.gradient(self.strain, self._recovery.at(
-                    self._part, slice(6, 7))[0])
+                return self._recovery.gradient(self.strain, self._recovered(slice(6, 7))[0])
         return first_order(self._gradient)
 
     @property
     def _gradient(self):
         """That of the elements."""
-        H, frame = self.beam.kinematics.gradients(self.beam, *self._own)
+        part = self._part
+        H, frame = self.beam.kinematics.gradients(self.beam, self._u[part.coordinates], part.at,
+                                                  part.e)
         return (H + frame)[..., 0]
 
     @cached_property
@@ -268,8 +267,8 @@ class Values(Mapping):
         """Cauchy stress F S F^T / J (sigma_xx, sigma_yy, sigma_xy), global axes, (3, n)."""
         F, S, volume = (self.frame if self._small else self.F), self.S, self._volume
         if np.iscomplexobj(self._u) and not self._small:
-            F, S, strain = self._gradient, self._stress, self._part.strain(self._u)
-            volume = self._volume_of(F, strain + (self.elastic - self.strain))
+            F, S = self._gradient, self._stress
+            volume = self._volume_of(F, self._part.strain(self._u) - self._eigenstrain)
         with np.errstate(invalid="ignore", divide="ignore"):
             A = np.array([[S[0], S[2]], [S[2], S[1]]])
             sigma = np.einsum("iJn,JKn,jKn->ijn", F, A, F, optimize=True) / volume
@@ -278,8 +277,7 @@ class Values(Mapping):
     @cached_property
     def sigma_zz(self) -> Array:
         """Cauchy stress normal to the plane, (n,): zero in plane stress."""
-        material = self.beam.material
-        if material.plane == "stress":
+        if self.beam.material.plane == "stress":
             return np.zeros(self.n)
         if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
             return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
@@ -290,29 +288,25 @@ class Values(Mapping):
 
     @cached_property
     def energy(self) -> Array:
-        """Strain energy per stress-free volume, (n,)."""
+        """Strain energy per reference volume, (n,)."""
+        if not self.beam.has_sections and not self._small:
+            # of a cable: half of its nominal stress times the stretch that is elastic
+            stretch, longer = stretched(self.strain[0])
+            longer = longer - (self._eigenstrain + 0.0 * self.strain)[0]
+            return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
+
         def of(material):
             law = material.law()
-            if not self.beam.has_sections and not self._small:
-                return self._energy_of_fibres()
             if self._small or isinstance(law, LinearLaw):
                 return 0.5 * np.sum(self.elastic * self.S, axis=0)
             return law.energy(self.elastic)
 
         return self.of_materials(of)
 
-    def _energy_of_fibres(self):
-        """Of a cable: half of its nominal stress times the stretch that is elastic."""
-        stretch, longer = stretched(self.strain[0])
-        if self._eigen is not None:
-            longer = longer - (self._eigen(self._part) + 0.0 * self.strain)[0]
-        return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
-
     @cached_property
     def principal(self) -> tuple[Array, Array]:
         """Principal strains (2, n), the larger first, and the direction of that, (2, n)."""
-        eps = self.strain * np.array([[1.0], [1.0], [0.5]])
-        values, direction = _principal(eps)
+        values, direction = _principal(self.strain * HALF_SHEAR)
         return values, np.einsum("iJn,Jn->in", self.frame, direction)
 
     @cached_property
@@ -321,8 +315,8 @@ class Values(Mapping):
         return _principal(self.sigma)
 
 
-def _column(ask):
-    return ask()[:, None]
+def _column(ask, material):
+    return ask(material)[:, None]
 
 
 def _principal(tensor):
@@ -382,7 +376,7 @@ def _table():
                 "global")
     yield Field("sigma_1_direction", lambda v: v.principal_stress[1],
                 "direction of the larger principal stress, deformed body", one, False, 2, "global")
-    yield Field("strain", lambda v: v.strain * np.array([[1.0], [1.0], [0.5]]),
+    yield Field("strain", lambda v: v.strain * HALF_SHEAR,
                 "Green–Lagrange strain", one, True, 3, "beam")
     yield Field("stress", lambda v: v.S, "second Piola–Kirchhoff stress", area, True, 3, "beam")
     yield Field("cauchy_stress", lambda v: v.sigma, "Cauchy stress", area, True, 3, "global")
@@ -475,12 +469,8 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
         Its points are (nelements, npoints), flattened.
     """
     ne = beam.mesh.nelements
-    part = kept(beam.grids, X.tobytes(), lambda: Part(
-        beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
-        np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1)), GRIDS)
-    find = None
-    if recover and hasattr(state, "recovery"):
-        def find():
-            return state.recovery(beam)
-    return Values(part, getattr(state, "places_of", state.u_of)(beam), find,
-                  getattr(state, "eigen", None))
+    part = Part(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
+                np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))
+    if hasattr(state, "values_of"):
+        return state.values_of(beam, part, recover)
+    return Values(part, state.u_of(beam))

@@ -1,21 +1,20 @@
-"""The force and the moment in the sections of a beam, from the internal forces of its elements.
+"""Force and moment in the sections of a beam, from the internal forces of its elements.
 
-The internal force of an element does no work in a rigid motion. With the loads that act on the
-element it is therefore in exact equilibrium, whatever the error of the displacement, and the part
-of the element between a node and a section gives the force and the moment there.
+The internal force of an element does no work in a rigid motion. With the loads on the element it is
+therefore in exact equilibrium, whatever the error of the displacement: the part of the element
+between a node and a section gives the force and the moment in that section.
 """
 
 from __future__ import annotations
 
-from copy import copy
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebint, chebvander
 
 from ..core.errors import AncfError
 from ..formulations.ecm import AXIS as WHOLE
-from ..core.kept import cached_property, kept
 from ..beam.kernels.base import apart
 from ..mesh.mapping import cross
 from ..core.quadrature import gauss, lagrange
@@ -25,238 +24,149 @@ from ..beam.distribution import AXIS, BODY, SNAP, station_of_node
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import ArrayLike
+
     from ..beam.beam import Beam
     from ..mesh.mapping import MappingBeam
-    from ..sections import Slab
     from ..beam.distribution import Sampled
     from ..core.types import Array
 
-#: Points along an element for its loads.
+#: Points along an element for its loads and for its length.
 ALONG = 8
 
-#: Points of sections up to which their tables are kept.
-SMALL = 4096
-
-#: A section force that changes at a node without a load by more than this part of its largest
-#: value: the state is no equilibrium. In a motion more is let pass: schemes that conserve energy
-#: hold the equation of motion in the mean over a step only, and the mean of both sides is right.
+#: Largest change of the section force at a node without a load, over its largest value. In a motion
+#: more is allowed: schemes that conserve energy satisfy the equation of motion in the mean over a
+#: step only, and the mean of both sides is right.
 UNBALANCED, UNBALANCED_MOTION = 0.02, 0.5
 
 #: Strains below this times the coordinates over the length of an element are round-off.
 UNLOADED = 16 * np.finfo(float).eps
-#: Section forces below this part of those that stress-free strains have alone are round-off.
+#: Section forces below this part of those that eigenstrains have alone are round-off.
 BALANCED = 1e-4
 
 
 class NotRecovered(AncfError):
-    """The section forces or fields of a beam cannot be recovered; the message says why.
+    """The section forces or fields of a beam cannot be recovered; the message says why."""
 
-    Parameters
+
+class ArcLength:
+    """Arc length along the reference axis of a beam.
+
+    Attributes
     ----------
-    message
-        Why.
-    which
-        Of several states those of which it is true, shape (states,); None for all.
+    nodes
+        That of the ends of the elements, shape (ne + 1,).
     """
 
-    def __init__(self, message: str, which: Array | None = None) -> None:
-        super().__init__(message)
-        self.which = which
+    def __init__(self, beam: Beam) -> None:
+        x, w = gauss(ALONG)
+        speed = np.hypot(*beam.mesh.mapping().DF(np.array([x, 0.5 + 0.0 * x]))[:, 0])
+        series = np.linalg.solve(chebvander(2.0 * x - 1.0, ALONG - 1), speed.T)
+        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T
+        self.nodes = np.append(0.0, np.cumsum(speed @ w))
+
+    def at(self, e: ArrayLike, xi: ArrayLike) -> Array:
+        """That of places xi of elements e, both of shape (n,)."""
+        return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
+            2.0 * np.asarray(xi) - 1.0, ALONG), self._inside[e])
 
 
 class Sections:
-    """Geometry and loads at points across given sections.
+    """Geometry of points across sections, and what the shape functions are there.
 
     Parameters
     ----------
-    forces
-        The :class:`SectionForces` they belong to.
+    beam
+        A :class:`~skfem_ancf.Beam`.
     e, xi
         Element of each section and its place there, shapes (n,).
     eta
-        Points across each section, shape (k,) or (n, k).
+        Points across each section, shape (k,) or (n, k); those of the axis by default.
     lifted
-        Of a cable: points off its axis are at ``r + Y r_X``, the latter turned by 90 degrees, as
-        its :class:`~skfem_ancf.beam.inertia.Inertia` has them. If not, all are on the axis.
-    slab
-        The slab of which all points are; None for those that are there.
+        Points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as its
+        :class:`~skfem_ancf.beam.inertia.Inertia` has them. If False, all are on the axis.
     mapping
-        From the reference cell to the body; None for that of the mesh.
+        From the reference cell to the body; by default that of the mesh.
     """
 
-    def __init__(self, forces: SectionForces, e: Array, xi: Array, eta: Array,
-                 lifted: bool = False, slab: Slab | None = None,
-                 mapping: MappingBeam | None = None) -> None:
-        self.forces, self.e, self._slab = forces, e, slab
-        beam = forces.beam
-        self.shape = len(e), eta.shape[-1]
-        self._xi = xi
-        name = "places" if mapping is None else "places by each element"
-        self.X, self.J = self._kept(name, eta, lambda: self._places(
-            xi, eta, mapping or beam.mesh.mapping()))
+    def __init__(self, beam: Beam, e: Array, xi: Array, eta: Any = 0.5,
+                 lifted: bool = False, mapping: MappingBeam | None = None) -> None:
+        self.beam, self.e, eta = beam, e, np.atleast_1d(eta)
+        shape = len(e), eta.shape[-1]
+        self.X = np.array([np.broadcast_to(xi[:, None], shape), np.broadcast_to(eta, shape)])
+        self.J = (mapping or beam.mesh.mapping()).DF(self.X, e)
         self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
-        self._arm: Any = 0.0
-        if lifted:
-            axis = Sections(forces, e, xi, np.array([0.5]))
-            self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(*axis.J[:, 0])
-
-    def _kept(self, name, eta, make):
-        """Tables of places, made once for few of them."""
-        e = self.e
-        if self.shape[0] * self.shape[1] > SMALL:
-            return make()
-        return kept(self.forces.beam.tables, (name, e.tobytes(), self._xi.tobytes(),
-                                              eta.tobytes()), make)
-
-    def _places(self, xi, eta, mapping):
-        """Reference points, and the derivative of the map."""
-        X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
-        return X, mapping.DF(X, self.e)
+        self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(
+            *Sections(beam, e, xi).J[:, 0]) if lifted else None
 
     @property
     def full_volume(self) -> Array:
-        """Of bodies that weigh what their height says, see :meth:`.MappingBeam.full_volume`."""
-        mesh = self.forces.beam.mesh
+        """Of sections that weigh what their height says, see :meth:`.MappingBeam.full_volume`."""
+        mesh = self.beam.mesh
         return self.volume if mesh.is_straight else mesh.mapping().full_volume(self.X, self.e)
 
     @cached_property
     def _functions(self):
-        """Local functions and their slopes."""
-        def make():
-            mesh = self.forces.beam.mesh
-            value, slope, _, powers = self.forces.beam.element.of_mesh(
-                mesh.mapping(), self.X, self.e)
-            scale = (mesh.lengths[self.e][:, None] ** powers).T[:, :, None]
-            return value * scale, slope * scale
+        """Local functions and their slopes, (nb, n, k) each."""
+        mesh = self.beam.mesh
+        value, slope, _, powers = self.beam.element.of_mesh(mesh.mapping(), self.X, self.e)
+        scale = (mesh.lengths[self.e][:, None] ** powers).T[:, :, None]
+        return value * scale, slope * scale
 
-        return self._kept("functions", self.X[1], make)
-
-    def field(self, q_e: Array, slope: bool = False) -> Array:
-        """A field of element coordinates, or its derivative by xi.
-
-        Parameters
-        ----------
-        q_e
-            Coordinates of the elements, shape (ne, nb, 2), of several states (states, ne, nb, 2).
-        slope
-            The derivative.
-
-        Returns
-        -------
-        ndarray
-            Shape (2, n, k), or (2, states, n, k).
-        """
+    def field(self, q: Array, slope: bool = False) -> Array:
+        """A field of element coordinates (ne, nb, 2), or its derivative by xi; (2, n, k)."""
         def of(functions):
-            return np.einsum("bnk,...nbi->i...nk", functions, q_e[..., self.e, :, :],
-                             optimize=True)
+            return np.einsum("bnk,nbi->ink", functions, q[self.e], optimize=True)
 
-        if slope or not np.any(self._arm):
+        if slope or self._arm is None:
             return of(self._functions[1 if slope else 0])
         r_xi = of(self._functions[1])
         return of(self._functions[0]) + self._arm * np.array([-r_xi[1], r_xi[0]])
 
-    def spread(self, values: Array) -> Array:
-        """Element vectors (..., ne, nb, 2) of forces (2, ..., n, k), summed."""
-        parts = np.einsum("bnk,i...nk->n...bi", self._functions[0], values, optimize=True)
-        if np.any(self._arm):
-            turned = self._arm * np.array([values[1], -values[0]])
-            parts = parts + np.einsum("bnk,i...nk->n...bi", self._functions[1], turned,
-                                      optimize=True)
-        out = np.zeros((self.forces.beam.mesh.nelements,) + parts.shape[1:], parts.dtype)
+    def spread(self, force: Array) -> Array:
+        """Element vectors (ne, nb, 2) of forces (2, n, k), summed."""
+        parts = np.einsum("bnk,ink->nbi", self._functions[0], force, optimize=True)
+        if self._arm is not None:
+            parts = parts + np.einsum("bnk,ink->nbi", self._functions[1], self._arm * np.array(
+                [force[1], -force[0]]), optimize=True)
+        out = np.zeros((self.beam.mesh.nelements,) + parts.shape[1:], parts.dtype)
         np.add.at(out, self.e, parts)
-        return np.moveaxis(out, 0, -3)
-
-    @cached_property
-    def body(self) -> Array:
-        """Force per volume of the stress-free body, inertia included, (2, ..., n, k)."""
-        f = self.forces
-        body, gravity = (np.moveaxis(x, -1, 0)[..., None, None] for x in f.spread)
-        out = np.broadcast_to(body, (2,) + f.states + self.shape) + self.sampled(BODY)
-        if f.acceleration is not None:
-            gravity = gravity - self.field(f.acceleration)
-        return out + self.density * gravity if np.any(gravity) else out
-
-    @cached_property
-    def density(self) -> Array:
-        """Mass per volume, (n, k)."""
-        across = self.forces.beam.across
-        if self._slab is not None:
-            return across.density(self._slab, self.X, self.e)
-        zero, X = np.zeros(self.shape), beside(self.X)
-        return across.of_slabs(X, zero, [
-            partial(across.density, slab, X, self.e) for slab in across.slabs], self.e,
-            graded=False) + zero
-
-    def sampled(self, where: int) -> Any:
-        """The sum of :class:`~skfem_ancf.beam.distribution.Sampled` densities there, (2, ..., n,
-        k); or 0."""
-        xi, eta = self.X[0, :, 0], self.X[1]
-        return sum(s.at(self.e, xi, eta, self.forces.beam.mesh.nelements)
-                   .reshape((2,) + self.forces.states + (len(xi), -1))
-                   for s in self.forces.sampled if s.where == where)
-
-    def face(self, side: int) -> Array:
-        """Force per width and xi on the bottom (0) or top (1), where the points are.
-
-        Shape (2, ..., n, k).
-        """
-        f = self.forces
-        out = np.zeros((2,) + f.states + self.shape, f.q.dtype)
-        if any(s.where == side for s in f.sampled):
-            out += self.sampled(side) / f.beam.across.face(side, self.X, self.e)
-        for factor, load in f.faces:
-            on = np.multiply.outer(factor, load.faces[side][self.e])[..., None]
-            if not np.any(on):
-                continue
-            if load.pressure is not None:
-                r = self.field(f.q, slope=True)
-                out += on * load.pressure * (1.0 - 2.0 * side) * np.array([-r[1], r[0]])
-            else:
-                t = load.traction
-                if callable(t):
-                    t = _traction(f.beam, t, beside(self.X), self.e)
-                else:
-                    t = np.asarray(t, dtype=float)[:, None, None]
-                out += on * (t * np.hypot(*self.J[:, 0])).reshape(
-                    (2,) + (1,) * len(f.states) + (len(self.e), -1))
         return out
 
-
-def _traction(beam, traction, X, e):
-    """What a function of places returns at points of the stress-free body, (2, n, k)."""
-    return np.array([np.broadcast_to(c, X.shape[1:])
-                     for c in traction(beam.mesh.mapping().F(X, e))])
+    def density(self) -> Array:
+        """Mass per volume, (n, k)."""
+        across, zero, X = self.beam.across, np.zeros(self.X.shape[1:]), beside(self.X)
+        return zero + across.of_slabs(X, zero, [partial(across.density, slab, X, self.e)
+                                                for slab in across.slabs], self.e, graded=False)
 
 
 class SectionForces:
-    """Force and moment in the sections of one beam, in one state or in several at once.
+    """Force and moment in the sections of one beam.
 
     Parameters
     ----------
     beam
         A :class:`~skfem_ancf.Beam`.
     u
-        Displacement of its coordinates, shape (N,), or (states, N): then arrays have the axis of
-        the states before those of places. Of linear solutions a
-        :func:`~skfem_ancf.core.linear.step` from the stress-free state, as are the factors of
-        loads; then all that is found is one.
+        Displacement of its coordinates, shape (N,). Of linear solutions a
+        :func:`~skfem_ancf.core.linear.step` from the reference configuration, as are the factors
+        of loads; then all results are one.
     loads
         Pairs of a factor and a :class:`~skfem_ancf.beam.distribution.Spread`, or None for a load
-        whose spread is not known. The factor of several states has shape (states,).
+        whose spread is not known.
     stations
-        Where supports and joints act: element + xi.
+        Where supports and joints act: axial coordinates element + xi.
     acceleration
-        Of the coordinates, shape (N,) or (states, N), or None.
+        Of the coordinates, shape (N,), or None.
     sampled
-        Densities of force besides, :class:`~skfem_ancf.beam.distribution.Sampled`.
+        Further densities of force, :class:`~skfem_ancf.beam.distribution.Sampled`.
     viscous
-        Forces of elements that resist the rate of the strain, shape (ne, nb, 2) or
-        (states, ne, nb, 2), or None.
+        Forces of the elements that resist the rate of the strain, shape (ne, nb, 2), or None.
 
     Attributes
     ----------
     cuts
-        Stations, ends included, between which the section force is continuous.
+        Axial coordinates, ends included, between which the section force is continuous.
 
     Raises
     ------
@@ -267,121 +177,118 @@ class SectionForces:
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
                  stations: Sequence[float] = (), acceleration: Array | None = None,
                  sampled: Sequence[Sampled] = (), viscous: Array | None = None) -> None:
-        self.beam = beam
+        self.beam, self.small, self.viscous = beam, np.iscomplexobj(u), viscous
         if any(load is None for _, load in loads):
             raise NotRecovered("a load is given by its force on the coordinates only: where it "
                                "acts across the section is not known")
-        self.states, self.small = u.shape[:-1], np.iscomplexobj(u)
         self.lifted = not (beam.has_sections or beam.across.simple)
-        gather = beam.kernel.gather
-        self.q = _each(gather, beam.q0_local + u)
-        self.acceleration = None if acceleration is None else _each(gather, acceleration)
-        #: Force per volume and per mass, (..., 2) each.
-        self.spread = [sum((np.multiply.outer(factor, np.asarray(getattr(load, name)))
-                            for factor, load in loads if getattr(load, name) is not None),
-                           np.zeros(self.states + (2,))) for name in ("body", "gravity")]
-        self.faces = [(factor, load) for factor, load in loads if load.faces is not None
-                      and np.any(factor) and np.any(load.faces)]
-        self.sampled = [*sampled, *(s.times(factor) for factor, load in loads
-                                    for s in load.sampled)]
-        self.viscous = viscous
+        self.q = beam.kernel.gather(beam.q0_local + u)
+        self._acceleration = None if acceleration is None else beam.kernel.gather(acceleration)
+        self._body, self._gravity = (
+            sum((factor * np.asarray(getattr(load, name)) for factor, load in loads
+                 if getattr(load, name) is not None), np.zeros(2)) for name in ("body", "gravity"))
+        self._faces = [(factor, load) for factor, load in loads
+                       if load.faces is not None and factor and np.any(load.faces)]
+        self._sampled = [*sampled, *(s.times(factor) for factor, load in loads
+                                     for s in load.sampled)]
+        #: The faces that carry a load: 0 the bottom, 1 the top.
+        self.sides = [side for side in (0, 1) if any(np.any(f.faces[side]) for _, f in self._faces)
+                      or any(s.where == side for s in self._sampled)]
         self.eigen = [(factor, load.eigen) for factor, load in loads if load.eigen is not None]
-        self._loads(u)
+        self._balance(u)
         self._cut(loads, stations)
         self._check()
 
-    # loads of the elements
+    # densities of force
 
-    def _loads(self, u):
+    def body(self, at: Sections) -> Array:
+        """Force per reference volume at points, inertia included, (2, n, k)."""
+        gravity = self._gravity[:, None, None]
+        out = self._body[:, None, None] + self.sampled(at, BODY) + np.zeros(at.X.shape)
+        if self._acceleration is not None:
+            gravity = gravity - at.field(self._acceleration)
+        return out + at.density() * gravity if np.any(gravity) else out
+
+    def sampled(self, at: Sections, where: int) -> Any:
+        """The sum of the Sampled densities of a kind at points, (2, n, k); or 0."""
+        return sum(s.at(at.e, at.X[0, :, 0], at.X[1], self.beam.mesh.nelements)
+                   for s in self._sampled if s.where == where)
+
+    def face(self, side: int, e: Array, xi: Array) -> tuple[Sections, Array]:
+        """Sections at the bottom (0) or top (1), and the force on them per xi, (2, n, 1)."""
+        at = Sections(self.beam, e, xi, float(side))
+        on, breadth = np.zeros((2, len(e), 1)), None
+        for factor, load in self._faces:
+            if load.pressure is not None:
+                r = at.field(self.q, slope=True)
+                force = load.pressure * (1.0 - 2.0 * side) * np.array([-r[1], r[0]])
+            else:
+                t = load.traction
+                t = (_traction(self.beam, t, beside(at.X), e) if callable(t) else
+                     np.asarray(t, dtype=float)[:, None, None])
+                force = t * np.hypot(*at.J[:, 0])
+            on = on + factor * load.faces[side][e][:, None] * force
+        if np.any(on):  # a circle has no face
+            breadth = self.beam.across.face(side, at.X, e)
+            on = breadth * on
+        return at, on + self.sampled(at, side)
+
+    def _balance(self, u):
         """Section forces at both ends of each element, and the loads at points along it."""
-        beam, mesh = self.beam, self.beam.mesh
-        ne, (x, w) = mesh.nelements, gauss(ALONG)
+        beam, ne, (x, w) = self.beam, self.beam.mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
-        parts = []
+        parts = [self.face(side, e, xi) for side in self.sides]
+        whole = not (beam.has_sections or self.lifted)
         for slab, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
-            whole = not (beam.has_sections or self.lifted)
-            if whole:
-                eta, v = WHOLE
-            inside = Sections(self, e, xi, eta, self.lifted, slab)
-            body = inside.body
+            eta, v = WHOLE if whole else (eta, v)
+            inside = Sections(beam, e, xi, eta, self.lifted)
+            body = self.body(inside)
             if np.any(body):
                 size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.full_volume
                 parts.append((inside, size * body))
-        for side in (0, 1):
-            if any(np.any(load.faces[side]) for _, load in self.faces) or any(
-                    s.where == side for s in self.sampled):
-                face = Sections(self, e, xi, np.array([float(side)]))
-                parts.append((face, beam.across.face(side, face.X, e) * face.face(side)))
-        middle = Sections(self, e, xi, np.array([0.5]))
+        middle = Sections(beam, e, xi)
         axis = middle.field(self.q)
-        if any(s.where == AXIS for s in self.sampled):
-            parts.append((middle, middle.sampled(AXIS)))
-        none = np.zeros(axis.shape[:-1])
-        force = sum((f.sum(axis=-1) for _, f in parts), none)
-        moment = sum((cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts), none[0])
+        parts.append((middle, self.sampled(middle, AXIS) + 0.0 * axis))
+        force = sum(f.sum(axis=-1) for _, f in parts)
+        moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
         self._r, self._force, self._moment = (
             x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
-        w = np.tile(w, ne)
-        load: Any = sum(at.spread(f * w[:, None]) for at, f in parts)
-        internal = _each(beam.kernel.small_forces if self.small else beam.kernel.forces, u)
+        load = sum(at.spread(f * np.tile(w, ne)[:, None]) for at, f in parts)
+        internal = (beam.kernel.small_forces if self.small else beam.kernel.forces)(u)
         if self.viscous is not None:
             internal = internal + self.viscous
-        q = np.split(self.q, 2, axis=-2)
-        #: Size of force times height and moment that stress-free strains have alone.
-        self._pushed = np.zeros(self.states)
+        #: Size of force times height and moment that eigenstrains have alone.
+        self._pushed = 0.0
         for factor, eigen in self.eigen:
-            if self.small:
-                pushed = np.multiply.outer(factor, eigen.small_forces())
-            else:
-                pushed = eigen.element_forces(u, factor) if u.ndim == 1 else np.array(
-                    [eigen.element_forces(x, f) for x, f in zip(u, factor)])
+            pushed = (factor * eigen.small_forces() if self.small else
+                      eigen.element_forces(u, factor))
             internal = internal - pushed
-            self._pushed = self._pushed + self._size(*_at_ends(q, pushed))
+            self._pushed += self._size(*self._at_ends(pushed))
         # of the part of the beam on the right of a section on that on its left
-        self.R, self.M = _at_ends(q, internal - load)
-        self.ends = np.array([q[0][..., 0, :], q[1][..., 0, :]])
+        self.R, self.M = self._at_ends(internal - load)
+
+    def _at_ends(self, force):
+        """Section forces (2 ends, ne, 2) and moments (2 ends, ne) of element vectors."""
+        (ql, qr), (left, right) = (np.split(x, 2, axis=1) for x in (self.q, force))
+        return (np.array([-left[:, 0], right[:, 0]]),
+                np.array([-_moments(ql, left), _moments(qr, right)]))
 
     def _size(self, R, M):
-        """The largest force times the height, and moment, of each state."""
-        return (np.max(np.abs(R), axis=(0, -2, -1)) * self.beam.mesh.height
-                + np.max(np.abs(M), axis=(0, -1)))
-
-    def _round_off(self):
-        """What :meth:`_size` is of a beam without load: that of the strains times the stiffness."""
-        beam = self.beam
-        places = self.q.imag if self.small else self.q
-        strain = UNLOADED * np.max(np.abs(places[..., 0, :]), axis=(-2, -1)) / np.min(
-            beam.mesh.lengths)
-        return strain * (beam.kernel.scale / beam.mesh.lengths.sum() * beam.mesh.height)
+        """The largest force times the height, and moment."""
+        return np.max(np.abs(R)) * self.beam.mesh.height + np.max(np.abs(M))
 
     def viscous_middles(self) -> tuple[Array, Array]:
-        """The part of force and moment that resists the rate of the strain, in the middle of
-        elements, where it is most accurate: shapes (2, ..., ne) and (..., ne).
+        """The part of force (2, ne) and moment (ne,) that resists the rate of the strain, in the
+        middle of elements, where it is most accurate.
         """
-        left, _ = np.split(np.asarray(self.viscous), 2, axis=-2)
-        q, _ = np.split(self.q, 2, axis=-2)
+        left, q = (np.split(np.asarray(x), 2, axis=1)[0] for x in (self.viscous, self.q))
         ne = self.beam.mesh.nelements
-        r = Sections(self, np.arange(ne), np.full(ne, 0.5), np.array([0.5])).field(self.q)[..., 0]
-        R = -np.moveaxis(left[..., 0, :], -1, 0)
-        return R, cross(np.moveaxis(q[..., 0, :], -1, 0) - r, R) - _moments(q, left)
+        r = Sections(self.beam, np.arange(ne), np.full(ne, 0.5)).field(self.q)[..., 0]
+        R = -left[:, 0].T
+        return R, cross(q[:, 0].T - r, R) - _moments(q, left)
 
-    def of(self, k: int) -> SectionForces:
-        """Those of one of several states, of which force and moment can be asked.
-
-        Parameters
-        ----------
-        k
-            Its number.
-        """
-        one = copy(self)
-        one.states, one.q = (), self.q[k]
-        for name in ("R", "M", "ends", "_force", "_r"):
-            setattr(one, name, getattr(self, name)[:, k])
-        one._moment = self._moment[k]
-        return one
-
-    def at(self, e: Array, xi: Array, side: Array) -> tuple[Array, Array]:
-        """Force and moment about the axis of the right part of the beam on the left.
+    def at(self, e: Array, xi: Array, side: Any) -> tuple[Array, Array]:
+        """Force (2, n) and moment (n,) about the axis: of the right part of the beam on the left.
 
         Parameters
         ----------
@@ -390,120 +297,103 @@ class SectionForces:
         side
             End of the element from which the equilibrium is followed: 0, 1, or 0.5 for the mean
             of both; shape (n,).
-
-        Returns
-        -------
-        force, moment
-            Shapes (2, ..., n) and (..., n).
         """
         x, w = gauss(ALONG)
         inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
         till = xi[:, None] * np.einsum("q,nqk->nk", w, inner)  # the integral from 0 to xi
-        r = Sections(self, e, xi, np.array([0.5])).field(self.q)[..., 0]
+        r = Sections(self.beam, e, xi).field(self.q)[..., 0]
+        f, m = self._force[:, e], self._moment[e]
+        turning = cross(self._r[:, e] - r[..., None], f) + m
+        ends = [q[:, 0] for q in np.split(self.q, 2, axis=1)]
         out = []
         for end, weights in ((0, till), (1, till - w)):
-            f, m = self._force[..., e, :], self._moment[..., e, :]
-            arm = self._r[..., e, :] - r[..., None]
-            R, at = (np.moveaxis(x[end][..., e, :], -1, 0) for x in (self.R, self.ends))
-            M = (self.M[end][..., e] + cross(at - r, R)
-                 - np.sum(weights * (cross(arm, f) + m), axis=-1))
-            R = R - np.sum(weights * f, axis=-1)
-            out.append((R, M))
+            R = self.R[end][e].T
+            M = (self.M[end][e] + cross(ends[end][e].T - r, R)
+                 - np.sum(weights * turning, axis=-1))
+            out.append((R - np.sum(weights * f, axis=-1), M))
         (R0, M0), (R1, M1) = out
         return R0 + side * (R1 - R0), M0 + side * (M1 - M0)
 
     # where they jump
 
     def _cut(self, loads, stations):
-        mesh = self.beam.mesh
+        mesh, across = self.beam.mesh, self.beam.across
+        ne = mesh.nelements
         stations = list(stations) + [s for _, load in loads for s in load.stations]
-        self._acted = self._at_nodes(stations)
+        self._acted = _snapped(stations)
         ends = np.setdiff1d(mesh.t[0], mesh.t[1]), np.setdiff1d(mesh.t[1], mesh.t[0])
-        stations += [station_of_node(mesh, k) for k in np.concatenate(ends)]
-        gaps = np.nonzero(mesh.t[1, :-1] != mesh.t[0, 1:])[0] + 1.0
-        for _, load in self.faces:
+        stations += [0.0, ne, *(station_of_node(mesh, k) for k in np.concatenate(ends)),
+                     *(np.nonzero(mesh.t[1, :-1] != mesh.t[0, 1:])[0] + 1.0), *across.jumps]
+        for _, load in self._faces:
             for side, face in enumerate(load.faces):
                 stations += list(np.nonzero(face[1:] != face[:-1])[0] + 1.0)
                 if callable(load.traction) and np.any(face):
-                    stations += list(jumps(partial(_traction, self.beam, load.traction),
-                                           mesh.nelements, np.array([float(side)])))
-        for s in self.sampled:
-            stations += [*s.changes(mesh.nelements), *s.jumps(mesh.nelements)]
-        stations += list(self.beam.across.jumps)
+                    stations += list(jumps(partial(_traction, self.beam, load.traction), ne,
+                                           np.array([float(side)])))
+        for s in self._sampled:
+            stations += [*s.changes(ne), *s.jumps(ne)]
         for _, eigen in self.eigen:
-            stations += list(jumps(eigen.strain_at, mesh.nelements, np.linspace(0.0, 1.0, 5)))
-        cuts = np.concatenate([stations, gaps, [0.0, mesh.nelements]])
-        self.cuts = np.unique(self._at_nodes(cuts))
-        for station in self._acted[self._acted % 1.0 != 0]:
-            self._pass_on(int(station))
+            stations += list(jumps(eigen.strain_at, ne, np.linspace(0.0, 1.0, 5)))
+        self.cuts = np.unique(_snapped(stations))
+        inside = self._acted[self._acted % 1.0 != 0].astype(int)
+        for e in inside:
+            self._pass_on(e, inside)
 
-    def _pass_on(self, e):
+    def _pass_on(self, e, inside):
         """The section forces at the ends of an element with a point load, from its neighbours.
 
         Its own internal force is in equilibrium with the load that its nodes take over.
         """
         t = self.beam.mesh.t
         for end, other in ((0, e - 1), (1, e + 1)):
-            if e + end in self._acted or np.any(np.floor(
-                    self._acted[self._acted % 1.0 != 0]) == other):
+            if e + end in self._acted or other in inside:
                 raise NotRecovered("a load or joint at a point inside of an element acts next to "
                                    "another one, or to a support: put a node at the point")
             near = 0 <= other < t.shape[1] and t[end, e] == t[1 - end, other]
-            self.R[end][..., e, :] = self.R[1 - end][..., other, :] if near else 0.0
-            self.M[end][..., e] = self.M[1 - end][..., other] if near else 0.0
-
-    @staticmethod
-    def _at_nodes(stations):
-        """Stations, those near a node put at it."""
-        stations = np.asarray(stations, dtype=float)
-        near = np.round(stations)
-        return np.where(np.abs(stations - near) < SNAP, near, stations)
+            self.R[end][e] = self.R[1 - end][other] if near else 0.0
+            self.M[end][e] = self.M[1 - end][other] if near else 0.0
 
     def _check(self):
         """The section force is continuous, and zero at ends, where nothing acts at a node."""
-        mesh = self.beam.mesh
-        n = mesh.p.shape[1]
-        R = np.zeros(self.states + (n, 2), self.R.dtype)
-        M = np.zeros(self.states + (n,), self.M.dtype)
-        R[..., mesh.t[1], :], M[..., mesh.t[1]] = self.R[1], self.M[1]
-        R[..., mesh.t[0], :] -= self.R[0]
-        M[..., mesh.t[0]] -= self.M[0]
-        size = np.maximum(self._size(self.R, self.M), BALANCED * self._pushed)
-        unloaded = size <= self._round_off()
-        if np.any(unloaded):
-            raise NotRecovered("the beam carries no load", unloaded)
+        beam, mesh = self.beam, self.beam.mesh
+        n, ne = mesh.p.shape[1], mesh.nelements
+        R, M = np.zeros((n, 2), self.R.dtype), np.zeros(n, self.M.dtype)
+        R[mesh.t[1]], M[mesh.t[1]] = self.R[1], self.M[1]
+        R[mesh.t[0]] -= self.R[0]
+        M[mesh.t[0]] -= self.M[0]
+        size = max(self._size(self.R, self.M), BALANCED * self._pushed)
+        places = np.max(np.abs((self.q.imag if self.small else self.q)[:, 0]))
+        round_off = UNLOADED * places / np.min(mesh.lengths) * (
+            beam.kernel.scale / mesh.lengths.sum() * mesh.height)
+        if size <= round_off:
+            raise NotRecovered("the beam carries no load")
         place = np.zeros(n)
-        place[mesh.t[0]], place[mesh.t[1]] = np.arange(mesh.nelements), 1.0 + np.arange(
-            mesh.nelements)
-        jump = (np.abs(R).max(axis=-1) * mesh.height + np.abs(M)) / size[..., None]
-        jump[..., np.isin(place, self._acted)] = 0.0
-        unbalanced = np.max(jump, axis=-1) > (
-            UNBALANCED if self.acceleration is None else UNBALANCED_MOTION)
-        if np.any(unbalanced):
-            k = np.unravel_index(np.argmax(jump), jump.shape)
+        place[mesh.t[0]], place[mesh.t[1]] = np.arange(ne), 1.0 + np.arange(ne)
+        jump = (np.abs(R).max(axis=-1) * mesh.height + np.abs(M)) / size
+        jump[np.isin(place, self._acted)] = 0.0
+        if np.max(jump) > (UNBALANCED if self._acceleration is None else UNBALANCED_MOTION):
             raise NotRecovered(
                 "the state is no equilibrium under the loads of the scene: at node "
-                f"{k[-1]} the section force changes by {jump[k]:.1%} of its largest value",
-                unbalanced)
+                f"{np.argmax(jump)} the section force changes by {np.max(jump):.1%} of its "
+                "largest value")
 
 
-def _each(function, u):
-    """A function of a vector (N,), of one state or of each of several (states, N)."""
-    return function(u) if u.ndim == 1 else np.array([function(x) for x in u])
+def _traction(beam, traction, X, e):
+    """What a function of places returns at points of the reference configuration, (2, n, k)."""
+    return np.array([np.broadcast_to(c, X.shape[1:])
+                     for c in traction(beam.mesh.mapping().F(X, e))])
 
 
-def _at_ends(q, force):
-    """Forces (2 ends, ..., ne, 2) and moments (2 ends, ..., ne) of element vectors, as sections
-    have them; q: coordinates of the left and the right nodes, (..., ne, nb, 2).
-    """
-    left, right = np.split(force, 2, axis=-2)
-    return (np.array([-left[..., 0, :], right[..., 0, :]]),
-            np.array([-_moments(q[0], left), _moments(q[1], right)]))
+def _snapped(stations):
+    """Axial coordinates, those near a node put at it."""
+    stations = np.asarray(stations, dtype=float)
+    near = np.round(stations)
+    return np.where(np.abs(stations - near) < SNAP, near, stations)
 
 
 def _moments(q, force):
-    """Moments (..., ne) of element vectors on the coordinates but r, (..., ne, nb, 2) both."""
-    q, force = (np.moveaxis(x[..., 1:, :], -1, 0) for x in (q, force))
+    """Moments (ne,) of element vectors on the coordinates but r, (ne, nb, 2) both."""
+    q, force = (np.moveaxis(x[:, 1:], -1, 0) for x in (q, force))
     return np.sum(cross(q, force), axis=-1)
 
 

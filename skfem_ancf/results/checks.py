@@ -15,7 +15,7 @@ from ..materials import LinearLaw
 if TYPE_CHECKING:
 
     from ..beam.beam import Beam
-    from ..beam.configuration import Configuration
+    from .state import State
     from ..core.types import Array
 
 #: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
@@ -67,12 +67,12 @@ class Checks:
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
-def check(state: Configuration) -> Checks:
+def check(state: State) -> Checks:
     """The :class:`Checks` of a state."""
     values, found = [], []
     for beam in state.beams:
         u, base = state.u_of(beam), None if state.base is None else state.base.u_of(beam)
-        ratio, stretches = beam.kinematics.deformation(beam, state.places_of(beam))
+        ratio, stretches = beam.kinematics.deformation(beam, state._places[state.system.of(beam)])
         values.append((np.min(ratio), np.min(stretches), np.max(stretches),
                        turning(beam, u, base)))
         found += (_findings(beam, values[-1][1], values[-1][3]) if base is None else
@@ -82,7 +82,7 @@ def check(state: Configuration) -> Checks:
                   tuple(found))
 
 
-def warn_of(state: Configuration) -> None:
+def warn_of(state: State) -> None:
     """Give a :class:`~skfem_ancf.core.errors.ModelWarning` for each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
         warn(text, ModelWarning)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,23 +11,24 @@ import numpy as np
 from ..beam.layout import select_beam, select_member
 from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..actions.eigenstrain import EigenStrain
+from ..actions.obstacles.contact import contact_of
+from ..equations.stability import verdict
 from ..recovery.fields import Values, find_field
-from ..core.frozen import Frozen
-from ..core.kept import cached_property
+from ..core.immutable import Immutable
 from ..core.linear import first_order, step
-from ..beam.interpolation import Part
 from ..beam.points import require_body
-from ..recovery.recovered import actions, recover
 from ..recovery.resultants import Resultants, resultants
 from ..recovery.section_forces import NotRecovered
+from .acting import recover, stations
+from .checks import check
+from .points import MaterialPoints
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from contextlib import AbstractContextManager
+    from collections.abc import Iterable
     from pathlib import Path
 
-
     from ..beam.beam import Beam
+    from ..beam.interpolation import Part
     from .checks import Checks
     from ..actions.joints.base import Joint
     from ..actions.obstacles.contact import Contact
@@ -39,9 +40,6 @@ if TYPE_CHECKING:
     from ..beam.layout import WhichBeam, WhichMember
 
 logger = logging.getLogger(__name__)
-
-#: Rows of recovered fields.
-STRAIN, STRESS = slice(0, 3), slice(3, 6)
 
 
 class Reaction(NamedTuple):
@@ -63,49 +61,42 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State(Frozen):
+class State(Immutable, MaterialPoints):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters
     ----------
     system
         The :class:`~skfem_ancf.equations.system.System` of the scene.
-    u
-        Displacement of the coordinates, shape (N,).
-    load
-        Load factor.
+    u, load, converged, iterations, message, steps, multipliers, t, acceleration, doubt, memory, base
+        As in the attributes.
     force
         Internal force there, shape (N,), or None: it is computed when asked for.
-    converged, iterations, message, steps, doubt
-        As in the attributes.
-    multipliers
-        Of the joints, shape (m,); zero by default.
-    t, inertia, acceleration, motion, origin
-        Of an instant of a motion: its time; the force of inertia and damping, and the
-        acceleration of the
-        coordinates, shape (N,); its :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the
-        run kept.
+    inertia, motion, origin
+        Of an instant of a motion: the force of inertia and damping, shape (N,); its
+        :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the run kept.
     verdict
-        What is known of its stability, or None: it is found when asked for.
-    memory
-        What load steps have left behind at obstacles, shape (n,), or None.
-    base
-        As in the attributes.
+        What the solver knows of its stability, or None: it is found when asked for.
 
     Attributes
     ----------
     u
-        Displacement of the coordinates from the stress-free state, shape (N,).
+        Displacement of the coordinates from the reference configuration, shape (N,).
     load
         Load factor.
     converged, iterations, message, steps
         How the solver got here; ``steps`` holds the residuals of every iteration.
+    multipliers
+        Lagrange multipliers of the joints, shape (m,).
     t
         Time, in a motion; else None.
     acceleration
         Of the coordinates, shape (N,), in a motion and of a mode; else None.
     doubt : str
-        Where and how the way to it left the path from the stress-free state; empty if it did not.
+        Where and how the way to it left the path from the reference configuration; empty if it did
+        not.
+    memory
+        What load steps have left behind at obstacles, shape (n,), or None.
     base : State or None
         The state about which this one is linearised: of a linear solution that without load, of a
         mode that which vibrates. All that is asked is of first order in the difference: strain,
@@ -124,14 +115,13 @@ class State(Frozen):
     acceleration: Array | None
     multipliers: Array
     doubt: str
+    memory: Array | None
+    base: State | None
     _force: Array | None
     _inertia: Array | float
-    base: State | None
     _motion: Any
     _origin: Any
     _verdict: Verdict | None
-    _checks: Checks | None
-    _memory: Array | None
 
     def __init__(self, system: System, u: Array, load: float = 1.0, force: Array | None = None,
                  converged: bool = True, iterations: int = 0, message: str = "",
@@ -146,13 +136,12 @@ class State(Frozen):
             if np.shape(value) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
                                  f"{np.shape(value)}")
-        # at once, as each by itself is looked at whether it may be set; _motion, _origin are the
-        # Motion of an instant, its scheme, and what a run of it keeps
-        vars(self).update(
-            system=system, u=u, load=load, converged=converged, iterations=iterations,
-            message=message, steps=tuple(steps), t=t, acceleration=acceleration,
-            multipliers=multipliers, doubt=doubt, base=base, _force=force, _inertia=inertia,
-            _motion=motion, _origin=origin, _verdict=verdict, _checks=None, _memory=memory)
+        self.system, self.u, self.load, self.multipliers = system, u, load, multipliers
+        self.converged, self.iterations, self.message = converged, iterations, message
+        self.steps, self.t, self.acceleration = tuple(steps), t, acceleration
+        self.doubt, self.memory, self.base = doubt, memory, base
+        self._force, self._inertia, self._verdict = force, inertia, verdict
+        self._motion, self._origin = motion, origin
 
     def replace(self, **changes: Any) -> State:
         """The same state with other attributes, as ``replace(message="guess")``.
@@ -170,15 +159,14 @@ class State(Frozen):
         for name in changes:
             if name not in known:
                 raise NameUnknown("attribute of State", name, known)
-        other = object.__new__(type(self))
-        vars(other).update(vars(self), **changes)
-        for name in ("_recoveries", "actions", "together", "places"):
-            vars(other).pop(name, None)
+        other = self._thawed()
+        for name, value in changes.items():
+            setattr(other, name, value)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
-            vars(other).update(_verdict=None, _checks=None, _force=None)
+            other._verdict = other._force = None
         if {"u", "multipliers", "system"} & set(changes):
-            vars(other).update(_motion=None, _origin=None, _memory=None)
-        other._seal()
+            other._motion = other._origin = other.memory = None
+        other._freeze()
         return other
 
     def __repr__(self):
@@ -196,20 +184,14 @@ class State(Frozen):
             lines += [f"  {line}" for line in str(self.checks).splitlines()]
         return "\n".join(lines)
 
-    def contact_memory(self) -> AbstractContextManager[None]:
-        """What its points remember of obstacles, lent to the equations while it is asked."""
-        return self.system.forces.contacts.lent(self._memory)
-
     @property
     def verdict(self) -> Verdict | None:
         """What the tangent says of an equilibrium: a
         :class:`~skfem_ancf.equations.stability.Verdict`; None for an instant of a motion, and for a
         linear solution: ``scene.buckling()`` tells up to which load that is stable.
         """
-        from ..equations.stability import verdict
-
         if self._verdict is None and self.t is None and self.base is None:
-            with self.contact_memory():
+            with self._contact_memory():
                 self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
         return self._verdict
 
@@ -227,16 +209,12 @@ class State(Frozen):
         """
         return None if self.verdict is None else self.verdict.negative_pivots
 
-    @property
+    @cached_property
     def checks(self) -> Checks:
         """How far the state is from what law and mesh are good for: a
         :class:`~skfem_ancf.results.checks.Checks`.
         """
-        from .checks import check
-
-        if self._checks is None:
-            self._checks = check(self)
-        return self._checks
+        return check(self)
 
     @property
     def beams(self) -> tuple[Beam, ...]:
@@ -244,39 +222,57 @@ class State(Frozen):
         return tuple(self.system.beams)
 
     @property
+    def bodies(self) -> tuple[RigidBody, ...]:
+        """The rigid bodies of the scene."""
+        return tuple(self.system.bodies)
+
+    @property
     def q(self) -> Array:
         """Absolute coordinates, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.system.members]) + self.u
-
-    @cached_property
-    def places(self) -> Array:
-        """Displacement of the coordinates as fields are asked at it, shape (N,): of a linear
-        solution the :func:`~skfem_ancf.core.linear.step` from its base.
-        """
-        return self.u if self.base is None else step(self.base.u, self.u)
-
-    def places_of(self, beam: WhichMember) -> Array:
-        """Those of :attr:`places` of one beam or rigid body."""
-        return self.places[self.system.of(select_member(self.beams, self.system.bodies, beam))]
-
-    @property
-    def from_rest(self) -> bool:
-        """True if it is linearised about the stress-free state without load."""
-        return self.base is not None and self.base.load == 0.0 and not self.base.u.any()
 
     @property
     def v(self) -> Array:
         """Velocity of the coordinates, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
-    @property
-    def bodies(self) -> tuple[RigidBody, ...]:
-        """The rigid bodies of the scene."""
-        return tuple(self.system.bodies)
+    def _contact_memory(self):
+        """A context in which the obstacles have the memory of this state."""
+        return self.system.forces.contacts.lent(self.memory)
 
-    def u_of(self, beam: WhichMember) -> Array:
-        """Coordinate displacements of one beam or rigid body."""
-        return self.u[self.system.of(select_member(self.beams, self.system.bodies, beam))]
+    # linear solutions
+
+    @cached_property
+    def _places(self) -> Array:
+        """Displacement at which fields are evaluated, shape (N,): of a linear solution the
+        :func:`~skfem_ancf.core.linear.step` from its base.
+        """
+        return self.u if self.base is None else step(self.base.u, self.u)
+
+    def _places_of(self, beam):
+        return self._places[self._dofs(beam)]
+
+    @property
+    def _from_rest(self):
+        """True if it is linearised about the reference configuration without load."""
+        return self.base is not None and self.base.load == 0.0 and not self.base.u.any()
+
+    @property
+    def _unit(self):
+        """What factors of loads are times: of a linear solution from rest a step, else 1."""
+        return step(0.0, 1.0) if self._from_rest else 1.0
+
+    @property
+    def _acted(self):
+        """Where forces act, as a displacement (N,): in linear theory where the base is."""
+        return self.u if self.base is None else self.base.u
+
+    @property
+    def _time(self):
+        """The time at which joints are asked: in statics the load factor."""
+        return self.load if self.t is None else self.t
+
+    # at material points
 
     def angle(self, body: WhichMember) -> float:
         """The angle of a rigid body, in radians, no more than pi from that of the start.
@@ -287,80 +283,7 @@ class State(Frozen):
             The RigidBody, its name or its number.
         """
         found = require_body(self.system, body)
-        return float(first_order(found.angle_at(self.places[self.system.of(found)])))
-
-    def angular_velocity(self, body: WhichMember) -> float:
-        """The angular velocity of a rigid body, counterclockwise; zero where there is no motion.
-
-        Parameters
-        ----------
-        body
-            The RigidBody, its name or its number.
-        """
-        found = require_body(self.system, body)
-        s = self.system.of(found)
-        return float(found.angular_velocity(self.u[s], self.v[s]))
-
-    # at material points
-
-    def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Displacement of material points.
-
-        Parameters
-        ----------
-        point
-            A material point, named by its place (x, y) in the stress-free body, or many: a list of
-            points, or an array (2, n) whose columns are points; a RigidBody for its centre of mass.
-        beam
-            The beam or rigid body, its name or its number; found for each point if it is not given.
-        line
-            The number of the line, of a frame; found for each point if it is not given. A point
-            that is in several lines or beams is one of that whose axis is nearest, here as in all
-            loads and readings; of the first of them if several are as near, as at a node.
-
-        Returns
-        -------
-        ndarray
-            Shape (2,), or (2, n) for many points.
-
-        Raises
-        ------
-        MeshError
-            If a point is outside the body.
-        """
-        return first_order(self.system.points.find(point, beam, line).displacement(self.places))
-
-    def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Position of material points, (2,) or (2, n); parameters are those of
-        :meth:`displacement`.
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam
-            The beam, its name or its number; found if it is not given.
-        line
-            As for :meth:`displacement`.
-        """
-        at = self.system.points.find(point, beam, line)
-        return at.start + first_order(at.displacement(self.places))
-
-    def velocity(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Velocity of material points, (2,) or (2, n); zero where there is no motion.
-
-        Parameters are those of :meth:`displacement`.
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam
-            The beam, its name or its number; found if it is not given.
-        line
-            As for :meth:`displacement`.
-        """
-        return self.system.points.find(point, beam, line).velocity(self.u, self.v)
+        return float(first_order(found.angle_at(self._places_of(found))))
 
     def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
@@ -370,39 +293,34 @@ class State(Frozen):
 
         Parameters
         ----------
-        point, beam
-            As for :meth:`displacement`: one point, shape (2,), or many.
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam, line
+            As for :meth:`displacement`.
         recover
-            The recovered field, see :mod:`skfem_ancf.recovery`, where there is one
+            The recovered field, see :mod:`skfem_ancf.recovery.recovered`, where there is one
             (:attr:`recovered`); False for the strain of the element at the point.
-        line
-            The number of the line, of a frame; found for each point if it is not given.
 
         Raises
         ------
         InputError
             If several lines or beams are as near to a point, as at a node: their strains differ.
         """
-        at = self.system.points.find(point, beam, line, ask=True)
-        recover = require_flag("recover", recover)
-        values = at.gather([self._strain(part, recover) for part in at.parts])
-        values[2] *= 0.5
-        return values
+        values = self._at_points(lambda v: v.strain, point, beam, recover, line)
+        return (values.T * [1.0, 1.0, 0.5]).T
 
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n).
 
-        Parameters are those of :meth:`strain`.
-
         Parameters
         ----------
-        point, beam, recover, line
-            As for :meth:`strain`: one point, shape (2,), or many.
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam, recover, line
+            As for :meth:`strain`.
         """
-        at = self.system.points.find(point, beam, line, ask=True)
-        recover = require_flag("recover", recover)
-        return at.gather([self._stress(part, recover) for part in at.parts])
+        return self._at_points(lambda v: v.S, point, beam, recover, line)
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
@@ -414,7 +332,7 @@ class State(Frozen):
             A name of :data:`skfem_ancf.recovery.fields.FIELDS`, as "von_mises", or a function or
             Field of your own, see :mod:`skfem_ancf.recovery.fields`.
         point
-            One point, shape (2,), or many, shape (2, n) or a list.
+            One point, shape (2,), or many, as for :meth:`displacement`.
         beam, recover, line
             As for :meth:`strain`.
 
@@ -433,103 +351,52 @@ class State(Frozen):
         >>> float(state.field("von_mises", (0.5, 0.05)).round(-1))
         300.0
         """
+        return self._at_points(find_field(field).of, point, beam, recover, line)
+
+    def _at_points(self, ask, point, beam, recover, line):
         at = self.system.points.find(point, beam, line, ask=True)
-        recover = require_flag("recover", recover)
-        field = find_field(field)
-        return at.gather([field.of(Values(part, self.places, partial(
-            self._recovery_of, part.number) if recover else None, self.eigen))
+        require_flag("recover", recover)
+        return at.gather([ask(Values(part, self._places, partial(
+            self._recovery_of, part.number) if recover else None, self._eigenstrains(part.beam)))
             for part in at.parts])
 
-    def eigen(self, part: Part, stress: bool = False) -> Any:
-        """The stress-free strain at points, or what the stress of the elements is less by for it.
-
-        Parameters
-        ----------
-        part
-            A :class:`~skfem_ancf.beam.interpolation.Part`.
-        stress
-            The latter.
-
-        Returns
-        -------
-        ndarray
-            Shape (3, n), or 0.
-        """
-        if not isinstance(part, Part):
-            raise InputError("part must be points of a beam, a "
-                             f"skfem_ancf.beam.interpolation.Part, got {shown(part)}")
-        if require_flag("stress", stress):
-            return first_order(self.eigen_stress(part.beam, part.at, part.e)[..., 0])
-        return sum(factor * load.strain_at(part.at, part.e)[..., 0]
-                   for factor, load in self.eigenstrains(part.beam))
-
-    def eigen_stress(self, beam: Beam, X: Array, e: Array) -> Array:
-        """What the stress of the elements is less by for stress-free strains, (3, n, m).
-
-        Of a linear solution a :func:`~skfem_ancf.core.linear.step`.
+    def values_of(self, beam: Beam, part: Part, recover: bool = True) -> Values:
+        """All fields at points of one beam, for pictures and files.
 
         Parameters
         ----------
         beam
             One of the beams.
-        X, e
-            Reference points (2, n, m) and their elements (n,).
+        part
+            The points, numbered by the coordinates of the beam alone.
+        recover
+            As for :meth:`strain`.
         """
-        u, unit = self.places_of(beam), self.unit
-        return np.zeros((3, *X.shape[1:])) + sum(
-            load.stress_at(u, X, e, unit * factor) for factor, load in self.eigenstrains(beam))
+        return Values(part, self._places_of(beam), partial(self.recovery, beam) if recover else
+                      None, self._eigenstrains(beam))
 
-    @property
-    def unit(self) -> Any:
-        """What factors of loads are times: of a linear solution from rest a
-        :func:`~skfem_ancf.core.linear.step`, else 1.
-        """
-        return step(0.0, 1.0) if self.from_rest else 1.0
-
-    def eigenstrains(self, beam: WhichBeam = None) -> list[tuple[float, EigenStrain]]:
-        """Factors and loads of stress-free strains on a beam."""
-        beam = select_beam(self.beams, beam)
-        return [(self.load * load.factor(self.t), load) for load in self.system.loads
+    def _eigenstrains(self, beam):
+        """Factors and loads of eigenstrains on a beam."""
+        return [(self._unit * self.load * load.factor(self.t), load) for load in self.system.loads
                 if isinstance(load, EigenStrain) and load.beam is beam]
-
-    def _strain(self, part, recover):
-        r = self._recovery_of(part.number) if recover else None
-        return first_order(part.strain(self.places)) if r is None else r.at(part, STRAIN)
-
-    def _stress(self, part, recover):
-        r = self._recovery_of(part.number) if recover else None
-        return (first_order(part.stress(self.places)) - self.eigen(part, True) if r is None else
-                r.at(part, STRESS))
 
     # recovered fields
 
     def recovery(self, beam: WhichBeam = None) -> Recovery | None:
-        """The recovered field of a beam, a :class:`~skfem_ancf.recovery.Recovery`, or None.
+        """The recovered field of a beam, a :class:`~skfem_ancf.recovery.recovered.Recovery`.
 
         None where the field cannot be recovered; :attr:`recovered` says why.
         """
         return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
 
-    def balance(self, beam: WhichBeam = None) -> Recovery | None:
-        """The :class:`~skfem_ancf.recovery.Recovery` with the section forces of a beam, or None.
-
-        A section given by numbers has these, but no fields.
-
-        Parameters
-        ----------
-        beam
-            The beam, its name or its number, in a scene of several.
-        """
-        return self._recovery_of(self.beams.index(select_beam(self.beams, beam)), fields=False)
-
     def _recovery_of(self, k, fields=True):
+        """That of beam ``k``, or with fields=False the one that has section forces at least."""
         if k not in self._recoveries:
-            states = [state for state in self.together if k not in state._recoveries]
-            for state, found in zip(states, recover(states, k)):
-                state._recoveries[k] = found
-                if why := state._why(k):
-                    logger.info("%r: strain and stress are those of the elements: %s",
-                                self.beams[k], why)
+            self._recoveries[k] = recover(
+                self, k, self._stations[k], self._places_of(k), self._unit)
+            if why := self._why(k):
+                logger.info("%r: strain and stress are those of the elements: %s",
+                            self.beams[k], why)
         found = self._recoveries[k]
         return None if isinstance(found, NotRecovered) or fields and found.why else found
 
@@ -546,7 +413,7 @@ class State(Frozen):
         """
         out = {}
         for k, beam in enumerate(self.beams):
-            self.recovery(beam)
+            self._recovery_of(k)
             out[k if beam.name is None else beam.name] = self._why(k)
         return out
 
@@ -555,17 +422,8 @@ class State(Frozen):
         return {}
 
     @cached_property
-    def together(self) -> Sequence[State]:
-        """States of the same scene whose fields are recovered with those of this one."""
-        return (self,)
-
-    @cached_property
-    def actions(self) -> list[list[float]]:
-        """Where supports and joints act on each beam: element + xi, a list a beam."""
-        first = self.together[0]
-        if first is not self and not self.system.constraints.joints:
-            return first.actions  # of supports: always the same
-        return actions(self)
+    def _stations(self):
+        return stations(self)
 
     def resultants(self, at: Any = None, beam: WhichBeam = None,
                    recover: bool = True, line: int | None = None) -> Resultants:
@@ -607,20 +465,23 @@ class State(Frozen):
         >>> sections.M.round(4).tolist(), sections.Q.round(4).tolist()
         ([-1.0, -0.5], [-1.0, -1.0])
         """
-        recover = require_flag("recover", recover)
-        if at is None:
-            chain = None
+        recover, chain, places, one = require_flag("recover", recover), None, None, False
+        if at is not None:
+            found = self.system.points.find(at, beam, line, ask=True)
+            if len(found.parts) != 1:
+                raise InputError("the points are in several beams: ask for the resultants of each, "
+                                 "with beam=")
+            part, one = found.parts[0], found.one
+            k, places = part.number, (part.e, part.X[0])
+        else:
             if line is not None:
                 beam, chain = self.system.points.chain_of(line, beam)
-            number = self.beams.index(select_beam(self.beams, beam))
-            return resultants(self, number, None, recover, chain)
-        found = self.system.points.find(at, beam, line, ask=True)
-        if len(found.parts) != 1:
-            raise InputError("the points are in several beams: ask for the resultants of each, "
-                             "with beam=")
-        part = found.parts[0]
-        values = resultants(self, part.number, part, recover)
-        return values.first() if found.one else values
+            k = self.beams.index(select_beam(self.beams, beam))
+        beam = self.beams[k]
+        values = resultants(beam, self._places_of(beam),
+                            self._recovery_of(k, fields=False) if recover else None,
+                            self._eigenstrains(beam), places, chain)
+        return values.first() if one else values
 
     # of the whole
 
@@ -643,9 +504,8 @@ class State(Frozen):
         InputError
             If there are no obstacles, or none of that number.
         """
-        from ..actions.obstacles.contact import contact_of
-
-        return contact_of(self, obstacle)
+        with self._contact_memory():
+            return contact_of(self, obstacle)
 
     @property
     def strain_energy(self) -> float:
@@ -654,16 +514,16 @@ class State(Frozen):
         It is W(E) of all the strain, also under temperatures and eigenstrains E0: these are loads,
         and their potential is what W(E - E0), the field "energy", has less.
         """
-        with self.contact_memory():
+        with self._contact_memory():
             if self.base is not None:
                 return self.system.linear_energy(self.base.u, self.u - self.base.u, self.load)
-            return self.system.strain_energy(self.u, self.load if self.t is None else self.t)
+            return self.system.strain_energy(self.u, self._time)
 
     @property
     def internal_force(self) -> Array:
         """Internal force on all coordinates, shape (N,)."""
         if self._force is None:
-            with self.contact_memory():
+            with self._contact_memory():
                 self._force = (
                     self.system.internal_force(self.u, self.t, self.load) if self.base is None else
                     self.system.linear_force(self.base.u, self.u - self.base.u, self.load))
@@ -683,34 +543,28 @@ class State(Frozen):
         beam
             The beam, its name or its number, in a scene of several.
 
-        Returns
-        -------
-        Reaction
-
         Raises
         ------
         InputError
             If a beam of a frame is named that no support holds there: clamps and pins hold nodes.
         """
-        frame = self.system.constraints.frame
+        system, frame = self.system, self.system.constraints.frame
         if frame is not None and beam is None:
             multipliers = self.multipliers[:len(frame.equations)]
             return Reaction(*frame.reaction(boundary, self._acted, multipliers))
-        member: Any = select_member(self.beams, self.system.bodies, beam)
-        s = self.system.of(member)
-        nodes, there = member.nodes(boundary), np.zeros(self.system.N, dtype=bool)
+        member: Any = select_member(self.beams, system.bodies, beam)
+        s = system.of(member)
+        nodes, there = member.nodes(boundary), np.zeros(system.N, dtype=bool)
         there[s].reshape(-1, member.nd)[nodes] = True
-        force, touched = self.system.constraints.force_on(there, self.multipliers)
-        total = np.where(self.system.constraints.free, 0.0, self._support_force()) + force
+        force, touched = system.constraints.force_on(there, self.multipliers)
+        total = np.where(system.constraints.free, 0.0, self._support_force()) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
-        q = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
-        arm = q.copy()
-        arm[:, 0] -= q[0, 0]
+        arm = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
+        arm[:, 0] -= arm[0, 0].copy()
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
-        by_name = dict(zip(member.dofnames, forces.sum(axis=0).ravel()))
-        holds = (~self.system.constraints.free | touched)[s].reshape(-1, member.nd)[nodes]
-        held = set(np.nonzero(holds.any(axis=0))[0])
-        names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
+        holds = (~system.constraints.free | touched)[s].reshape(-1, member.nd)[nodes].any(axis=0)
+        names = {n: float(v) for n, v, held in zip(
+            member.dofnames, forces.sum(axis=0).ravel(), holds) if held}
         if frame is not None and not names:
             raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: what holds "
                              "the nodes of a frame is asked of nodes, without beam=")
@@ -722,21 +576,15 @@ class State(Frozen):
         loads = system.external_force(self.u, self.t) if self.base is None else (
             system.linear_external_force(self.base.u, self.u - self.base.u))
         total = self.internal_force - self.load * loads + self._inertia
-        t = self.load if self.t is None else self.t
         if system.constraints.joints:
-            total = total + self.multipliers @ system.constraints.full_jacobian(self._acted, t)
+            total = total + self.multipliers @ system.constraints.full_jacobian(
+                self._acted, self._time)
         return total
-
-    @property
-    def _acted(self):
-        """Where forces act, as a displacement (N,): in linear theory where the base is."""
-        return self.u if self.base is None else self.base.u
 
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""
-        t = self.load if self.t is None else self.t
         return self.system.constraints.joint_force(
-            joint, self.multipliers, self._support_force(), self._acted, t)
+            joint, self.multipliers, self._support_force(), self._acted, self._time)
 
     # files and pictures
 
@@ -746,14 +594,14 @@ class State(Frozen):
         return state_html(self)
 
     def save(self, filename: StrPath, **options: Any) -> Path:
-        """Write the deformed body for ParaView.
+        """Write the deformed body for ParaView; see :func:`skfem_ancf.io.vtu.save_vtu`.
 
         Parameters
         ----------
         filename
             Path that ends with .vtu.
         **options
-            Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+            Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
 
         Returns
         -------
@@ -765,59 +613,25 @@ class State(Frozen):
         return save_vtu(self, filename, **options)
 
     def to_pyvista(self, **options: Any) -> Any:
-        """The body as a grid of pyvista.
-
-        Parameters
-        ----------
-        **options
-            Those of :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
-        """
+        """The body as a grid of pyvista; see :func:`skfem_ancf.visuals.pyvista.to_pyvista`."""
         from ..visuals.pyvista import to_pyvista
 
         return to_pyvista(self, **options)
 
     def view(self, field: Any = "eps_yy", **options: Any) -> Any:
-        """Put the body into a plotter of pyvista, and return it.
-
-        Parameters
-        ----------
-        field
-            As for :meth:`plot`.
-        **options
-            Those of :func:`skfem_ancf.visuals.pyvista.view`.
-        """
+        """Put the body into a plotter of pyvista; see :func:`skfem_ancf.visuals.pyvista.view`."""
         from ..visuals.pyvista import view
 
         return view(self, field, **options)
 
     def plot_resultants(self, beam: WhichBeam = None, **options: Any) -> Any:
-        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`.
-
-        Parameters
-        ----------
-        beam
-            The beam, its name or its number.
-        **options
-            Those of :func:`skfem_ancf.visuals.diagrams.plot_resultants`.
-        """
+        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`."""
         from ..visuals.diagrams import plot_resultants
 
         return plot_resultants(self, beam, **options)
 
     def plot(self, field: str = "eps_yy", **options: Any) -> Any:
-        """Draw the deformed body.
-
-        Parameters
-        ----------
-        field
-            What it is coloured by, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
-        **options
-            Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""
         from ..visuals.matplotlib import plot_state
 
         return plot_state(self, field, **options)

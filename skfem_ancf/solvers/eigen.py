@@ -201,7 +201,7 @@ def modes(system: System, state: State, k: int) -> Modes:
     SupportError
         If joints are not independent in this state.
     """
-    with state.contact_memory():
+    with system.forces.contacts.lent(state.memory):
         return _modes(system, state, k)
 
 

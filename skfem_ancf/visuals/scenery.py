@@ -42,7 +42,7 @@ class _Body:
         x, axis = values.x.reshape(flat), beam.mesh.mapping().F(ends)
         u = values.u.reshape(flat)
         axis_u = first_order(beam.kinematics.displacements(
-            beam, state.places_of(beam), ends, None))
+            beam, getattr(state, "_places_of", state.u_of)(beam), ends, None))
         self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
         self.values = field.of(values)
         if field.components > 1:

@@ -286,7 +286,7 @@ class Contacts:
             return None
         ours, theirs = self.tables, state.system.forces.contacts.tables
         same = np.array_equal(ours.ints, theirs.ints) and np.array_equal(ours.floats, theirs.floats)
-        return state._memory if same else None
+        return state.memory if same else None
 
     def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
         """Points stick from here on, and nothing reaches beyond the surface.

@@ -82,9 +82,7 @@ def contact_of(state: Configuration, obstacle: Any = None) -> Contact:
     nearest = np.inf
     t = state.load if state.t is None else state.t
     v = None if state.t is None else np.array(state.v)
-    with state.contact_memory():
-        pushes = contacts.pushes(np.array(state.u), v, t)
-    for k, *values in pushes:
+    for k, *values in contacts.pushes(np.array(state.u), v, t):
         if which is None or k == which:
             nearest = min(nearest, float(values[3].min()))
             for column, x in zip(found, values):

@@ -1,0 +1,125 @@
+"""What acts on a beam in a state, as :mod:`skfem_ancf.recovery` takes it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import sparse
+
+from ..recovery.recovered import Recovery
+from ..recovery.section_forces import NotRecovered, SectionForces, viscous_forces
+from ..beam.distribution import Sampled, station_of_node, stations_of_vector
+
+if TYPE_CHECKING:
+    from .state import State
+    from ..beam.beam import Beam
+    from ..core.types import Array
+
+
+def stations(state: State) -> list[list[float]]:
+    """Where supports and joints act on each beam: axial coordinates element + xi, a list a beam."""
+    system = state.system
+    fixed = np.zeros(system.N, dtype=bool)
+    fixed[system.constraints.fixed] = True
+    acting = system.forces.acting_rows()
+    J = None
+    if system.constraints.m or len(acting):
+        u = state.u if state.base is None else state.base.u
+        J = sparse.vstack([system.constraints.sparse_jacobian(
+            u, state.load if state.t is None else state.t), acting]).tocsc()
+    out: list[list[float]] = []
+    for beam, s in zip(system.beams, system.slices):
+        nodes = np.nonzero(np.any(fixed[s].reshape(-1, beam.nd), axis=1))[0]
+        found = [station_of_node(beam.mesh, int(k)) for k in nodes]
+        here = None if J is None else J[:, s]
+        for row in () if here is None else here[np.unique(here.indices)].toarray():
+            if np.any(row):
+                # an equation between neighbouring nodes: at both
+                loaded = np.nonzero(np.any(row.reshape(-1, beam.nd) != 0, axis=1))[0]
+                found += (stations_of_vector(beam, row)
+                          or [station_of_node(beam.mesh, int(k)) for k in loaded])
+        out.append(found)
+    return out
+
+
+def distributed(state: State, beam: Beam, unit: Any) -> tuple[list[Sampled], list[float]]:
+    """Densities of force elements that act all along a beam, and the stations of other parts.
+
+    Parameters
+    ----------
+    state, unit
+        As for :func:`recover`.
+    beam
+        The beam.
+
+    Raises
+    ------
+    NotRecovered
+        If a force element does not say where it acts.
+    """
+    system = state.system
+    sampled: list[Sampled] = []
+    places: list[float] = []
+    elements = [e for e in system.forces.elements if e.distributed]
+    if not elements:
+        return sampled, places
+    force = -(system.part_forces(state.u, state.v) if state.base is None else unit
+              * system.small_part_forces(state.base.u, state.u - state.base.u, state.load))
+    for element in elements:
+        if element.along is None:
+            raise NotRecovered(f"how {element!r} acts along the beam is not known to it")
+        where, facets, at = element.along
+        if where is not beam:
+            continue
+        places += at
+        rows = system.forces.rows_of(element)
+        for group in facets:
+            w = np.linalg.solve(np.vander(group.xi, increasing=True).T,
+                                1.0 / np.arange(1, len(group.xi) + 1))  # of its own rule
+            values = force[:, rows[len(w) * group.chosen[:, None] + np.arange(len(w))]] / w
+            sampled.append(Sampled(group.where, group.elements, group.xi, values))
+    return sampled, places
+
+
+def recover(state: State, number: int, at: list[float], u: Array,
+            unit: Any) -> Recovery | NotRecovered:
+    """The recovered field of one beam, or why there is none.
+
+    Parameters
+    ----------
+    state
+        The state.
+    number
+        The number of the beam.
+    at
+        Its :func:`stations`.
+    u
+        Displacement of its coordinates, shape (N,): of a linear solution a step.
+    unit
+        What factors of loads are times: a step where all is linear about the reference
+        configuration, else 1.
+    """
+    beam, system = state.beams[number], state.system
+    if state.base is not None and not np.iscomplexobj(unit):
+        return NotRecovered("it is linearised about a state that is not free of load, a mode of "
+                            "it: its strain and stress are those of the elements")
+    s = system.of(beam)
+    try:
+        loads: list[Any] = [
+            (unit * state.load * load.factor(state.t),
+             load.spread((state if state.base is None else state.base).u_of(number)))
+            for load in system.loads if load.beam is beam]
+        sampled, places = distributed(state, beam, unit)
+        acceleration = viscous = None
+        if state.acceleration is not None:
+            acceleration = unit * (
+                state.acceleration + system.damping_acceleration(state.v))[s]
+        time = system.retardation[number]
+        if state.t is not None and time:
+            viscous = viscous_forces(beam, state.u[s], state.v[s], time)
+        with np.errstate(all="ignore"):
+            return Recovery(SectionForces(beam, u, loads, [*at, *places], acceleration, sampled,
+                                          viscous), u)
+    except NotRecovered as why:
+        return why
