@@ -687,9 +687,6 @@ for _name in ("displacement", "position", "velocity", "strain", "stress", "resul
 call("frame.sensor, line", lambda **k: frame().clamp(0).sensor("s", "N", **k),
      dict(at=(0.0, 0.5), line=0), at="vector", line="nodes?")
 call("state.recovery", lambda **k: state().recovery(**k), dict(beam=0), beam="beam?")
-for _name in ("balance", "eigenstrains"):
-    call(f"state.{_name}", lambda _name=_name, **k: getattr(state(), _name)(**k), dict(beam=0),
-         beam="beam?")
 call("scene.state", lambda **k: loaded_once().state(**k),
      dict(u=np.zeros(beam().N), multipliers=None, load=1.0),
      {"multipliers": {"[]": "there are none"}}, u="other?", multipliers="other?", load="number")

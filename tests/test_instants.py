@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
+                        MeshBeam, Scene, StVenantKirchhoff)
 from skfem_ancf.recovery.section_forces import SectionForces
 
 pytestmark = pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # few elements

@@ -173,7 +173,7 @@ class Run:
         self.size = 1e-4 * task.span if task.dt is None else task.dt
         self.history = History(system, scheme, self)
         self._turns = self.history._turns
-        self.recorder = Recorder(sensors, system, self.history.instants)
+        self.recorder = Recorder(sensors, system, self.history.instant)
         self.y: Any = None
         self.longest: int | None = None
         self.until: Callable[[State], float] | None = None

@@ -14,7 +14,7 @@ from ..actions.joints.base import Joint
 from .base import recalled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from ..beam.points import Located
     from ..results.state import State
@@ -184,13 +184,13 @@ class Recorder:
         Pairs of name and :class:`Sensor`.
     system
         What is integrated.
-    states_of
+    state_of
         Makes States of Motions, one after the other.
     """
 
     def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
-                 states_of: Callable[[Sequence[Motion]], Iterable[State]]) -> None:
-        self.sensors, self._system, self._states_of = list(sensors), system, states_of
+                 state_of: Callable[[Motion], State]) -> None:
+        self.sensors, self._system, self._state_of = list(sensors), system, state_of
         self._located: list[Any] = [locate(sensor, system) for _, sensor in self.sensors]
         self._t: list[Array] = []
         self._read: list[list[Array]] = [[] for _ in self.sensors]
@@ -202,7 +202,7 @@ class Recorder:
         others: dict[int, list[Any]] = {k: [] for k, (_, sensor) in enumerate(self.sensors)
                                         if not sensor.moving}
         if others:
-            for state in self._states_of(steps):
+            for state in map(self._state_of, steps):
                 for k, values in others.items():
                     values.append(self.sensors[k][1].read(self._located[k], state))
         self._t.append(np.array([y.t for y in steps]))
@@ -241,7 +241,7 @@ class Recorder:
         y
             An instant.
         """
-        now = Recorder(self.sensors, self._system, self._states_of)
+        now = Recorder(self.sensors, self._system, self._state_of)
         now.record([y])
         for found, (one,) in zip(self._read, now._read):
             recalled({"sensor": found[0]}, "sensor", (len(self._t[0]), *one.shape[1:]),

@@ -24,8 +24,6 @@ from ..beam.distribution import AXIS, BODY, SNAP, station_of_node
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike
-
     from ..beam.beam import Beam
     from ..mesh.mapping import MappingBeam
     from ..beam.distribution import Sampled
@@ -65,10 +63,10 @@ class ArcLength:
         self._inside = chebint(series, lbnd=-1.0, scl=0.5).T
         self.nodes = np.append(0.0, np.cumsum(speed @ w))
 
-    def at(self, e: ArrayLike, xi: ArrayLike) -> Array:
+    def at(self, e: Array, xi: Array) -> Array:
         """That of places xi of elements e, both of shape (n,)."""
         return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
-            2.0 * np.asarray(xi) - 1.0, ALONG), self._inside[e])
+            2.0 * xi - 1.0, ALONG), self._inside[e])
 
 
 class Sections:

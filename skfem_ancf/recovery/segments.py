@@ -1,4 +1,4 @@
-"""The recovered field of one axial segment: steps 2 to 4 of :mod:`skfem_ancf.recovery.recovered`."""
+"""The field of one axial segment: steps 2 to 4 of :mod:`skfem_ancf.recovery.recovered`."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Segment:
         self._solve()
 
     def _sections(self, start, end):
-        """Places of the sections in their elements, and the side from which their force is taken."""
+        """Places of the sections in their elements, and the side that their force is taken from."""
         e = np.arange(int(np.floor(start)), int(np.ceil(end)))
         a, b = np.maximum(start - e, 0.0), np.minimum(end - e, 1.0)
         far = b - a > CLOSE

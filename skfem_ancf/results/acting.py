@@ -12,12 +12,11 @@ from ..recovery.section_forces import NotRecovered, SectionForces, viscous_force
 from ..beam.distribution import Sampled, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
-    from .state import State
     from ..beam.beam import Beam
     from ..core.types import Array
 
 
-def stations(state: State) -> list[list[float]]:
+def stations(state: Any) -> list[list[float]]:
     """Where supports and joints act on each beam: axial coordinates element + xi, a list a beam."""
     system = state.system
     fixed = np.zeros(system.N, dtype=bool)
@@ -43,7 +42,7 @@ def stations(state: State) -> list[list[float]]:
     return out
 
 
-def distributed(state: State, beam: Beam, unit: Any) -> tuple[list[Sampled], list[float]]:
+def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[float]]:
     """Densities of force elements that act all along a beam, and the stations of other parts.
 
     Parameters
@@ -82,7 +81,7 @@ def distributed(state: State, beam: Beam, unit: Any) -> tuple[list[Sampled], lis
     return sampled, places
 
 
-def recover(state: State, number: int, at: list[float], u: Array,
+def recover(state: Any, number: int, at: list[float], u: Array,
             unit: Any) -> Recovery | NotRecovered:
     """The recovered field of one beam, or why there is none.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from ..materials import LinearLaw
 if TYPE_CHECKING:
 
     from ..beam.beam import Beam
-    from .state import State
     from ..core.types import Array
 
 #: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
@@ -67,7 +66,7 @@ class Checks:
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
-def check(state: State) -> Checks:
+def check(state: Any) -> Checks:
     """The :class:`Checks` of a state."""
     values, found = [], []
     for beam in state.beams:
@@ -82,7 +81,7 @@ def check(state: State) -> Checks:
                   tuple(found))
 
 
-def warn_of(state: State) -> None:
+def warn_of(state: Any) -> None:
     """Give a :class:`~skfem_ancf.core.errors.ModelWarning` for each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
         warn(text, ModelWarning)

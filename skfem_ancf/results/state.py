@@ -68,7 +68,9 @@ class State(Immutable, MaterialPoints):
     ----------
     system
         The :class:`~skfem_ancf.equations.system.System` of the scene.
-    u, load, converged, iterations, message, steps, multipliers, t, acceleration, doubt, memory, base
+    u, load, multipliers, t, acceleration, memory, base
+        As in the attributes.
+    converged, iterations, message, steps, doubt
         As in the attributes.
     force
         Internal force there, shape (N,), or None: it is computed when asked for.
@@ -232,7 +234,7 @@ class State(Immutable, MaterialPoints):
         return np.concatenate([b.q0 for b in self.system.members]) + self.u
 
     @property
-    def v(self) -> Array:
+    def v(self) -> Array:  # type: ignore[override]
         """Velocity of the coordinates, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
@@ -477,10 +479,10 @@ class State(Immutable, MaterialPoints):
             if line is not None:
                 beam, chain = self.system.points.chain_of(line, beam)
             k = self.beams.index(select_beam(self.beams, beam))
-        beam = self.beams[k]
-        values = resultants(beam, self._places_of(beam),
+        of = self.beams[k]
+        values = resultants(of, self._places_of(of),
                             self._recovery_of(k, fields=False) if recover else None,
-                            self._eigenstrains(beam), places, chain)
+                            self._eigenstrains(of), places, chain)
         return values.first() if one else values
 
     # of the whole
@@ -601,7 +603,7 @@ class State(Immutable, MaterialPoints):
         filename
             Path that ends with .vtu.
         **options
-            Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
+            Those of that function.
 
         Returns
         -------
@@ -613,25 +615,55 @@ class State(Immutable, MaterialPoints):
         return save_vtu(self, filename, **options)
 
     def to_pyvista(self, **options: Any) -> Any:
-        """The body as a grid of pyvista; see :func:`skfem_ancf.visuals.pyvista.to_pyvista`."""
+        """The body as a grid of pyvista; see :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
+
+        Parameters
+        ----------
+        **options
+            Those of that function.
+        """
         from ..visuals.pyvista import to_pyvista
 
         return to_pyvista(self, **options)
 
     def view(self, field: Any = "eps_yy", **options: Any) -> Any:
-        """Put the body into a plotter of pyvista; see :func:`skfem_ancf.visuals.pyvista.view`."""
+        """Put the body into a plotter of pyvista; see :func:`skfem_ancf.visuals.pyvista.view`.
+
+        Parameters
+        ----------
+        field
+            What it is coloured by.
+        **options
+            Those of that function.
+        """
         from ..visuals.pyvista import view
 
         return view(self, field, **options)
 
     def plot_resultants(self, beam: WhichBeam = None, **options: Any) -> Any:
-        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`."""
+        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`.
+
+        Parameters
+        ----------
+        beam
+            The beam, its name or its number.
+        **options
+            Those of that function.
+        """
         from ..visuals.diagrams import plot_resultants
 
         return plot_resultants(self, beam, **options)
 
     def plot(self, field: str = "eps_yy", **options: Any) -> Any:
-        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""
+        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+
+        Parameters
+        ----------
+        field
+            What it is coloured by.
+        **options
+            Those of that function.
+        """
         from ..visuals.matplotlib import plot_state
 
         return plot_state(self, field, **options)
