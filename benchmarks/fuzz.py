@@ -201,7 +201,7 @@ class Body:
                                                                        beam.material)]
 
     def _gradients(self, X, W):
-        basis = Basis(self.beam.mesh, self.beam.vector_element, quadrature=(X, W))
+        basis = Basis(self.beam.mesh, self.beam.basis.elem, quadrature=(X, W))
         # of the first component of the vector element: the scalar functions
         grad = np.array([basis.basis[k][0].grad[0] for k in range(0, basis.Nbfun, 2)])
         frame = self.beam.mesh.mapping().frame(X)

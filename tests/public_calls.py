@@ -385,16 +385,11 @@ call("Beam", Beam, whole, mesh="other", element="other", material="other", width
 call("Beam, auto", Beam, {**whole, "element": "auto", "fields": "S_xx", "tolerance": 1e-3},
      fields="fields", tolerance="positive")
 call("Beam, damped", Beam, {**whole, "damping": KelvinVoigt(1e-3)}, damping="other?")
-call("beam.with_mesh", lambda **k: beam().with_mesh(**k), dict(mesh=mesh()), mesh="other")
-call("beam.nodes", lambda **k: beam().nodes(**k), dict(boundary="left"), boundary="facets")
 call("beam.dofs", lambda **k: beam().dofs(**k), dict(boundary="left", names=["r^1"]),
      boundary="facets", names="coordinates?")
-call("beam.locate", lambda **k: beam().locate(**k), dict(point=(0.5, 0.0)), point="vector")
 call("beam.probe", lambda **k: beam().probe(**k), dict(point=(0.5, 0.0)), point="vector")
 call("beam.facet_basis", lambda **k: beam().facet_basis(**k), dict(facets="top", intorder=2),
      {"intorder": {"0": "a rule of degree 0"}}, facets="facets", intorder="count?")
-call("beam.section_node", lambda **k: beam().section_node(**k), dict(boundary="left"),
-     boundary="facets")
 at = dict(u=np.zeros(beam().N), X=np.array([[0.5], [0.5]]), tind=np.array([0]))
 for _name in ("strain", "stress", "displacements", "gradients"):
     call(f"beam.{_name}", lambda _name=_name, **k: getattr(beam(), _name)(**k), at,

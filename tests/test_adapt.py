@@ -97,14 +97,14 @@ def test_scene_is_put_on_other_beams():
     scene = Scene(left, right).clamp("left", beam="left").gravity((0, -1))
     scene.joint("weld", beams=(left, right), at=("right", "left"))
     scene.point_force((0, -0.1), at=(2, 0), beam=right).fix("right", ["r^1"], beam=1)
-    again = scene.with_beams([b.with_mesh(b.mesh.refined(3)) for b in scene.beams])
+    again = scene.with_beams([b.replace(mesh=b.mesh.refined(3)) for b in scene.beams])
     assert (len(again.loads), len(again.joints)) == (3, 1) and again.system.constraints.m == 3
     a, b = scene.solve_linear(), again.solve_linear()
     assert_allclose(b.displacement((2, 0), "right"), a.displacement((2, 0), "right"), rtol=0.1,
                     atol=1e-12)
     numbered = Scene(left).clamp(np.array([0]))
     with pytest.raises(InputError, match="names or functions"):
-        numbered.with_beams([left.with_mesh(left.mesh.refined())])
+        numbered.with_beams([left.replace(mesh=left.mesh.refined())])
 
 
 # the degree
@@ -162,7 +162,7 @@ def test_beams_are_refined_one_by_one():
     assert {r.kind for r in state.refinements if r.beam == 1} == {"split"}
     assert state.beams[0].element.axis_degree > 5
     assert 2 * state.beams[0].mesh.nelements < state.beams[1].mesh.nelements
-    fine = Scene(*(b.with_mesh(b.mesh.refined(k)) for b, k in zip((smooth, rough), (3, 6))))
+    fine = Scene(*(b.replace(mesh=b.mesh.refined(k)) for b, k in zip((smooth, rough), (3, 6))))
     fine.clamp("left", beam=0).gravity((0, -3.0)).joint("weld", beams=(0, 1), at=("right", "left"))
     assert_allclose(state.displacement((1, 0), 1), fine.solve_static().displacement((1, 0), 1),
                     atol=1e-4)

@@ -419,7 +419,7 @@ def test_finer_meshes_keep_the_bodies():
     state = scene.solve_static(adapt=1e-3)
     assert state.beams[0].mesh.nelements > 3
     fine = MeshBeam.init_line(np.linspace(0, 1, 49), 0.05)
-    fine = scene.with_beams([scene.beams[0].with_mesh(fine)]).solve_static()
+    fine = scene.with_beams([scene.beams[0].replace(mesh=fine)]).solve_static()
     assert_allclose(state.angle("crank"), fine.angle("crank"), rtol=3e-3)
     assert state.error_estimate["displacement"] <= 1e-3
 

@@ -25,6 +25,7 @@ from skfem_ancf.core.quadrature import gauss, tensor
 from skfem_ancf.beam.distribution import BODY, Sampled
 from skfem_ancf.solvers import newton
 from skfem_ancf.solvers.tracing import Tracer
+from skfem_ancf.beam.interpolation import locate
 from skfem_ancf.mesh.taper import PLACES, halved
 
 STEEL = StVenantKirchhoff(1e6, 0.3, 1.0)
@@ -58,11 +59,11 @@ def test_energy_of_split_strains(name, element, mesh):
     D = STEEL.law(STEEL.shear_factor(element)).D
     D0 = np.diag([STEEL.E, STEEL.E, D[2, 2]])
     X, W = tensor(gauss(5), gauss(2 * element.order + 1))
-    body = Basis(beam.mesh, beam.vector_element, quadrature=(X, W))
-    axis = Basis(beam.mesh, beam.vector_element, quadrature=(X * [[1], [0]] + [[0], [0.5]], W))
+    body = Basis(beam.mesh, beam.basis.elem, quadrature=(X, W))
+    axis = Basis(beam.mesh, beam.basis.elem, quadrature=(X * [[1], [0]] + [[0], [0.5]], W))
     # the axis' part is an integral along the axis, times h b
     rule = tensor(gauss(5), (np.array([0.5]), np.ones(1)))
-    thin = Basis(beam.mesh, beam.vector_element, quadrature=rule)
+    thin = Basis(beam.mesh, beam.basis.elem, quadrature=rule)
     q = beam.q0 + 0.05 * np.random.default_rng(3).standard_normal(beam.N)
 
     def strain(basis):
@@ -92,7 +93,7 @@ def test_energy_of_split_strains(name, element, mesh):
 def test_full_quadrature_is_exact(element):
     """The energy of any displacement, against scikit-fem with 12 by 12 points an element."""
     beam = Beam(line(2), element, STEEL, 0.3, "continuum")
-    basis = Basis(beam.mesh, beam.vector_element, quadrature=tensor(gauss(12), gauss(12)))
+    basis = Basis(beam.mesh, beam.basis.elem, quadrature=tensor(gauss(12), gauss(12)))
     q = beam.q0 + 0.2 * np.random.default_rng(3).standard_normal(beam.N)
     energy = asm(forms.energy(STEEL, 0.3, STEEL.shear_factor(element)), basis, r=q)
     assert beam.kernel.energy(q - beam.q0) == pytest.approx(energy, rel=1e-12)
@@ -224,7 +225,7 @@ def test_points_off_the_axis_are_found_in_their_element(mesh):
         xi = rng.uniform(0.02, 0.98, 2)
         for X in ((xi[0], 0.03), (xi[1], 0.97)):
             x = beam.mesh.mapping().F(np.array(X)[:, None, None], np.array([e]))[:, 0, 0]
-            found, where = beam.locate(x)
+            found, where = locate(beam, x)
             assert found == e
             assert_allclose(where, X, rtol=0, atol=1e-9)
 

@@ -104,7 +104,7 @@ def test_a_point_is_where_it_says():
 def test_a_point_is_the_same_on_a_finer_mesh():
     scene = Scene(beam()).pin((0, 0)).pin((1, 0)).pin((2, 0)).gravity((0, -9.81))
     scene.moment((1, 0), 3.0)
-    fine = scene.with_beams([b.with_mesh(b.mesh.refined()) for b in scene.beams])
+    fine = scene.with_beams([b.replace(mesh=b.mesh.refined()) for b in scene.beams])
     assert {k for k, _ in fine._fixed} == {0} and len(fine.system.constraints.fixed) == 6
     assert fine.loads[1].node == 4
     with pytest.raises(MeshError, match="on no section"):
@@ -163,7 +163,7 @@ def test_welds_meet():
         with pytest.raises(InputError, match="needs the section of each"):
             scene.joint("weld", beams=("a", "b"), at=wrong)
     assert scene.joints == ()
-    moved = b.with_mesh(b.mesh.translated((-0.5, 0)))
+    moved = b.replace(mesh=b.mesh.translated((-0.5, 0)))
     for at in (("right", "left"), (2, 0), ((2, 0), "left")):
         joined = Scene(a, moved).clamp("left", beam="a").gravity((0, -9.81))
         joined.joint("weld", beams=(a, moved), at=at)

@@ -52,7 +52,7 @@ def test_forces_on_surfaces_are_those_of_the_forms(body, element):
 def test_points_of_surfaces_have_areas_and_normals(body):
     beam = Beam(BODIES[body](), ElementBeamANCF(2), LAW, 0.3)
     for place in PLACES:
-        basis, found = beam.facet_basis(place), surfaces_of(beam, place, beam.facet_points)
+        basis, found = beam.facet_basis(place), surfaces_of(beam, place, beam.element.facet_points)
         total = sum(one.areas.sum() for one in found)
         assert total == pytest.approx(0.3 * basis.dx.sum(), rel=1e-13)
         both = sum(np.einsum("ifp,fp->i", one.normals, one.areas) for one in found)

@@ -12,6 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         StVenantKirchhoff)
 from skfem_ancf.core.errors import CallbackError
 from skfem_ancf.core.quadrature import gauss
+from skfem_ancf.beam.interpolation import locate
 from skfem_ancf.scene.adapt import refine
 
 ELEMENTS = {"order 1": ElementBeamANCF(1), "order 2": ElementBeamANCF(2),
@@ -208,7 +209,7 @@ def test_points_are_found_and_meshes_refined(mesh):
     x = mesh.mapping().F(X[:, :, None], e)[..., 0]
     assert_allclose(mesh.mapping().invF(x[:, :, None], e)[..., 0], X, atol=1e-9)
     beam = Beam(mesh, ElementBeamANCF(2), STEEL, width=0.1)
-    assert_allclose([beam.locate(p)[0] for p in x.T], e)
+    assert_allclose([locate(beam, p)[0] for p in x.T], e)
     fine = mesh.refined()
     s = fine.s[fine.t]
     function = taper if mesh.is_straight else circle

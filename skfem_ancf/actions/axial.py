@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..beam.interpolation import probe
 from ..core.errors import ask_field, require_finite
 from ..beam.kernels.section import beam_gradients
 from .loads import DeadLoad, Load
@@ -64,10 +65,10 @@ class FollowerForce(Load):
         if isinstance(beam, RigidBody):
             bound._dofs, weights = beam.probe(self.at)
             bound._stations, bound._start = (), beam.q0[2:]
-            bound._along, bound._slopes = beam.section_direction(0)
+            bound._along, bound._slopes = beam.direction()
         else:
             e, X = _place(beam, self.at, self.line)
-            bound._dofs, weights = beam.probe_at(self.at, e, X)
+            bound._dofs, weights = probe(beam, self.at, (e, X))
             bound._stations, bound._along = (e + float(X[0]),), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
                                            np.array([e]))

@@ -18,7 +18,7 @@ from scipy import sparse
 from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from ..formulations import COMPONENTS
 from .nonlinear_eigenstrain import energy_lost, sampled, unmatched
-from ..beam.kernels.along import stretched
+from ..beam.strains import on_grid, strain_at, stretched
 from ..beam.kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from ..beam.kernels.law import LINEAR
 from ..beam.kernels.section import linearised
@@ -238,14 +238,13 @@ class EigenStrain(Load):
         """
         beam, E0 = self.beam, self.strain_at(X, e)
         if not beam.has_sections:
-            stretch, _ = stretched(beam.kinematics.strain(beam, u, X, e)[0])
+            stretch, _ = stretched(on_grid(strain_at, beam, u, X, e)[0])
             return self.nominal_at(X, e, factor) / stretch
         which = np.broadcast_to(beam.across.which(X, e), E0.shape[1:])
         for k, slab in enumerate(beam.across.slabs):  # what acts on the elements
             E0[1] -= np.where(which == k, unmatched(beam, self, slab, X, e), 0.0)
-        E = beam.kinematics.strain(beam, u, X, e) if self.grows else 0.0 * factor * E0
-        laws = [partial(stress_of, layer.material.law(layer.material.shear_factor(layer.element)))
-                for layer in beam.layers]
+        E = on_grid(strain_at, beam, u, X, e) if self.grows else 0.0 * factor * E0
+        laws = [partial(stress_of, layer.law) for layer in beam.layers]
         return beam.across.of_slabs(
             X, E, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
 

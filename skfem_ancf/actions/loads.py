@@ -20,6 +20,9 @@ from skfem.assembly import FacetBasis, LinearForm, asm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
+from ..beam.kinematics import direction
+from ..mesh.places import node_of
+from ..beam.interpolation import locate, probe
 from ..beam.beam import Beam
 from ..core.errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_function, require_slope, shown,
@@ -399,13 +402,9 @@ class PointForce(Load):
             dofs, weights = beam.probe(self.at)
             np.add.at(vector, dofs, self.total[:, None] * weights)
             return DeadLoad(beam, vector, self.amplitude)
-        e, X = beam.locate(self.at)
-        first = beam.first_of_node(e, *X.tolist())
-        if first < 0:
-            dofs, weights = beam.probe_at(self.at, e, X)
-            vector[dofs] = self.total[:, None] * weights  # those of an element, each once
-        else:
-            vector[first:first + 2] = self.total
+        e, X = locate(beam, self.at)
+        dofs, weights = probe(beam, self.at, (e, X))
+        vector[dofs] = self.total[:, None] * weights  # those of an element, each once
         return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
 
 
@@ -430,7 +429,7 @@ class Traction(Load):
 
     def bind(self, beam: Beam) -> Load:
         t, vector, mapping = self.t, np.zeros(beam.N), beam.mesh.mapping()
-        found = surfaces_of(beam, self.boundary, 7 if callable(t) else beam.facet_points)
+        found = surfaces_of(beam, self.boundary, 7 if callable(t) else beam.element.facet_points)
         forces: list[Array] = []
         for one in found:
             density = ask_field("t(x)", t, mapping.F(one.X, one.elements)) if callable(t) else (
@@ -656,7 +655,7 @@ class Pressure(Load):
 def _follower(beam, facets, p):
     """The force of a pressure over the position, ``-n da`` being its derivative, turned; sparse."""
     mesh, nd, row, column, value = beam.mesh, beam.nd, [], [], []
-    for one in surfaces_of(beam, facets, beam.facet_points):
+    for one in surfaces_of(beam, facets, beam.element.facet_points):
         functions, grad = beam.element.functions(mesh.mapping(), one.X, one.elements)
         slopes = grad[:, 0] * one.along[0] + grad[:, 1] * one.along[1]
         both = p * np.einsum("iep,jep,ep->eij", functions, slopes, one.weights)
@@ -703,8 +702,12 @@ class EndMoment(Load):
         self.M, self.boundary, self.couple = M, boundary, couple
         if isinstance(boundary, (int, np.integer)):
             self.boundary = np.array([boundary])
-        self.node = beam.section_node(cast("Place", self.boundary))
-        self.dofs, self.c = beam.section_direction(self.node)
+        if isinstance(beam, RigidBody):
+            beam.dofs(self.boundary)  # raises MeshError unless it is a place
+            self.node, (self.dofs, self.c) = 0, beam.direction()
+        else:
+            self.node = node_of(beam.mesh, cast("Place", self.boundary))
+            self.dofs, self.c = direction(beam, self.node)
 
     def bind(self, beam: Beam) -> Load:
         if beam is self.beam:

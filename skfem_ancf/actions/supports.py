@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..mesh.places import node_of
 from ..core.errors import InputError, SupportError
 from ..mesh.places import is_point
 
@@ -75,7 +76,7 @@ class Support:
 
     def _require_on_axis(self, beam: Beam) -> None:
         x = np.asarray(self.boundary, dtype=float)
-        axis = np.round(beam.mesh.p[:, beam.section_node(self.boundary)], 12) + 0.0
+        axis = np.round(beam.mesh.p[:, node_of(beam.mesh, self.boundary)], 12) + 0.0
         if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
             raise InputError(
                 f"pin holds the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "

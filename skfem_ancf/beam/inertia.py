@@ -8,13 +8,13 @@ import numpy as np
 
 from ..core.linalg import BandMatrix
 from ..mesh.mapping import cross
-from ..core.quadrature import gauss, product_rule
+from ..core.quadrature import gauss, product_rule, tensor
+from ..formulations.ecm import AXIS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .interior import Interior
-    from ..core.types import Array
+    from ..core.types import Array, Rule
 
 #: Points along an element more, where the height is a cubic or something varies.
 MORE = 4
@@ -47,13 +47,7 @@ class Inertia(NamedTuple):
     moments: Any = None
 
     def matrices(self, elements: Any) -> Array:
-        """Mass matrices, shape (n, 2 nb, 2 nb).
-
-        Parameters
-        ----------
-        elements
-            A slice.
-        """
+        """Mass matrices of a slice of the elements, shape (n, 2 nb, 2 nb)."""
         N, m = self.functions[:, elements], self.mass[elements]
         size = 2 * len(N)
 
@@ -69,13 +63,7 @@ class Inertia(NamedTuple):
         return out
 
     def weights(self, g: Array) -> Array:
-        """Forces of an acceleration, shape (nelements, nb, 2).
-
-        Parameters
-        ----------
-        g
-            Acceleration, shape (2,).
-        """
+        """Forces of an acceleration g (2,), shape (nelements, nb, 2)."""
         out = np.einsum("iep,ep->ei", self.functions, self.mass)[:, :, None] * g
         if self.slopes is not None:
             out = out + np.einsum("iep,ep->ei", self.slopes, self.moments[0])[:, :, None] * (
@@ -83,53 +71,39 @@ class Inertia(NamedTuple):
         return out
 
 
-def points_along(beam: Interior) -> int:
-    """Gauss points along an element for products of two coordinates.
+def exact_rule(beam: Any) -> Rule:
+    """Points (2, n) and weights (n,), exact for products of two degrees of freedom."""
+    n = beam.element.axis_degree + 1 + (0 if beam.mesh.is_straight else 1)
+    return tensor(gauss(n), gauss(beam.element.order + 1) if beam.has_sections else AXIS)
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    """
+
+def points_along(beam: Any) -> int:
+    """Gauss points along an element for products of two degrees of freedom."""
     more = (0 if beam.mesh.is_straight else 1) + (0 if beam.across.constant else MORE)
     return beam.element.axis_degree + 1 + more
 
 
-def of_sections(beam: Interior, times: str = "density") -> Inertia:
-    """The Inertia of a beam with sections, of their full height between nodes too.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    times
-        "" for volumes in place of masses.
-    """
+def inertia_of(beam: Any) -> Inertia:
+    """The Inertia of a beam, of sections of their full height between nodes too."""
+    if not beam.has_sections:
+        return _of_cable(beam)
     across, axis = beam.across, gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     parts = []
     for slab, rule in across.rules(beam.element.order + 1, inertia=True):
         X, W = product_rule(axis, rule)
         parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
-                      across.volume(slab, X, W, tind, times=times, full=True)))
+                      across.volume(slab, X, W, tind, times="density", full=True)))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 
-def of_cable(beam: Interior) -> Inertia:
-    """The Inertia of a cable; without that of turning if its section is a plain rectangle.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    """
+def _of_cable(beam):
+    """The Inertia of a cable; without that of turning if its section is a plain rectangle."""
     across, mapping = beam.across, beam.mesh.mapping()
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
     N, d_xi = beam.element.along(mapping, X, tind)
-    if across.simple and across.uniform:
-        return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
     eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
     J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
     # the length of the axis: directors that are interpolated between nodes are shorter than one
@@ -143,23 +117,18 @@ def of_cable(beam: Interior) -> Inertia:
     return Inertia(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
 
-def projected(beam: Interior, field: Callable[[Array], Array]) -> Array:
-    """Rates of the coordinates whose velocity is nearest to a field, in the mean over the body.
+def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
+    """Rates (N,) of the degrees of freedom whose velocity is nearest to a field, in the mean.
 
     Parameters
     ----------
     beam
         A :class:`~skfem_ancf.Beam`.
     field
-        Takes points of the stress-free body, shape (2, nelements, npoints), and returns its
+        Takes points of the reference configuration, shape (2, nelements, npoints), and returns its
         components there.
-
-    Returns
-    -------
-    ndarray
-        Shape (N,).
     """
-    X, W = beam.exact_rule()
+    X, W = exact_rule(beam)
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
     N = element.values(mapping, X).transpose(1, 0, 2)
     weighted, back = N * (mapping.full_volume(X) * W)[:, None], N.transpose(0, 2, 1)

@@ -1,13 +1,15 @@
-"""Many points of one beam or rigid body: what their coordinates weigh there."""
+"""Points of beams and rigid bodies: what their degrees of freedom weigh there."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.kept import cached_property
+from ..mesh.places import as_point
+from .strains import strain_at, stress_at
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,30 +21,20 @@ if TYPE_CHECKING:
 ON_AXIS = 1e-12
 
 
-class Part:
-    """Points in one beam.
-
-    Parameters
-    ----------
-    beam, number, coordinates, index, e, X
-        As in the attributes.
+class BeamPoints:
+    """Points of one beam.
 
     Attributes
     ----------
     beam, number
         The beam and its number.
     coordinates : slice
-        Those of the beam in its scene.
+        Its degrees of freedom in the scene.
     index
-        Which of the points they are, (n,), or None for all.
+        Which of the points asked for they are, (n,), or None for all.
     e, X
         Elements (n,) and reference points (2, n).
-    n : int
-        How many.
     """
-
-    e: Array
-    X: Array
 
     def __init__(self, beam: Any, number: int, coordinates: slice, index: Array | None,
                  e: Array, X: Array) -> None:
@@ -57,7 +49,7 @@ class Part:
 
     @cached_property
     def start(self) -> Array:
-        """Positions in the stress-free body, (2, n)."""
+        """Positions in the reference configuration, (2, n)."""
         return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
 
     @cached_property
@@ -67,164 +59,108 @@ class Part:
 
     @cached_property
     def dofs(self) -> Array:
-        """Coordinates of the scene that move each point, (nb, 2, n)."""
-        beam = self.beam
-        first = self.coordinates.start + beam.mesh.t[0, self.e] * beam.nd
-        return first + np.arange(2 * beam.nd).reshape(-1, 2, 1)
-
-    def _table(self, which):
-        """The local functions, 0, or of a cable their derivatives by xi, 1: (nb, n)."""
-        beam, series = self.beam, self.beam.series
-        table = series.values(series.tables[which], self.X)
-        if beam.mesh.heights is not None:
-            table *= series.swollen(beam.mesh.mapping().relative_height(self.e, self.X[0])[0])
-        return table * beam.scales[self.e].T
+        """Degrees of freedom of the scene that move each point, (nb, 2, n)."""
+        first = self.coordinates.start + self.beam.mesh.t[0, self.e] * self.beam.nd
+        return first + np.arange(2 * self.beam.nd).reshape(-1, 2, 1)
 
     @cached_property
     def weights(self) -> Array:
-        """Of these coordinates in the position, (nb, n)."""
-        return self._table(0)
+        """Their weights in the position, (nb, n)."""
+        return self.beam.element.values(self.beam.mesh.mapping(), self.at, self.e)[..., 0]
 
     @cached_property
     def slopes(self) -> Array:
-        """Of these coordinates in the derivative of the position by xi, (nb, n)."""
-        return self._table(1)
+        """Their weights in the derivative of the position by xi, (nb, n)."""
+        return self.beam.element.along(self.beam.mesh.mapping(), self.at, self.e)[1][..., 0]
 
     def combine(self, weights: Array, u: Array) -> Array:
-        """The sum of weighted coordinates of the scene at each point.
-
-        Parameters
-        ----------
-        weights
-            Shape (nb, n).
-        u
-            Coordinates of the scene, or their rates, shape (..., N).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 2, n).
-        """
+        """The sum (..., 2, n) of weighted degrees of freedom (..., N) at each point."""
         return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
 
-    def _moving(self, u):
-        """Position and slope of changes u (..., N) of the coordinates, four components."""
-        return (*np.moveaxis(self.combine(self.weights, u), -2, 0),
-                *np.moveaxis(self.combine(self.slopes, u), -2, 0))
-
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2, n) for coordinates ``u`` (..., N) of the scene."""
+        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
+        moved = self.combine(self.weights, u)
         if not self.off_axis:
-            return self.combine(self.weights, u)
-        return np.stack(carried(self._levers, *self._moving(u)), -2)
+            return moved
+        before, now = self._tangents(u)
+        turn = now / _length(now) - before / _length(before)
+        return moved + self._lever * np.stack([-turn[..., 1, :], turn[..., 0, :]], -2)
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n).
-
-        Parameters
-        ----------
-        u, v
-            Displacement of the coordinates of the scene and its rate, shapes (..., N).
-        """
+        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
+        moved = self.combine(self.weights, v)
         if not self.off_axis:
-            return self.combine(self.weights, v)
-        slope = np.moveaxis(self.combine(self.slopes, u), -2, 0)
-        return np.stack(swung(self._levers, *slope, *self._moving(v)), -2)
+            return moved
+        a, rate = self._tangents(u)[1], self.combine(self.slopes, v)
+        turn = (a[..., 0, :] * rate[..., 1, :] - a[..., 1, :] * rate[..., 0, :])[..., None, :]
+        return moved - self._lever * turn / _length(a) ** 3 * a
 
-    def strain(self, u: Array) -> Array:
-        """The strain of the elements (eps_xx, eps_yy, 2 eps_xy), shape (3, n).
-
-        Parameters
-        ----------
-        u
-            Coordinates of the scene, shape (N,).
-        """
-        beam = self.beam
-        return beam.kinematics.strain_at(beam, u[self.coordinates], self.e, self.X)
-
-    def stress(self, u: Array) -> Array:
-        """The stress of the elements (S_xx, S_yy, S_xy), shape (3, n).
-
-        Parameters
-        ----------
-        u
-            Coordinates of the scene, shape (N,).
-        """
-        beam, strain = self.beam, self.strain(u)
-        if len(beam.across.slabs) == 1:
-            return self._stress(strain, u, slice(None))
-        which = beam.across.which(self.at, self.e)
-        for k in range(len(beam.across.slabs)):
-            on = np.nonzero(which == k)[0]
-            strain[:, on] = self._stress(strain, u, on)
-        return strain
-
-    def _stress(self, strain, u, on):
-        """That of some of the points, all of one slab."""
-        beam = self.beam
-        return beam.kinematics.stress(beam, strain[:, on, None], u[self.coordinates],
-                                      self.at[:, on], self.e[on])[..., 0]
+    def _tangents(self, u):
+        """Derivatives of the axis by xi before and after a displacement, (..., 2, n)."""
+        start, q0 = self.coordinates.start, self.beam.q0_local
+        before = sum(w * q0[d - start] for w, d in zip(self.slopes, self.dofs))
+        return before, before + self.combine(self.slopes, u)
 
     @cached_property
-    def _levers(self):
-        """Of points off the axis their distance from it, and its slope where there is no stress."""
-        lever = np.ravel(self.beam.mesh.mapping().offset(self.at, self.e))
-        start, q0 = self.coordinates.start, self.beam.q0_local
-        return (lever, *sum(w * q0[d - start] for w, d in zip(self.slopes, self.dofs)))
+    def _lever(self):
+        return np.ravel(self.beam.mesh.mapping().offset(self.at, self.e))
+
+    def strain(self, u: Array) -> Array:
+        """The strain of the elements, see :func:`~.strains.strain_at`, for ``u`` of the scene."""
+        return strain_at(self.beam, u[self.coordinates], self.e, self.X)
+
+    def stress(self, u: Array) -> Array:
+        """The stress of the elements, see :func:`~.strains.stress_at`, for ``u`` of the scene."""
+        return stress_at(self.beam, u[self.coordinates], self.e, self.X)
 
 
-def carried(section: Sequence[Any], x: Any, y: Any, ax: Any, ay: Any) -> tuple[Any, Any]:
-    """The displacement of points whose sections stay normal to an axis.
-
-    Parameters
-    ----------
-    section
-        The distance of the points from the axis, and both components of its derivative by xi where
-        there is no stress: numbers, or arrays (n,).
-    x, y, ax, ay
-        Displacement of the axis, and its derivative by xi: numbers, or arrays (..., n).
-    """
-    lever, bx, by = section
-    ax, ay = ax + bx, ay + by
-    size, size0 = (ax * ax + ay * ay) ** 0.5, (bx * bx + by * by) ** 0.5
-    return x - lever * (ay / size - by / size0), y + lever * (ax / size - bx / size0)
+def _length(a):
+    return (a[..., :1, :] ** 2 + a[..., 1:, :] ** 2) ** 0.5
 
 
-def swung(section: Sequence[Any], ax: Any, ay: Any, x: Any, y: Any, px: Any, py: Any
-          ) -> tuple[Any, Any]:
-    """The velocity of points whose sections stay normal to an axis.
+def locate(beam: Any, point: Any) -> tuple[int, Array]:
+    """The element of a material point, and its point (xi, eta) of the reference cell.
 
     Parameters
     ----------
-    section
-        As for :func:`carried`.
-    ax, ay
-        The derivative of the axis' displacement by xi: numbers, or arrays (..., n).
-    x, y, px, py
-        Velocity of the axis, and its derivative by xi.
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    point
+        Its place in the reference configuration, shape (2,), or the name of an end.
+
+    Raises
+    ------
+    MeshError
+        If the point is outside the body.
     """
-    lever, bx, by = section
-    ax, ay = ax + bx, ay + by
-    turn = lever * (ax * py - ay * px) / (ax * ax + ay * ay) ** 1.5
-    return x - turn * ax, y - turn * ay
+    x = as_point(point, beam.mesh)[:, None]
+    e, X, outside = beam.finder(x)
+    if outside[0] > beam.finder.allowed:
+        raise beam.finder.refuse(x, outside)
+    return int(e[0]), X[:, 0]
 
 
-class BodyPart:
-    """Points of one rigid body.
+def probe(beam: Any, point: Any, at: tuple[int, Array] | None = None) -> tuple[Array, Array]:
+    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`, of a point that :func:`locate` may know."""
+    e, X = locate(beam, point) if at is None else at
+    if not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed:
+        raise InputError(
+            f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
+            "position there is no linear function of its degrees of freedom: name a point of the "
+            "axis, and put a moment on an end section with scene.moment")
+    return probe_reference(beam, e, X)
 
-    Attributes
-    ----------
-    body
-        The :class:`~skfem_ancf.RigidBody`.
-    coordinates : slice
-        Those of the body in its scene.
-    index
-        Which of the points they are, (n,), or None for all.
-    start
-        Positions at the start, (2, n).
-    """
 
-    off_axis = False  # its points move linearly in its coordinates
+def probe_reference(beam: Any, e: int, X: Array) -> tuple[Array, Array]:
+    """As :func:`probe`, for a point (2,) of the reference cell of an element."""
+    one = BeamPoints(beam, 0, slice(0, beam.N), None, np.array([e]), np.reshape(X, (2, 1)))
+    return one.dofs[..., 0].T, one.weights[:, 0]
+
+
+class BodyPoints:
+    """Points of one rigid body; attributes as of :class:`BeamPoints`."""
+
+    off_axis = False  # its points move linearly in its degrees of freedom
 
     def __init__(self, body: RigidBody, coordinates: slice, index: Array | None,
                  start: Array) -> None:
@@ -232,19 +168,13 @@ class BodyPart:
         self._frame = body.local(start)
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2, n) for coordinates ``u`` (..., N) of the scene."""
+        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
         x, y, c, s = np.moveaxis(u[..., self.coordinates, None], -2, 0)
         a, b = self._frame
         return np.stack([x + a * c - b * s, y + a * s + b * c], axis=-2)
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n).
-
-        Parameters
-        ----------
-        u, v
-            Displacement of the coordinates of the scene and its rate, shapes (..., N).
-        """
+        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
         return self.displacement(v)
 
     @property
@@ -254,3 +184,41 @@ class BodyPart:
                          "of beams")
 
 
+class Located:
+    """Points of a scene.
+
+    Attributes
+    ----------
+    one : bool
+        They were given as a single point.
+    n : int
+        How many.
+    parts : list of BeamPoints and BodyPoints
+        Those of each beam and body that has some.
+    """
+
+    def __init__(self, one: bool, n: int, parts: Sequence[Any]) -> None:
+        self.one, self.n, self.parts = one, n, parts
+
+    def gather(self, values: Sequence[Array]) -> Array:
+        """One array of those of the parts, (..., n) each; (...) for a single point."""
+        if len(self.parts) == 1 and self.parts[0].index is None:
+            out = values[0]
+        else:
+            out = np.empty(values[0].shape[:-1] + (self.n,))
+            for part, value in zip(self.parts, values):
+                out[..., part.index] = value
+        return out[..., 0] if self.one else out
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (..., 2), or (..., 2, n) of many, for degrees of freedom (..., N)."""
+        return self.gather([part.displacement(u) for part in self.parts])
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2), or (..., 2, n) of many, for degrees of freedom and their rates."""
+        return self.gather([part.velocity(u, v) for part in self.parts])
+
+    @cached_property
+    def start(self) -> Array:
+        """Positions in the reference configuration."""
+        return self.gather([part.start for part in self.parts])

@@ -6,14 +6,14 @@ two numbers; many are an array of shape (2, n), as scikit-fem has them, or a lis
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .layout import select_beam, select_member
 from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
-from ..core.kept import cached_property
-from .interpolation import BodyPart, Part
+from .interpolation import BeamPoints, BodyPoints, Located
 from ..mesh.places import as_point
 from .rigid import RigidBody
 
@@ -73,52 +73,6 @@ def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
 
 def _ragged(p):
     return not isinstance(p, np.ndarray) and any(np.ndim(x) for x in p if not isinstance(x, str))
-
-
-class Located:
-    """Points of a scene.
-
-    Attributes
-    ----------
-    one : bool
-        They were given as a single point.
-    n : int
-        How many.
-    parts : list of Part and BodyPart
-        Those of each beam and body that has some.
-    """
-
-    def __init__(self, one: bool, n: int, parts: Sequence[Any]) -> None:
-        self.one, self.n, self.parts = one, n, parts
-
-    def gather(self, values: Sequence[Array]) -> Array:
-        """One array of those of the parts, (..., n) each; (...) for a single point."""
-        if len(self.parts) == 1 and self.parts[0].index is None:
-            out = values[0]
-        else:
-            out = np.empty(values[0].shape[:-1] + (self.n,))
-            for part, value in zip(self.parts, values):
-                out[..., part.index] = value
-        return out[..., 0] if self.one else out
-
-    def displacement(self, u: Array) -> Array:
-        """Displacements for coordinates ``u`` (..., N): (..., 2), or (..., 2, n) of many."""
-        return self.gather([part.displacement(u) for part in self.parts])
-
-    def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2), or (..., 2, n) of many points.
-
-        Parameters
-        ----------
-        u, v
-            Displacement of the coordinates of the scene and its rate, shapes (..., N).
-        """
-        return self.gather([part.velocity(u, v) for part in self.parts])
-
-    @cached_property
-    def start(self) -> Array:
-        """Positions in the stress-free body."""
-        return self.gather([part.start for part in self.parts])
 
 
 class Points:
@@ -246,7 +200,7 @@ class Points:
         x = as_points(body.position if points is None else points)
         start = np.reshape(x, (2, -1))
         return Located(x.ndim == 1, start.shape[1],
-                       [BodyPart(body, self._coordinates(body), None, start)])
+                       [BodyPoints(body, self._coordinates(body), None, start)])
 
     def _coordinates(self, body):
         return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
@@ -261,7 +215,7 @@ class Points:
             if ask and np.any(tied):
                 self._ask(x[:, [np.argmax(tied)]], [beam])
             k = self.beams.index(beam)
-            return Located(one, len(e), [Part(beam, k, self.slices[k], None, e, X)])
+            return Located(one, len(e), [BeamPoints(beam, k, self.slices[k], None, e, X)])
         which, least = np.full(x.shape[1], -1), np.full(x.shape[1], np.inf)
         elements, cells = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape)
         several, parts = np.zeros(x.shape[1], dtype=bool), list[Any]()
@@ -283,15 +237,15 @@ class Points:
             self._ask(x[:, [np.argmax(several)]], self.beams)
         for k in np.unique(which[which >= 0]):
             at = np.flatnonzero(which == k)
-            parts.append(Part(self.beams[k], int(k), self.slices[k], at, elements[at],
+            parts.append(BeamPoints(self.beams[k], int(k), self.slices[k], at, elements[at],
                               cells[:, at]))
         if not x.size:
-            parts.append(Part(self.beams[0], 0, self.slices[0], which, elements, cells))
+            parts.append(BeamPoints(self.beams[0], 0, self.slices[0], which, elements, cells))
         left = np.flatnonzero(which < 0)
         for body in self.bodies:
             on = body.contains(x[:, left])
             if np.any(on):
-                parts.append(BodyPart(body, self._coordinates(body), left[on], x[:, left[on]]))
+                parts.append(BodyPoints(body, self._coordinates(body), left[on], x[:, left[on]]))
                 left = left[~on]
         if len(left):
             p = (float(c) for c in x[:, left[0]])

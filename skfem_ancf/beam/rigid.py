@@ -176,24 +176,8 @@ class RigidBody(Frozen):
         n = np.array([-self.q0[3], self.q0[2]])
         return np.append(v[:, 0], n * (n @ (v[:, 1] - v[:, 0])) / self.size)
 
-    def held_by_a_section(self, held: Sequence[int], sums: Sequence[Any] = ()) -> bool:
-        """False: of a body its motions are asked.
-
-        Parameters
-        ----------
-        held, sums
-            Numbers of coordinates, and sums of them.
-        """
-        return False
-
     def rigid_motions(self, rows: Any = slice(None)) -> Array:
-        """Two translations and the rotation about :attr:`origin`: shape (4, 3).
-
-        Parameters
-        ----------
-        rows
-            Numbers of coordinates, shape (n,), for as many rows; all by default.
-        """
+        """Two translations and the rotation about :attr:`origin`, (4, 3), or some of the rows."""
         out = np.zeros((4, 3))
         out[0, 0] = out[1, 1] = 1.0
         out[2:, 2] = -self.q0[3], self.q0[2]
@@ -214,37 +198,16 @@ class RigidBody(Frozen):
         NameUnknown
             If a name is not known; the message lists the known ones.
         """
-        self.section_node(boundary)
+        if boundary is not None and not isinstance(boundary, RigidBody):
+            self.place(boundary)
         if names is None:
             return np.arange(4)
-        names = require_names("coordinate", names, [*NAMES, "r", "d"])
+        names = require_names("degree of freedom", names, [*NAMES, "r", "d"])
         return np.array([k for k, full in enumerate(NAMES)
                          if full in names or full.rsplit("^", 1)[0] in names])
 
-    def nodes(self, boundary: Any = None) -> Array:
-        """The number 0, shape (1,): a body is one place.
-
-        Parameters
-        ----------
-        boundary
-            None, or one of its points.
-        """
-        return np.array([self.section_node(boundary)])
-
-    def section_node(self, boundary: Any) -> int:
-        """0: all of a body has one direction.
-
-        Parameters
-        ----------
-        boundary
-            None, or one of its points.
-        """
-        if boundary is not None and not isinstance(boundary, RigidBody):
-            self.place(boundary)
-        return 0
-
-    def section_direction(self, node: int) -> tuple[Array, Array]:
-        """Coordinates (2, 1) and weight (1,) of its director."""
+    def direction(self) -> tuple[Array, Array]:
+        """Numbers (2, 1) and weight (1,) of the degrees of freedom of its director."""
         return np.array([[2], [3]]), np.ones(1)
 
     # points

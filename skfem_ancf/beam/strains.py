@@ -1,378 +1,353 @@
-"""The strain of the elements at points, by tables of what it is sampled from."""
+"""Strain and stress of the elements at points."""
 
 from __future__ import annotations
 
-from operator import mul
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
+from numpy.polynomial.chebyshev import chebder, chebvander
 
+from ..elements.series import coefficients, places, transform
 from ..formulations import COMPONENTS
-from ..core.kept import cached_property
-from .kernels.along import from_first_node
-from ..elements.series import chebyshev, derivatives, polynomials
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .interior import Interior
+    from ..core.types import Array, Law, Rule
     from ..formulations.base import Term
-    from ..core.types import Array, Rule
 
 #: Points that are evaluated at once.
 CHUNK = 3072
 
-#: Which derivatives of the position each strain component needs: along the axis 0, across it 1.
-NEEDS = ((0,), (1,), (0, 1))
+
+# Green-Lagrange strain of the derivatives a along the axis and b across it of the displacement,
+# pairs of arrays; (x, y) is the tangent of the axis in the reference configuration.
 
 
 def along_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """Green-Lagrange strain eps_xx.
-
-    Parameters
-    ----------
-    a, b
-        Derivatives of the displacement along the axis and across it, each a pair of numbers or
-        arrays (n,).
-    x, y
-        The tangent of the stress-free axis.
-    """
+    """The component eps_xx."""
     return (x + 0.5 * a[0]) * a[0] + (y + 0.5 * a[1]) * a[1]
 
 
 def across_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """Green-Lagrange strain eps_yy; parameters are those of :func:`along_axis`.
-
-    Parameters
-    ----------
-    a, b, x, y
-        As there, pairs of arrays of shape (n,), and of shape (n,).
-    """
+    """The component eps_yy."""
     return (0.5 * b[0] - y) * b[0] + (x + 0.5 * b[1]) * b[1]
 
 
 def shear(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """Twice the Green-Lagrange strain eps_xy; parameters are those of :func:`along_axis`.
-
-    Parameters
-    ----------
-    a, b, x, y
-        As there, pairs of arrays of shape (n,), and of shape (n,).
-    """
+    """Twice the component eps_xy."""
     return (x + a[0]) * b[0] + (y + a[1]) * b[1] - y * a[0] + x * a[1]
 
 
-#: The components in their order.
 STRAINS = along_axis, across_axis, shear
 
 
-def turned(turning: Sequence[Any], by_xi: Any, by_eta: Any) -> list[Any]:
-    """Derivatives along the axis and across it.
-
-    Parameters
-    ----------
-    turning
-        What :func:`_turning` returns.
-    by_xi, by_eta
-        Derivatives by xi and by eta, pairs of numbers or arrays (n,).
-    """
-    det, a, b, c, d = turning[:5]
-    return [((a * by_xi[0] + b * by_eta[0]) / det, (a * by_xi[1] + b * by_eta[1]) / det),
-            ((c * by_xi[0] + d * by_eta[0]) / det, (c * by_xi[1] + d * by_eta[1]) / det)]
-
-
-def sampled(terms: Sequence[Any], slopes: Sequence[Any], frames: Sequence[Any]) -> list[Any]:
-    """The samples of the strain: of each term its component at its place.
-
-    Parameters
-    ----------
-    terms
-        As ``ElementStrain.terms``.
-    slopes
-        Derivatives of the displacement, each a pair of numbers or arrays (n,).
-    frames
-        The tangent of the stress-free axis at each place, pairs of numbers or arrays.
-    """
-    return [STRAINS[row](slopes[a], slopes[b], *frames[place]) for row, place, a, b in terms]
-
-
-def interpolated(terms: Sequence[Any], weights: Sequence[Any], samples: Sequence[Any]
-                 ) -> list[Any]:
-    """The strain (eps_xx, eps_yy, 2 eps_xy): of each component the sum of weighted samples.
-
-    Parameters
-    ----------
-    terms
-        As ``ElementStrain.terms``.
-    weights, samples
-        Of each term, numbers or arrays (n,).
-    """
-    out: list[Any] = [0.0, 0.0, 0.0]
-    for weight, sample, (row, _, _, _) in zip(weights, samples, terms):
-        out[row] = out[row] + weight * sample
-    return out
-
-
-class ElementStrain:
-    """The strain of a term of a formulation: interpolated samples.
-
-    A component is sampled at places along the axis that are the same in all elements: there the
-    derivatives of the position along the axis and across it are polynomials across the section,
-    divided by the determinant of the map of a curved element. A component that is not sampled is
-    evaluated at the points themselves.
+class Interpolation:
+    """Displacements of elements as sums ``c_ij T_i(2 xi - 1) T_j(2 eta - 1)``, T Chebyshev's.
 
     Parameters
     ----------
     beam
-        A :class:`~skfem_ancf.Beam` with sections.
-    term
-        A :class:`~skfem_ancf.formulations.Term`.
-    rows
-        The components that are asked for; the others are zero.
-
-    Attributes
-    ----------
-    terms : list
-        For each sample of a component: the component, the place, and which of the derivatives are
-        those along the axis and across it there.
+        A :class:`~skfem_ancf.Beam`.
     """
 
-    def __init__(self, beam: Interior, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
-        self.beam, series = beam, beam.series
-        names = [COMPONENTS[row] for row in rows]
-        self.places = sorted({float(xi) for name in names for xi in term.samples.get(name, ())})
-        self.here = any(name not in term.samples for name in names)
-        self.terms: list[tuple[int, int, int, int]] = []
-        self._pairs: list[tuple[int, int]] = []  # places and derivatives there that are needed
-        most = max(len(term.samples.get(name, (0.0,))) for name in names)
-        weights = []
-        if self.here:
-            self._pairs += [(len(self.places), 0), (len(self.places), 1)]
-        for row, name in zip(rows, names):
-            nodes = np.asarray(term.samples.get(name, ()))
-            lagrange = np.linalg.inv(chebvander(2.0 * nodes - 1.0, len(nodes) - 1)).T if len(
-                nodes) else np.ones((1, 1))
-            at = [self.places.index(float(xi)) for xi in nodes] or [len(self.places)]
-            for place, coefficients in zip(at, lagrange):
-                pairs = [self._pair(place, J) for J in NEEDS[row]]
-                self.terms.append((row, place, pairs[0], pairs[-1]))
-                weights.append(np.append(coefficients, np.zeros(most - len(coefficients))))
-        self._weights, self._degree = np.array(weights), most
-        self._sort()
-        #: The terms, and their components, that are evaluated at the points themselves.
-        self.at_points = [(k, row) for k, (row, place, _, _) in enumerate(self.terms)
-                          if place == len(self.places)]
-        self._shape = series.shape
-        self._basis = np.array([chebyshev(xi, series.shape[0]) for xi in self.places]).reshape(
-            -1, series.shape[0])
-        #: Of straight elements of one height, whose map is linear.
-        self._linear = beam.mesh.is_straight and beam.mesh.heights is None
-
-    def _pair(self, place, J):
-        if (place, J) not in self._pairs:
-            self._pairs.append((place, J))
-        return self._pairs.index((place, J))
-
-    def _sort(self):
-        """Pairs by their places, and as arrays those that are the same in all elements."""
-        order = sorted(range(len(self._pairs)), key=lambda k: self._pairs[k])
-        new = {old: k for k, old in enumerate(order)}
-        self.terms = [(row, place, new[a], new[b]) for row, place, a, b in self.terms]
-        self._pairs = [self._pairs[k] for k in order]
-        fixed = np.array([pair for pair in self._pairs if pair[0] < len(self.places)], dtype=int)
-        self._at, self._which = fixed.reshape(-1, 2).T
-
-    # derivatives at places, as polynomials across the section
-
-    def _turned(self, tables, e):
-        """Along the axis and across it, from derivatives by xi and eta: (pairs, M, k, n).
-
-        Tables (places, 2, m, k, n) for elements (n,).
-        """
-        mesh, at, which = self.beam.mesh, self._at, self._which
-        if not len(at):
-            return []
-        if self._linear:
-            size = np.array([mesh.lengths[e], np.full(len(e), mesh.height)])
-            table = tables[at, which]
-            return table / size[which].reshape(len(at), 1, 1, len(e))
-        return sum(_times(self._map[1 + 2 * which + k, at][..., e], tables[at, k]) for k in (0, 1))
+    def __init__(self, beam: Any) -> None:
+        mesh, element, mapping = beam.mesh, beam.element, beam.mesh.mapping()
+        self.nodes, self.lengths = mesh.t, mesh.lengths
+        #: Of straight elements of one height the tangents and the height; else the mapping.
+        self.tangents, self.height = mesh.p_X[:, mesh.t[0]], mesh.height
+        self.mapping = None if mesh.is_straight and mesh.heights is None else mapping
+        p, m = element.axis_degree + 1, max(element.order, 1) + 1
+        swell = np.array([across for _, _, across in element.functionals] * 2)
+        unit = coefficients(lambda X: element.local(X, 1.0)[0], p, m).swapaxes(-1, -2)
+        self.table = mesh.height ** swell[:, None, None] * unit
+        n = p if mapping.heights_of(0) is None else p + mapping.height_degree * int(swell.max())
+        self.shape, self.swell = (n, m), swell
+        self.by_xi, self.by_eta = _slope_matrix(n), _slope_matrix(m)
+        self.slope = element.local(np.zeros((2, 1)), 1.0)[3]
 
     @cached_property
-    def _map(self):
-        """What :func:`_turning` says of the places, linear in 2 eta - 1, (7, places, 2, ne)."""
-        return self._turning_across(np.arange(self.beam.mesh.nelements),
-                                    np.array(self.places)[:, None])
+    def _at_places(self):
+        """Where heights vary: places along, and the functions of one height there, (n, m, nb)."""
+        x = places(self.shape[0])
+        return x, (chebvander(2.0 * x - 1.0, self.table.shape[1] - 1) @ self.table).transpose(
+            1, 2, 0)
 
-    def _turning_across(self, e, xi):
-        """What :func:`_turning` says at places (..., n) of elements (n,): (7, ..., 2, n)."""
-        low, high = (np.array(_turning(*self.beam.mesh.mapping().derivatives(e, xi, eta)))
-                     for eta in (0.0, 1.0))
-        return np.stack([0.5 * (low + high), 0.5 * (high - low)], axis=-2)
+    def of_elements(self, q: Array, e: Array) -> Array:
+        """The coefficients (p, m, 2, n) of degrees of freedom (N,) on elements (n,)."""
+        nodes = q.reshape(-1, len(self.slope) // 2, 2)
+        q_e = np.concatenate([nodes[self.nodes[0, e]], nodes[self.nodes[1, e]]], axis=1)
+        q_e[:, len(self.slope) // 2] -= q_e[:, 0]  # from the first node: less round-off
+        q_e[:, 0] = 0.0
+        q_e = q_e.transpose(1, 2, 0) * (self.lengths[e] ** self.slope[:, None])[:, None]
+        heights = self.mapping and self.mapping.heights_of(e)
+        if heights is None:
+            found = self.table.reshape(len(q_e), -1).T @ q_e.reshape(len(q_e), -1)
+        else:  # functions of the section are h^m P(Y / h)
+            (x, functions), n = self._at_places, self.shape[0]
+            swollen = heights(x[:, None])[0][:, None] ** self.swell[:, None]
+            found = transform(n) @ (functions @ (
+                swollen[:, :, None] * q_e).reshape(n, len(q_e), -1)).reshape(n, -1)
+        return found.reshape(*self.shape, *q_e.shape[1:])
 
-    # at many points
 
-    def __call__(self, u: Array, e: Array, X: Array, across: Rule | None = None) -> Array:
-        """(eps_xx, eps_yy, 2 eps_xy) at points.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates of the beam, shape (N,).
-        e, X
-            Elements (n,) and reference points (2, n).
-        across
-            Points and weights across sections, for the mean over those of the points.
-
-        Returns
-        -------
-        ndarray
-            Shape (3, n).
-        """
-        beam, n = self.beam, len(e)
-        few = n < beam.mesh.nelements
-        of = e if few else np.arange(beam.mesh.nelements)
-        u_e = from_first_node(beam.kernel.gather(u, of)).transpose(1, 2, 0)
-        u_e = u_e * beam.scales[of].T[:, None]
-        fixed, free = self._derivatives(u_e, of)
-        turned = self._turned(fixed, of)
-        means = None if across is None else self._means(turned, of, across)
-        out = np.empty((3, n), u_e.dtype)
-        for first in range(0, n, CHUNK):
-            part = slice(first, first + CHUNK)
-            at = np.arange(n)[part] if few else e[part]
-            if means is None:
-                samples = self._samples(turned, free, at, e[part], X[:, part])
-            else:
-                samples = [mean.take(at) for mean in means]
-                for (k, _), mean in zip(self.at_points, self._means_here(
-                        free, at, e[part], X[0, part], across)):
-                    samples[k] = mean
-            weights = self._weights @ chebyshev(X[0, part], self._weights.shape[1])
-            for row, values in zip(out, interpolated(self.terms, list(weights), samples)):
-                row[part] = values
-        return out
-
-    def _samples(self, turned, free, at, e, X):
-        """The samples (n,) of each term at the places across of points."""
-        T = polynomials(X[1], self._shape[1] + 1)
-        slopes, frames = self._slopes(turned, at, e, T), self._frames(e)
-        if self.here:
-            found, tangent = self._slopes_here(free, at, e, X, T)
-            slopes += found
-            frames.append(tangent)
-        return sampled(self.terms, slopes, frames)
-
-    def _means(self, turned, of, across):
-        """The means over the section of samples at fixed places, for all elements (terms, ne)."""
-        at, frames = np.arange(len(of)), self._frames(of)
-        total = np.zeros((len(self.terms), len(of)), np.result_type(*turned, float))
-        for eta, weight in zip(*across):
-            slopes = self._slopes(turned, at, of, polynomials(0.0 * of + eta, self._shape[1] + 1))
-            for mean, (row, place, a, b) in zip(total, self.terms):
-                if place < len(self.places):
-                    mean += weight * STRAINS[row](slopes[a], slopes[b], *frames[place])
-        return total
-
-    def _means_here(self, free, at, e, xi, across):
-        """The means of what is evaluated at the points over their sections."""
-        if not self.here:
-            return []
-        turning, tables, means = self._turning_across(e, xi), {}, [0.0] * len(self.at_points)
-        by_xi, by_eta = (self._at_xi(table, at, xi)[None] for table in free)
-        for J in {J for _, row in self.at_points for J in NEEDS[row]}:
-            a, b = turning[1 + 2 * J:3 + 2 * J, None]
-            tables[J] = (_times(a, by_xi) + _times(b, by_eta))[0]
-        for eta, weight in zip(*across):
-            T = polynomials(eta, self._shape[1] + 1)
-            inverse = 1.0 / (turning[0, 0] + T[1] * turning[0, 1])
-            slopes = {J: inverse * sum(map(mul, table, T)) for J, table in tables.items()}
-            for k, (_, row) in enumerate(self.at_points):
-                means[k] += weight * STRAINS[row](slopes.get(0), slopes.get(1), *turning[5:, 0])
-        return means
-
-    def _derivatives(self, u_e, e):
-        """Derivatives by xi and eta of displacements (nb, k, n) of elements, polynomials.
-
-        At the places (places, 2, m, k, n), and everywhere (2, p, m, k, n). Elements e are an array
-        (n,), or a number.
-        """
-        heights = self.beam.mesh.mapping().heights_of(e)
-        free = derivatives(self.beam.series.in_elements(u_e, heights))
-        return np.tensordot(self._basis, free, (1, 1)), free
-
-    def _slopes(self, turned, at, e, T):
-        """Derivatives at places, (2, n) each, from polynomials of elements, number ``at`` there."""
-        inverse = [] if self._linear else [1.0 / (d[0].take(e) + T[1] * d[1].take(e))
-                                           for d in self._map[0]]
-        out = []
-        for (place, _), table in zip(self._pairs, turned):
-            value = table[0].take(at, axis=-1)
-            for c, basis in zip(table[1:], T[1:]):
-                value += c.take(at, axis=-1) * basis
-            if not self._linear:
-                value *= inverse[place]
-            out.append(value)
-        return out
-
-    def _at_xi(self, table, at, xi):
-        """Of a table (p, m, 2, elements) polynomials across, (m, 2, n), at places xi (n,)."""
-        value = table[0].take(at, axis=-1)
-        for c, T in zip(table[1:], polynomials(xi, len(table))[1:]):
-            value += c.take(at, axis=-1) * T
-        return value
-
-    def _slopes_here(self, free, at, e, X, T):
-        """Derivatives at the points themselves, (2, n) each, and the tangent of the axis there."""
-        turning, both = self._turning(e, *X), []
-        for table in free:
-            first, *others = self._at_xi(table, at, X[0])
-            for c, basis in zip(others, T[1:]):
-                first += c * basis
-            both.append(first)
-        return turned(turning, *both), turning[5:]
-
-    def _turning(self, e, xi, eta):
-        """What :func:`turned` takes, at points, and the tangent of the axis there."""
-        mesh = self.beam.mesh
-        if not self._linear:
-            return _turning(*mesh.mapping().derivatives(e, xi, eta))
-        return 1.0, 1.0 / mesh.lengths[e], 0.0, 0.0, 1.0 / mesh.height, *self._tangents(e)
-
-    def _frames(self, e):
-        """The tangent of the axis at all places."""
-        if self._linear:
-            return [self._tangents(e)] * len(self.places)
-        return [self._map[5:, place, 0].take(e, axis=-1) for place in range(len(self.places))]
-
-    def _tangents(self, e):
-        """Those of straight elements, (2, n)."""
-        mesh = self.beam.mesh
-        return mesh.p_X[:, mesh.t[0]].take(e, axis=-1)
-
-def _times(linear, table):
-    """Products of linear functions (pairs, 2, n) of z and polynomials (pairs, m, k, n).
-
-    All are sums of Chebyshev polynomials of z; the products have m + 1 terms.
-    """
-    c, d = linear[:, 0, None, None], linear[:, 1, None, None]
-    out = np.zeros((table.shape[0], table.shape[1] + 1, table.shape[2], linear.shape[-1]),
-                   table.dtype)
-    out[:, :-1] += c * table
-    out[:, 1:2] += d * table[:, :1]
-    out[:, 2:] += 0.5 * d * table[:, 1:]
-    out[:, :-2] += 0.5 * d * table[:, 1:]
+def _slope_matrix(n):
+    out = np.zeros((n, n))
+    out[:-1] = 2.0 * chebder(np.eye(n))
     return out
 
 
-def _turning(J0, J1, t):
-    """What takes derivatives by xi and eta to those along the frame, a list of seven.
+class Gradients:
+    """The displacement gradient at points, each in an element of its own.
 
-    The determinant of the map; times that, how much of both is in the one along the axis, and in
-    the one across it; the tangent. All are linear in eta.
-
-    J0, J1 and t are the derivatives of the map and the tangent, (2, ...).
+    Parameters
+    ----------
+    beam, u, e
+        A beam, the displacement of its degrees of freedom (N,), and the elements (n,).
     """
-    (a, b), (c, d), (x, y) = J0, J1, t
-    return [a * d - b * c, x * d - y * c, a * y - b * x, -x * c - y * d, a * x + b * y, x, y]
+
+    def __init__(self, beam: Any, u: Array, e: Array) -> None:
+        self.at: Array
+        self.basis = basis = beam.interpolation
+        self.e, ne = e, len(basis.lengths)
+        few = len(e) < ne
+        of, self.at = (e, np.arange(len(e))) if few else (np.arange(ne), e)
+        self._known: dict[float, Array] = {}
+        c = basis.of_elements(u, of)
+        self.by = np.array([np.tensordot(basis.by_xi, c, 1),
+                            np.einsum("jk,pk...->pj...", basis.by_eta, c)])
+
+    def __call__(self, part: slice, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
+        """Derivatives along the axis and across it, and its tangent, at some of the points.
+
+        Parameters
+        ----------
+        part
+            Which of the points.
+        xi, eta
+            Their places, (n,), or one for all of them.
+        """
+        at, e, m = self.at[part], self.e[part], self.by.shape[2]
+        if np.ndim(xi):
+            table, at = _sum(self.by.swapaxes(0, 1), xi, at), np.arange(len(at))
+        else:
+            if xi not in self._known:
+                T = chebvander(2.0 * xi - 1.0, self.by.shape[1] - 1)
+                self._known[xi] = np.tensordot(T, self.by, (-1, 1))
+            table = self._known[xi].reshape(2, m, 2, -1)
+        by_xi, by_eta = _sum(table.swapaxes(0, 1), eta, at)
+        basis = self.basis
+        if basis.mapping is None:
+            return by_xi / basis.lengths[e], by_eta / basis.height, basis.tangents[:, e]
+        (a, b), (c, d), (x, y) = basis.mapping.derivatives(e, xi, eta)
+        det = a * d - b * c
+        return (((x * d - y * c) * by_xi + (a * y - b * x) * by_eta) / det,
+                ((a * x + b * y) * by_eta - (x * c + y * d) * by_xi) / det, (x, y))
+
+
+def _sum(tables, x, at):
+    """``sum_k T_k(2 x - 1) tables[k]``, of tables (n, ..., elements) at some elements."""
+    T = chebvander(2.0 * x - 1.0, len(tables) - 1).T
+    out = tables[0].take(at, axis=-1)
+    for c, t in zip(tables[1:], T[1:]):
+        out += c.take(at, axis=-1) * t
+    return out
+
+
+def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
+              across: Rule | None = None) -> Array:
+    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) of the elements, shape (3, n).
+
+    Each component is sampled where the term of the formulation says, and interpolated between.
+
+    Parameters
+    ----------
+    beam, u
+        A :class:`~skfem_ancf.Beam`, and the displacement of its degrees of freedom, (N,).
+    e, X
+        Elements (n,) and reference points (2, n).
+    term
+        One of the terms of the beam; by default the first. Components on which its law does not
+        depend are zero.
+    across
+        Points and weights across the section, for the mean over sections.
+    """
+    if not beam.has_sections:
+        return _strain_of_cable(beam, u, e, X)
+    rows = (0, 1, 2) if term is None else getattr(term.law, "rows", (0, 1, 2))
+    samples = (term or beam.terms[0]).samples
+    gradients, out = Gradients(beam, u, e), np.zeros((3, len(e)), np.result_type(u, float))
+    for first in range(0, len(e), CHUNK):
+        part = slice(first, first + CHUNK)
+        xi = X[0, part]
+        for eta, weight in ((X[1, part], 1.0),) if across is None else zip(*across):
+            for place, wanted in _places(samples, rows, xi):
+                a, b, t = gradients(part, xi if place is None else place, eta)
+                for row, w in wanted:
+                    out[row, part] += weight * w * STRAINS[row](a, b, *t)
+    return out
+
+
+def _places(samples, rows, xi):
+    """Each place along the axis, None for the points, with the components and their weights."""
+    found: dict[Any, list[Any]] = {}
+    for row in rows:
+        nodes = samples.get(COMPONENTS[row])
+        if nodes is None:
+            found.setdefault(None, []).append((row, 1.0))
+        else:
+            T = [chebvander(2.0 * np.asarray(x) - 1.0, len(nodes) - 1) for x in (nodes, xi)]
+            for place, w in zip(nodes, np.linalg.solve(T[0].T, T[1].T)):
+                found.setdefault(float(place), []).append((row, w))
+    return found.items()
+
+
+def stress_at(beam: Any, u: Array, e: Array, X: Array, strain: Array | None = None) -> Array:
+    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) of the elements, shape (3, n).
+
+    Parameters
+    ----------
+    beam, u, e, X
+        As for :func:`strain_at`, shapes (N,), (n,) and (2, n).
+    strain
+        What that returns, if it is known, (3, n).
+    """
+    E = (strain_at(beam, u, e, X) if strain is None else strain)[..., None]
+    at = X[:, :, None]
+    of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
+          partial(_stress_of_cable, strain=E, X=at, tind=e))
+    return beam.across.of_slabs(at, E, [partial(of, layer) for layer in beam.layers], e)[..., 0]
+
+
+def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
+    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements.
+
+    Parameters
+    ----------
+    of, beam, u
+        The function, a beam, and the displacement of its degrees of freedom, (N,).
+    X, tind
+        Reference points, (2, npoints) or (2, nelements, npoints), and elements, (nelements,), or
+        None for all.
+    *more
+        Passed on.
+
+    Returns
+    -------
+    ndarray
+        Shape (3, nelements, npoints).
+    """
+    tind = np.arange(beam.mesh.nelements) if tind is None else tind
+    shape = len(tind), X.shape[-1]
+    points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
+    return of(beam, u, np.repeat(tind, shape[1]), points, *more).reshape(3, *shape)
+
+
+class Layer:
+    """One layer of a beam, as its formulation asks for it.
+
+    Parameters
+    ----------
+    beam, slab, terms
+        The beam, its layer, and the terms of the strain energy of this.
+
+    Attributes
+    ----------
+    law
+        The constitutive law, with the shear factor of the section.
+    """
+
+    def __init__(self, beam: Any, slab: Any, terms: Sequence[Term]) -> None:
+        self.beam, self.material, self.terms = beam, slab.material, terms
+        self._element = beam.across.element_of(slab)
+
+    @cached_property
+    def law(self) -> Law:
+        return self.material.law(self.material.shear_factor(self._element))
+
+    def strain(self, term: Term, u: Array, X: Array, tind: Array | None = None,
+               across: Rule | None = None) -> Array:
+        """The strain of a term, (3, nelements, npoints).
+
+        Parameters
+        ----------
+        term
+            One of the terms.
+        u, X, tind
+            As for :meth:`Beam.strain <skfem_ancf.Beam.strain>`, shapes (N,), (2, npoints) or (2,
+            nelements, npoints), and (nelements,).
+        across
+            Points and weights across the section, for the mean over sections.
+        """
+        return on_grid(strain_at, self.beam, u, X, tind, term, across)
+
+
+# cables
+
+
+def stretched(xx: Array) -> tuple[Array, Array]:
+    """The stretch of a fibre of a Green-Lagrange strain, and that less 1 without cancellation."""
+    stretch = np.sqrt(1.0 + 2.0 * xx)
+    return stretch, 2.0 * xx / (1.0 + stretch)
+
+
+def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any, Any]:
+    """The axis of a cable at sections.
+
+    Parameters
+    ----------
+    beam, u
+        As for :func:`strain_at`, shape (N,).
+    e, xi
+        Elements and places along them, (n,).
+
+    Returns
+    -------
+    tangents, extension, bending, kappa0
+        Unit tangents before and after, (2, 2, n); stretch less that before, change of curvature,
+        and curvature before, (n,).
+    """
+    L, basis = beam.mesh.lengths[e], beam.interpolation
+    derivatives = []
+    for q in (beam.q0_local, u):
+        by_xi = np.tensordot(basis.by_xi, basis.of_elements(q, e)[:, 0], 1)
+        derivatives += [_sum(c, xi, np.arange(len(e))) / L ** (k + 1)
+                        for k, c in enumerate((by_xi, np.tensordot(basis.by_xi, by_xi, 1)))]
+    a0, b0, da, db = derivatives
+    if beam.mesh.is_straight:
+        b0 = 0.0 * b0
+    a, b = a0 + da, b0 + db
+    (square0, square), (kappa0, kappa) = zip(*(
+        (s := x[0] * x[0] + x[1] * x[1], (x[0] * y[1] - x[1] * y[0]) / s)
+        for x, y in ((a0, b0), (a, b))))
+    length0, length = np.sqrt(square0), np.sqrt(square)
+    strain = np.array([((2.0 * a[0] - da[0]) * da[0] + (2.0 * a[1] - da[1]) * da[1])
+                       / (length + length0), kappa - kappa0])
+    if np.iscomplexobj(strain) and not u.real.any():
+        strain.real = 0.0  # not round-off, where the axis is curved
+    return (a0 / length0, a / length), strain[0], strain[1], kappa0
+
+
+def fibres(beam: Any, e: Array, X: Array, extension: Array, bending: Array, kappa0: Array) -> Any:
+    """Strain of the fibres of a cable by their length at points (2, n), and eps_yy over eps_xx."""
+    at = X[:, :, None]
+    Y, which = beam.mesh.mapping().offset(at, e), beam.across.which(at, e)
+    ratios = np.array([slab.material.lateral_ratio for slab in beam.across.slabs])[which]
+    Y, ratios = (np.broadcast_to(x, at.shape[1:])[:, 0] for x in (Y, ratios))
+    return (extension - Y * bending) / (1.0 - Y * kappa0), -ratios
+
+
+def _strain_of_cable(beam, u, e, X):
+    longer, ratio = fibres(beam, e, X, *cable_axis(beam, u, e, X[0])[1:])
+    xx = longer + 0.5 * longer * longer
+    return np.array([xx, ratio * xx, 0.0 * xx])
+
+
+def _stress_of_cable(layer, strain, X, tind):
+    beam, (stretch, longer) = layer.beam, stretched(strain[0])
+    if not beam.mesh.is_straight:
+        kappa0 = cable_axis(beam, 0.0 * beam.q0, tind, X[0, :, 0])[3][:, None]
+        longer = longer * (1.0 - beam.mesh.mapping().offset(X, tind) * kappa0)
+    S = layer.material.axial_modulus * longer / stretch
+    return np.array([S, 0.0 * S, 0.0 * S])

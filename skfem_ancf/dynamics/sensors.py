@@ -16,7 +16,7 @@ from .base import recalled
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from ..beam.points import Located
+    from ..beam.interpolation import Located
     from ..results.state import State
     from ..equations.system import System
     from ..core.types import Array

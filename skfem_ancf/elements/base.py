@@ -172,6 +172,11 @@ class ElementBeam(Frozen, Element):
         return self.section.degree >= 3
 
     @property
+    def facet_points(self) -> int:
+        """Gauss points of a facet, for products of two local functions."""
+        return max(self.axis_degree, self.order) + 2
+
+    @property
     def _factors(self) -> Array:
         return _factors(self._along, self.functionals, self.section.number)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
+from ..beam.kinematics import clamps_direction
 from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..actions.joints.base import Joint, same_joint
 from ..actions.joints.director import UnitDirector
@@ -557,7 +558,7 @@ class Constraints:
         found = []
         for beam, s in zip(self.members, self.slices):
             held, = (~self.free[s]).nonzero()
-            if beam.held_by_a_section(held.tolist()):
+            if clamps_direction(beam, held.tolist()):
                 found.append(True)
                 continue
             found.append(self._holds(beam, held, ()))
@@ -597,7 +598,7 @@ class Constraints:
                     rows.append((b, first, last))
                     own.append([(dof - s.start, factor) for dof, factor in of])
             held, = (~self.free[s]).nonzero()
-            standing[k] = bool(rows) and (beam.held_by_a_section(held.tolist(), own)
+            standing[k] = bool(rows) and (clamps_direction(beam, held.tolist(), own)
                                           or self._holds(beam, held, own))
             if standing[k]:
                 found += rows

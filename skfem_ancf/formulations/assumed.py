@@ -14,7 +14,7 @@ from .base import Formulation, Integrated, Term
 from .ecm import AXIS, split_moduli
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from ..elements.base import ElementBeam
     from ..materials.base import Material
@@ -112,14 +112,15 @@ class Assumed(Formulation):
         return [Term(laws[0], whole.axis, whole.section, whole.samples),
                 Term(laws[1], gauss(volume), whole.section, samples)]
 
-    def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
-        first, *others = beam.terms
-        total = stress_of(first.law, strain(first))
+    def stress(self, layer: Integrated, strain: Array, u: Array, X: Array,
+               tind: Array | None) -> Array:
+        first, *others = layer.terms
+        total = stress_of(first.law, strain)
         for term in others:  # of the middle of the element, or of the section's mean
             xi, mean = term.axis[0], term.section_samples
-            total = total + stress_of(term.law, strain(
-                term, None if len(xi) > 1 else xi[0], None if mean is None else (
-                    mean[0], mean[1][0])))
+            at = X if len(xi) > 1 else np.array([0.0 * X[0] + xi[0], X[1]])
+            across = None if mean is None else (mean[0], mean[1][0])
+            total = total + stress_of(term.law, layer.strain(term, u, at, tind, across))
         return total
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,

@@ -14,7 +14,7 @@ from ..core.kept import cached_property
 from ..core.quadrature import gauss, lagrange, product_rule
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
@@ -101,25 +101,16 @@ class Term:
 
 
 class Integrated(Protocol):
-    """What a formulation reads of a beam for its stress.
+    """What a formulation reads of a layer of a beam, a :class:`~skfem_ancf.beam.strains.Layer`."""
 
-    Attributes
-    ----------
-    terms
-        The integrals that make up its strain energy.
-    law
-        The material law at its integration points.
-    """
-
-    @property
-    def terms(self) -> Sequence[Term]: ...
+    terms: Sequence[Term]
 
     @property
     def law(self) -> Law: ...
 
-    def strains(self, strain: Array, u: Array, X: Array,
-                tind: Array | None) -> Callable[..., Array]:
-        """The strain of each term at points, as :meth:`Formulation.stress_of` calls it."""
+    def strain(self, term: Term, u: Array, X: Array, tind: Array | None = None,
+               across: Rule | None = None) -> Array:
+        """The strain of a term, or its mean over sections; (3, nelements, npoints)."""
 
 
 class Formulation(Frozen):
@@ -175,49 +166,25 @@ class Formulation(Frozen):
         """
         return None
 
-    def stress(self, beam: Integrated, strain: Array, u: Array, X: Array,
+    def stress(self, layer: Integrated, strain: Array, u: Array, X: Array,
                tind: Array | None) -> Array:
-        """Second Piola-Kirchhoff stress of a beam's strain, for output.
+        """Second Piola-Kirchhoff stress, for output; shape (3, nelements, npoints).
 
         Parameters
         ----------
-        beam
-            A :class:`~skfem_ancf.Beam`.
+        layer
+            One layer of a beam, with ``terms``, ``law`` and ``strain(term, u, X, tind, across)``.
         strain
             That of ``beam.strain(u, X, tind)``, shape (3, nelements, npoints); the rest is for
             formulations whose stress depends on more than the strain at the point.
         u
-            Displacement of the coordinates, shape (N,).
+            Displacement of the degrees of freedom, shape (N,).
         X
             Reference points, (2, npoints) or (2, nelements, npoints).
         tind
             Elements, shape (nelements,), or None for all.
-
-        Returns
-        -------
-        ndarray
-            Shape (3, nelements, npoints).
         """
-        return self.stress_of(beam, beam.strains(strain, u, X, tind))
-
-    def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
-        """As :meth:`stress`, which calls it: for one point and for many.
-
-        Parameters
-        ----------
-        beam
-            A :class:`~skfem_ancf.Beam`.
-        strain
-            Called as ``strain(term, xi, across)`` it returns the strain of a term of the beam at
-            the points, (3, ...): with xi at that place along their elements instead, and with
-            points and weights ``across`` its mean over their sections.
-
-        Returns
-        -------
-        ndarray
-            Shape (3, ...).
-        """
-        return stress_of(beam.law, strain(beam.terms[0]))
+        return stress_of(layer.law, strain)
 
     @staticmethod
     def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:

@@ -12,7 +12,7 @@ from ..materials import LinearLaw
 from .base import Formulation, Integrated, Term
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from ..elements.base import ElementBeam
     from ..materials.base import Material
@@ -74,9 +74,10 @@ class EnhancedContinuum(Formulation):
             terms.append(Term(LinearLaw(coupling), axis, AXIS))
         return terms
 
-    def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
-        first, *coupling = beam.terms
-        out = stress_of(first.law, strain(first))
+    def stress(self, layer: Integrated, strain: Array, u: Array, X: Array,
+               tind: Array | None) -> Array:
+        first, *coupling = layer.terms
+        out = stress_of(first.law, strain)
         if coupling:
-            out = out + stress_of(coupling[0].law, strain(first, None, AXIS))
+            out = out + stress_of(coupling[0].law, layer.strain(first, u, X, tind, AXIS))
         return out

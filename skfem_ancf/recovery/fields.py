@@ -17,9 +17,10 @@ import numpy as np
 from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                            require_flag, require_integer, require_label, require_text, shown)
 from ..core.linear import first_order, step
-from ..beam.kernels.along import stretched
+from ..beam import kinematics
 from ..materials import LinearLaw
-from ..beam.interpolation import Part
+from ..beam.interpolation import BeamPoints
+from ..beam.strains import stretched
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -124,7 +125,7 @@ class Values(Mapping):
     Parameters
     ----------
     part
-        The :class:`~skfem_ancf.beam.interpolation.Part` with the points.
+        The :class:`~skfem_ancf.beam.interpolation.BeamPoints` with the points.
     u
         Displacement of the coordinates that the part is numbered by, shape (N,); of a linear
         solution the :func:`~skfem_ancf.core.linear.step` from its base.
@@ -153,7 +154,7 @@ class Values(Mapping):
         The beam's frame in the reference configuration, ``frame[:, 0]`` along the axis, (2, 2, n).
     """
 
-    def __init__(self, part: Part, u: Array, find: Callable[[], Recovery | None] | None = None,
+    def __init__(self, part: BeamPoints, u: Array, find: Callable[[], Recovery | None] | None = None,
                  eigen: Sequence[tuple[Any, Any]] = ()) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)
@@ -244,8 +245,7 @@ class Values(Mapping):
     def _gradient(self):
         """That of the elements."""
         part = self._part
-        H, frame = self.beam.kinematics.gradients(self.beam, self._u[part.coordinates], part.at,
-                                                  part.e)
+        H, frame = kinematics.gradients(self.beam, self._u[part.coordinates], part.at, part.e)
         return (H + frame)[..., 0]
 
     @cached_property
@@ -469,8 +469,8 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
         Its points are (nelements, npoints), flattened.
     """
     ne = beam.mesh.nelements
-    part = Part(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
-                np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))
+    part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
+                      np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1))
     if hasattr(state, "values_of"):
         return state.values_of(beam, part, recover)
     return Values(part, state.u_of(beam))

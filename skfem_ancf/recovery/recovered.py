@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..beam.strains import on_grid, stress_at
 from ..formulations.ecm import EnhancedContinuum
 from ..materials import LinearLaw
 from .intervals import Intervals, Points
@@ -190,8 +191,7 @@ class Recovery:
         beam, x = self.beam, self.beam.element.sampling.places("xx")
         eta, u, e = self.intervals.eta, self._u, np.arange(self.beam.mesh.nelements)
         X = np.array([np.repeat(x, len(eta)), np.tile(eta, len(x))])
-        of = beam.kinematics
-        stress = of.stress(beam, of.strain(beam, u, X, None), u, X, None)
+        stress = on_grid(stress_at, beam, u, X, None)
         for factor, eigen in self.forces.eigen:
             stress = stress - eigen.stress_at(u, X, e, factor)
         stress = stress.reshape(3, len(e), len(x), len(eta))

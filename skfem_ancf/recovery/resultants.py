@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..beam.kernels.along import CableSections
+from ..beam import kinematics
+from ..beam.strains import cable_axis, on_grid, stress_at
 from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
 from ..mesh.mapping import cross
@@ -209,14 +210,13 @@ def _axis(segment):
 def _own(beam, u, eigen, e, xi):
     """From the stress of the elements, integrated across the section."""
     X, area = _across(beam, e, xi)
-    of = beam.kinematics
-    S = of.stress(beam, of.strain(beam, u, X, e), u, X, e) - sum(
+    S = on_grid(stress_at, beam, u, X, e) - sum(
         load.stress_at(u, X, e, factor) for factor, load in eigen)
-    H, frame = of.gradients(beam, u, X, e)
+    H, frame = kinematics.gradients(beam, u, X, e)
     P = (H + frame)[:, 0] * S[0] + (H + frame)[:, 1] * S[2]
 
     def position(points):
-        return beam.mesh.mapping().F(points, e) + of.displacements(beam, u, points, e)
+        return beam.mesh.mapping().F(points, e) + kinematics.displacements(beam, u, points, e)
 
     arm = position(X) - position(_on_axis(xi))
     return _result(np.sum(P * area, axis=-1), np.sum(cross(arm, P) * area, axis=-1),
@@ -246,13 +246,8 @@ def _own_of_cable(beam, u, eigen, e, xi):
 
 def _forces_of_cable(beam, u, eigen, e, xi):
     """Normal force and moment of a cable, and angle, stretch, shear and curvature of its axis."""
-    at = CableSections(beam, xi[:, None], e)
-    tangent, (eps, kappa) = at(beam.kernel.gather(u, e))
-    EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
-    N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
-    strain, curvature = eps[:, 0], kappa[:, 0]
-    return (EA * strain - ES * curvature - N0, EI * curvature - ES * strain - M0,
-            (angle_of(*tangent[..., 0]), 1.0 + strain, 0.0 * xi, curvature))
+    (_, t), extension, bending, _ = cable_axis(beam, u, e, xi)
+    return angle_of(*t), 1.0 + extension, 0.0 * xi, bending
 
 
 def _strains_of_cable(beam, eigen, e, xi, N, M):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..beam import kinematics
 from ..core.errors import ModelWarning, warn
 from ..beam.distribution import SNAP
 from ..materials import LinearLaw
@@ -71,7 +72,7 @@ def check(state: Any) -> Checks:
     values, found = [], []
     for beam in state.beams:
         u, base = state.u_of(beam), None if state.base is None else state.base.u_of(beam)
-        ratio, stretches = beam.kinematics.deformation(beam, state._places[state.system.of(beam)])
+        ratio, stretches = kinematics.deformation(beam, state._places[state.system.of(beam)])
         values.append((np.min(ratio), np.min(stretches), np.max(stretches),
                        turning(beam, u, base)))
         found += (_findings(beam, values[-1][1], values[-1][3]) if base is None else
@@ -242,4 +243,4 @@ def shortest(beam: Beam, u: Array) -> float:
     u
         Displacement of its coordinates, shape (N,).
     """
-    return float(beam.kinematics.shortest(beam, u))
+    return kinematics.shortest(beam, u)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..beam.beam import Beam
-    from ..beam.interpolation import Part
+    from ..beam.interpolation import BeamPoints
     from .checks import Checks
     from ..actions.joints.base import Joint
     from ..actions.obstacles.contact import Contact
@@ -362,7 +362,7 @@ class State(Immutable, MaterialPoints):
             self._recovery_of, part.number) if recover else None, self._eigenstrains(part.beam)))
             for part in at.parts])
 
-    def values_of(self, beam: Beam, part: Part, recover: bool = True) -> Values:
+    def values_of(self, beam: Beam, part: BeamPoints, recover: bool = True) -> Values:
         """All fields at points of one beam, for pictures and files.
 
         Parameters
@@ -556,7 +556,8 @@ class State(Immutable, MaterialPoints):
             return Reaction(*frame.reaction(boundary, self._acted, multipliers))
         member: Any = select_member(self.beams, system.bodies, beam)
         s = system.of(member)
-        nodes, there = member.nodes(boundary), np.zeros(system.N, dtype=bool)
+        nodes = np.unique(member.dofs(boundary) // member.nd)
+        there = np.zeros(system.N, dtype=bool)
         there[s].reshape(-1, member.nd)[nodes] = True
         force, touched = system.constraints.force_on(there, self.multipliers)
         total = np.where(system.constraints.free, 0.0, self._support_force()) + force

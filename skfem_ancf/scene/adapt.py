@@ -316,7 +316,7 @@ def refine(scene: Any, marked: Sequence[ArrayLike]) -> tuple[Any, Callable[[Arra
     scene, prolong
         ``prolong(u)`` is the displacement u (N,) in the coordinates of the new scene.
     """
-    beams = [b.with_mesh(b.mesh.refined(np.asarray(m, dtype=int)))
+    beams = [b.replace(mesh=b.mesh.refined(np.asarray(m, dtype=int)))
              for b, m in zip(scene.beams, marked)]
 
     def prolong(u):

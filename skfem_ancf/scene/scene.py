@@ -936,7 +936,6 @@ class Scene:
         """
         boundary, beam = on_body(boundary, beam)
         k = self._number(beam)
-        self.members[k].section_node(boundary)
         load = EndMoment(self.members[k], boundary, require_finite_scalar("M", M), amplitude)
         return self._put(loads=[(k, load)])
 

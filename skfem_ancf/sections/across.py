@@ -454,6 +454,10 @@ class Across(Frozen):
             out.append((slab, terms))
         return out
 
+    def element_of(self, slab: Slab) -> ElementBeam:
+        """The element as formulations ask for it, with the rules across a layer."""
+        return self.element if self.plain else self.element.measured(slab.measure, self.shear)
+
     @cached_property
     def shear(self) -> float | None:
         """The shear factor for the element, None for that of a rectangle of one material."""
@@ -557,16 +561,8 @@ class Across(Frozen):
         EA, ES, EI = self.moments(np.array([0.5]), tind, "E")[:, :, 0]
         return EI - ES**2 / EA
 
-    def bending_over_mass(self, density: float) -> float:
-        """E I over the mass per length, where it is least.
-
-        Parameters
-        ----------
-        density
-            Mean mass per volume.
-        """
-        if self.simple:
-            return self.slabs[0].material.E * self.mesh.height**2 / density / 12.0
+    def bending_over_mass(self) -> float:
+        """E I over the mass per length, where it is least."""
         mass = self.moments(np.array([0.5]), what="mass")[0]
         return float(np.min(self.bending[:, None] / mass))
 

@@ -287,7 +287,7 @@ def _bending_eigenvalue(system):
     if not system.beams:
         mass = sum(body.total_mass for body in system.bodies)
         return system.energy_of_bodies / (mass * system.size**2) or 1.0
-    stiffness = min(b.across.bending_over_mass(b.density) for b in system.beams)
+    stiffness = min(b.across.bending_over_mass() for b in system.beams)
     return stiffness * (np.pi / system.size) ** 4
 
 

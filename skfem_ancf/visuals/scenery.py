@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..beam import kinematics
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_positive,
                            shown, require_unmasked)
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
@@ -41,7 +42,7 @@ class _Body:
         flat = self.shape[:2] + (-1,)
         x, axis = values.x.reshape(flat), beam.mesh.mapping().F(ends)
         u = values.u.reshape(flat)
-        axis_u = first_order(beam.kinematics.displacements(
+        axis_u = first_order(kinematics.displacements(
             beam, getattr(state, "_places_of", state.u_of)(beam), ends, None))
         self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
         self.values = field.of(values)

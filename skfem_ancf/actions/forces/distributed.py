@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...beam.interpolation import probe_reference
 from ...beam.layout import select_beam
 from ...core.errors import require_flag, require_not_negative
 from ...beam.kernels.section import beam_gradients
@@ -50,14 +51,14 @@ class Foundation(ForceElement):
 
     def bind(self, layout: Layout) -> list[Link]:
         beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
-        self._at, found = [], surfaces_of(beam, self.side, beam.facet_points)
+        self._at, found = [], surfaces_of(beam, self.side, beam.element.facet_points)
         self.along = (beam, *groups_of(beam.mesh, found))
         for one in found:
             X = one.X if beam.has_sections else np.array([one.X[0], np.full(len(one.X[0]), 0.5)])
             for e, areas, normals in zip(one.elements.tolist(), one.areas,
                                          one.normals.transpose(1, 2, 0)):
                 for x, area, normal in zip(X.T, areas, normals):
-                    dofs, weights = beam.probe_reference(e, x)
+                    dofs, weights = probe_reference(beam, e, x)
                     self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
                                      normal))
         return [place for place, _, _ in self._at]
@@ -115,7 +116,7 @@ class Drag(ForceElement):
         self._at = []
         for e in range(mesh.nelements):
             for k, x in enumerate(X.T):
-                dofs, weights = beam.probe_reference(e, x)
+                dofs, weights = probe_reference(beam, e, x)
                 place = link(Link(np.zeros(2), dofs + first, weights))
                 slope = link(Link(frame[0, e, k], dofs + first, slopes[0, e, k]))
                 self._at.append((place, slope, float(w[k] * length[e, k])))

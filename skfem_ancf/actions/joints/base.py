@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...mesh.places import node_of
+from ...beam.interpolation import locate, probe_reference
+from ...beam.kinematics import direction as direction_of, direction_weights
 from ...core.errors import AncfError, InputError, MeshError, require_finite, require_slope, shown
 from ...core.frozen import Sealable
 from ..loads import beside, require_entries
@@ -589,7 +592,7 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
                 found.append(k)
             continue
         try:
-            member.locate(at)
+            locate(member, at)
         except MeshError:
             continue
         found.append(k)
@@ -609,7 +612,7 @@ def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
     beams: list[Any] = [layout.members[k] for k in found]
     if len(found) < 2 or isinstance(at, str) or any(isinstance(b, RigidBody) for b in beams):
         return found
-    where = [(b, *b.locate(at)) for b in beams]
+    where = [(b, *locate(b, at)) for b in beams]
     off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]
     return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.alike]
 
@@ -685,7 +688,7 @@ def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     if isinstance(member, RigidBody):
         start = member.place(at)
     else:
-        e, X = member.locate(at)
+        e, X = locate(member, at)
         start = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
     return _of(layout, member, start, dofs, weights)
 
@@ -709,16 +712,16 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
         return point(layout, beam, place), _fixed(np.array([1.0, 0.0]))
     member = layout.beam(beam)
     if isinstance(member, RigidBody):
-        dofs, weights = member.section_direction(member.section_node(place))
+        dofs, weights = member.direction()
         return (point(layout, member, place),
                 _of(layout, member, member.q0[dofs] @ weights, dofs, weights))
     try:
-        node = member.section_node(place)
+        node = node_of(member.mesh, place)
     except MeshError:
         if not is_point(place):
             raise
         return _inner_section(layout, member, place)
-    dofs, weights = member.section_direction(node)
+    dofs, weights = direction_of(member, node)
     direction = _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights)
     if is_point(place) and member.has_sections:
         return point(layout, member, place), direction
@@ -728,12 +731,12 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
 
 def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
     """As :func:`section`, for a section inside an element."""
-    e, X = beam.locate(at)
+    e, X = locate(beam, at)
     if not beam.has_sections:
         X = np.array([X[0], 0.5])
         at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    dofs, _ = beam.probe_reference(e, X)
-    weights = beam.kinematics.direction_weights(beam, e, float(X[0]))
+    dofs, _ = probe_reference(beam, e, X)
+    weights = direction_weights(beam, e, float(X[0]))
     return point(layout, beam, at), _of(layout, beam, beam.q0_local[dofs] @ weights, dofs, weights)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ...beam.kinematics import direction
 from ...core.kept import cached_property
 from .base import Joint
 from .settlements import HELD, Settlements
@@ -362,8 +363,8 @@ def chain_ends(beam: Beam) -> Array:
 def _directions(beam: Beam, nodes: Array) -> tuple[Any, Array]:
     """Coordinates (2, nodes, n) and weights (nodes, n) of the directions of sections."""
     if beam.mesh.heights is None:
-        dofs, c = beam.section_direction(int(nodes[0]))
+        dofs, c = direction(beam, int(nodes[0]))
         shift = beam.nd * (nodes - nodes[0])
         return dofs[:, None] + shift[:, None], np.tile(c, (len(nodes), 1))
-    found = [beam.section_direction(int(node)) for node in nodes]
+    found = [direction(beam, int(node)) for node in nodes]
     return np.stack([dofs for dofs, _ in found], axis=1), np.array([c for _, c in found])

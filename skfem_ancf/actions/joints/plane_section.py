@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...mesh.places import node_of
+from ...beam.kinematics import plane
 from ...core.errors import require_label
 from .base import Joint
 
@@ -35,9 +37,9 @@ class PlaneSection(Joint):
 
     def bind(self, layout: Layout) -> None:
         beam = layout.beam(self.beam)
-        node = beam.section_node(self.at)
+        node = node_of(beam.mesh, self.at)
         t = beam.mesh.p_X[:, node]
-        direction, held = beam.kinematics.plane(beam, t)
+        direction, held = plane(beam, t)
         self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
         first = layout.offset(beam) + node * beam.nd
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...beam.interpolation import locate
 from ...beam.layout import select_beam
 from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                             require_integer, require_not_negative, require_option, require_positive,
@@ -211,7 +212,7 @@ class Obstacle(ForceElement):
         for beam in beams:
             for at in landmarks:
                 try:
-                    Y = beam.locate(at)[1][1]
+                    Y = locate(beam, at)[1][1]
                 except MeshError:
                     continue
                 if min(Y, 1.0 - Y) > CUT:
