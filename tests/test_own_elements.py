@@ -84,19 +84,19 @@ def test_held_are_the_modes_that_the_samples_miss(name):
     kernel = null_space(K / np.outer(size, size), rcond=1e-11) / size[:, None]
     rigid = beam.rigid_motions()
     assert np.linalg.matrix_rank(np.hstack([kernel, rigid]) * size[:, None], 1e-9) == len(kernel.T)
-    held = [mode.weights @ part for mode in element.held
+    held = [mode.weights @ part for mode in element.stabilised
             for part in (kernel[0::2], kernel[1::2])]
     missed = kernel.shape[1] - 3
     s = np.linalg.svd(np.array(held), compute_uv=False)
     assert np.sum(s > 1e-9 * s[0]) == missed  # rigid motions are not held, all else is
-    for mode in element.held:  # and none is held in vain
+    for mode in element.stabilised:  # and none is held in vain
         both = [mode.weights @ part for part in (kernel[0::2], kernel[1::2])]
         assert np.max(np.abs(both)) > 1e-6 * s[0]
 
 
 @pytest.mark.parametrize("element, k", [(ElementBeamANCF(3), 1.0), (ElementBeamANCFCubic(2), 10.0)])
 def test_held_of_a_cubic_axis_is_the_mean_slope_less_the_chord(element, k):
-    mode, nb = element.held[0], element.nodal_dofs
+    mode, nb = element.stabilised[0], element.nodal_dofs
     expected = np.zeros(2 * nb)
     expected[[0, 1, nb, nb + 1]] = 1.0, 0.5, -1.0, 0.5
     assert_allclose(mode.weights, expected, atol=1e-15)

@@ -15,8 +15,8 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
            "sweeps"]
 #: Returned by public methods, and machinery all the same.
 MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "System", "Spread",
-             "ElementStrain", "Law", "Amplitude", "BodyFields", "Link", "Part",
-             "Held", "Sampling", "Rule", "Series", "Point", "Critical", "Vector"}
+             "Interpolation", "Layer", "Law", "Amplitude", "BodyFields", "Link", "Part",
+             "StabilisedMode", "Sampling", "Rule", "Point", "Critical", "Vector"}
 
 
 def entries():

@@ -140,7 +140,7 @@ class LineLoad(Load):
                   np.broadcast_to(given[:, None, None], x.shape))
         if self.chains is not None:
             values = values * np.isin(mesh.chains, self.chains)[:, None]
-        functions = beam.element.functions(mapping, X)[0]
+        functions = beam.element.of_mesh(mapping, X)[0]
         vector = beam.kernel.scatter(np.einsum("kep,iep->eki", functions, lengths * values))
         spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,
                                          values * (lengths / w)),))

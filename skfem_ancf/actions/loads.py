@@ -434,7 +434,7 @@ class Traction(Load):
         for one in found:
             density = ask_field("t(x)", t, mapping.F(one.X, one.elements)) if callable(t) else (
                 t[:, None, None])
-            functions = beam.element.values(mapping, one.X, one.elements)
+            functions = beam.element.of_mesh(mapping, one.X, one.elements)[0]
             forces.append(density * one.areas)
             add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions, forces[-1]), vector)
         if not beam.has_sections:

@@ -92,7 +92,7 @@ def inertia_of(beam: Any) -> Inertia:
     parts = []
     for slab, rule in across.rules(beam.element.order + 1, inertia=True):
         X, W = product_rule(axis, rule)
-        parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
+        parts.append((beam.element.of_mesh(beam.mesh.mapping(), X, tind)[0],
                       across.volume(slab, X, W, tind, times="density", full=True)))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
@@ -103,7 +103,7 @@ def _of_cable(beam):
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
-    N, d_xi = beam.element.along(mapping, X, tind)
+    N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
     eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
     J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
     # the length of the axis: directors that are interpolated between nodes are shorter than one
@@ -130,7 +130,7 @@ def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
     """
     X, W = exact_rule(beam)
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
-    N = element.values(mapping, X).transpose(1, 0, 2)
+    N = element.of_mesh(mapping, X)[0].transpose(1, 0, 2)
     weighted, back = N * (mapping.full_volume(X) * W)[:, None], N.transpose(0, 2, 1)
     gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
     gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])

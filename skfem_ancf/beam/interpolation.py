@@ -64,14 +64,18 @@ class BeamPoints:
         return first + np.arange(2 * self.beam.nd).reshape(-1, 2, 1)
 
     @cached_property
+    def _functions(self):
+        return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.at, self.e)
+
+    @property
     def weights(self) -> Array:
         """Their weights in the position, (nb, n)."""
-        return self.beam.element.values(self.beam.mesh.mapping(), self.at, self.e)[..., 0]
+        return self._functions[0][..., 0]
 
-    @cached_property
+    @property
     def slopes(self) -> Array:
         """Their weights in the derivative of the position by xi, (nb, n)."""
-        return self.beam.element.along(self.beam.mesh.mapping(), self.at, self.e)[1][..., 0]
+        return self._functions[1][..., 0]
 
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum (..., 2, n) of weighted degrees of freedom (..., N) at each point."""

@@ -86,7 +86,10 @@ def gradients(beam: Any, u: Array, X: Array, tind: Array | None) -> tuple[Array,
     mapping = beam.mesh.mapping()
     if beam.has_sections:
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-        return beam.element.gradients(mapping, X, tind, u_e)
+        _, d_xi, d_eta = beam.element.of_mesh(mapping, X, tind)
+        r_xi, r_eta = (np.einsum("ebi,bep->iep", u_e, d, optimize=True) for d in (d_xi, d_eta))
+        rates, frame = mapping.in_frame(X, tind)
+        return r_xi[:, None] * rates[:, 0] + r_eta[:, None] * rates[:, 1], frame
     e, P, shape = _flat(beam, X, tind)
     (_, tangent), *axis = cable_axis(beam, u, e, P[0])
     longer, ratio = fibres(beam, e, P, *axis)
@@ -101,7 +104,7 @@ def displacements(beam: Any, u: Array, X: Array, tind: Array | None) -> Array:
     """As :meth:`Beam.displacements <skfem_ancf.Beam.displacements>`; u may be complex."""
     mapping = beam.mesh.mapping()
     u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-    out = np.einsum("eki,kep->iep", u_e, beam.element.values(mapping, X, tind), optimize=True)
+    out = np.einsum("eki,kep->iep", u_e, beam.element.of_mesh(mapping, X, tind)[0], optimize=True)
     if beam.has_sections:
         return out
     e, P, shape = _flat(beam, X, tind)

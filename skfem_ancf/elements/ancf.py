@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ..core.errors import require_integer, require_option
-from ..core.frozen import read_only
+from ..core.immutable import read_only
 from ..core.quadrature import gauss_lobatto
 from .base import ElementBeam, SectionFunctions
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,25 +10,20 @@ from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
 from ..core.errors import InputError, MeshError, require_finite, shown
-from ..core.frozen import Content, Frozen, read_only
-from ..core.kept import cached_property
+from ..core.immutable import Immutable
+from ..core.quadrature import gauss
 from ..mesh.nodal import nodal_derivatives, turned
-from ..core.quadrature import gauss, tensor
-from ..mesh.reference_cell import SECTIONS, RefBeam, few, hermite_basis
-from .series import coefficients
-from .sampling import Held, Sampling, default_sampling, missed
+from ..mesh.reference_cell import SECTIONS, RefBeam, hermite_basis
+from .sampling import Sampling, StabilisedMode, default_sampling, missed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
-    from ..mesh.mapping import MappingBeam
-    from ..mesh.chain import Chain
-    from ..mesh.mesh_beam import MeshBeam
     from ..core.types import Array, Rule
-
-    Functionals = tuple[tuple[float, int, int], ...]
+    from ..mesh.mapping import MappingBeam
+    from ..mesh.mesh_beam import MeshBeam
 
 
 #: Degrees along the axis of the elements of the package.
@@ -36,18 +31,7 @@ DEGREES = tuple(range(3, 16, 2))
 
 
 def require_degree(degree: object) -> int:
-    """A degree along the axis: one of :data:`DEGREES`.
-
-    Parameters
-    ----------
-    degree
-        What was given.
-
-    Raises
-    ------
-    InputError
-        If it is another.
-    """
+    """A degree along the axis: one of :data:`DEGREES`; raises InputError for another."""
     if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
             or degree not in DEGREES):
         raise InputError(f"the degree along the axis is one of {', '.join(map(str, DEGREES))}, got "
@@ -55,48 +39,59 @@ def require_degree(degree: object) -> int:
     return int(degree)
 
 
-class ElementBeam(Frozen, Element):
+class SectionFunctions:
+    """Polynomials P_k(eta), P_k(0) = 0, given by their derivatives in the Legendre basis.
+
+    The section function of a beam is ``h^m P_k(Y / h)`` for an m-th derivative.
+
+    Parameters
+    ----------
+    derivatives
+        Legendre coefficients of P_k' on [-1/2, 1/2], shape (degree, n).
+    """
+
+    def __init__(self, derivatives: ArrayLike) -> None:
+        self._dP = require_finite("derivatives", derivatives, (None, None))
+        self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2.0
+        self.degree, self.number = self._dP.shape
+
+    def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
+        """P_k and its derivative at eta in [-1/2, 1/2]; of all k, shape (n,) + eta.shape."""
+        return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])
+
+
+class ElementBeam(Immutable, Element):
     """A scalar beam element; wrap it in scikit-fem's ``ElementVector`` for the position field.
 
     The local functions are, for each of the two nodes, a Hermite function in xi for the position
     ``r``, its slope ``r_X`` and further derivatives on the axis, then ``(1 - xi) P_k(Y)`` or
-    ``xi P_k(Y)`` for each section coordinate, Hermite functions too where their derivatives along
-    X are coordinates. A subclass says what the coordinates are; all else follows from that, the
-    :attr:`sampling` of the formulation "assumed" included, which it may override.
+    ``xi P_k(Y)`` for each derivative of the section, Hermite functions too where their derivatives
+    along X are degrees of freedom. A subclass says what the degrees of freedom are; all else
+    follows, the :attr:`sampling` of the formulation "assumed" included, which it may override.
 
     Parameters
     ----------
     section
         The functions P_k of the section, a :class:`SectionFunctions`.
     names
-        Names of the coordinates of a node after ``r`` and ``r_X``: further derivatives of the
-        axis, then those of all P_k, then their first derivatives along X, and so on.
+        Names of the degrees of freedom of a node after ``r`` and ``r_X``: further derivatives of
+        the axis, then those of all P_k, then their first derivatives along X, and so on.
     functionals
-        What these coordinates are, as in the attribute.
+        What these are, as in the attribute.
     welded
-        Those of ``names`` that a welded face fixes.
+        Those of ``names`` that a welded face fixes: the position of every point of it.
 
     Attributes
     ----------
-    section : SectionFunctions
-        The functions P_k of the section.
-    welded : list of str
-        Names of the coordinates that a welded face fixes: the position of every point of it.
     functionals : tuple of (float, int, int)
-        For each coordinate of a node: eta - 1/2 of the point, and the number of derivatives
-        along X and Y that the coordinate is.
+        For each degree of freedom of a node: eta - 1/2 of the point, and the number of derivatives
+        along X and Y.
     axis_degree : int
         Polynomial degree of the axis along X.
     sections : str
-        How section coordinates vary between the nodes: "linear", "cubic" or "quintic" (Hermite,
-        with derivatives along X as further coordinates).
-    strain_degree : int
-        Polynomial degree of the Green-Lagrange strain along a straight element.
-    carries_shear_parabola : bool
-        True if the section functions hold Y^3, so that no shear correction is wanted.
+        How the section varies between the nodes: "linear", "cubic" or "quintic" (Hermite).
     kinematics : str
-        How the points of a section follow the coordinates: a name of
-        :data:`skfem_ancf.beam.kinematics.KINEMATICS`.
+        "sections" or "cable", see :mod:`skfem_ancf.beam.kinematics`.
     """
 
     refdom = RefBeam
@@ -110,7 +105,7 @@ class ElementBeam(Frozen, Element):
         self.section = section
         self.dofnames = ["r", "r_X", *names]
         self.nodal_dofs = len(self.dofnames)
-        self.functionals: Functionals = (
+        self.functionals: tuple[tuple[float, int, int], ...] = (
             (0.0, 0, 0), (0.0, 1, 0), *((y, along, across) for y, along, across in functionals))
         self.welded = ["r", *welded]
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
@@ -139,8 +134,9 @@ class ElementBeam(Frozen, Element):
         shear
             What :func:`skfem_ancf.sections.shear.shear_factor` gives for the section.
         """
-        other = object.__new__(type(self))
-        other.__dict__.update(vars(self), _measure=measure, shear=shear)
+        other = self._thawed()
+        other._measure, other.shear = measure, shear
+        other._freeze()
         return other
 
     def raised(self) -> ElementBeam | None:
@@ -149,13 +145,7 @@ class ElementBeam(Frozen, Element):
         return None
 
     def across(self, n: int) -> Rule:
-        """Points eta and weights across the section, n of them; those of Gauss unless it is known.
-
-        Parameters
-        ----------
-        n
-            Number of points.
-        """
+        """n Gauss points eta and weights across the section."""
         return gauss(n) if self._measure is None else self._measure.gauss(n)
 
     @property
@@ -165,10 +155,12 @@ class ElementBeam(Frozen, Element):
 
     @property
     def strain_degree(self) -> int:
+        """Polynomial degree of the Green-Lagrange strain along a straight element."""
         return 2 * max(self.axis_degree - 1, 2 * self._along[1] - 1)
 
     @property
     def carries_shear_parabola(self) -> bool:
+        """True if the section functions hold Y^3, so that no shear correction is wanted."""
         return self.section.degree >= 3
 
     @property
@@ -176,9 +168,30 @@ class ElementBeam(Frozen, Element):
         """Gauss points of a facet, for products of two local functions."""
         return max(self.axis_degree, self.order) + 2
 
-    @property
+    # local functions
+
+    @cached_property
     def _factors(self) -> Array:
-        return _factors(self._along, self.functionals, self.section.number)
+        """Of all local functions: row of the axis functions, or -1, of those along X that a
+        section function has, its number, the power of h, and that of the length."""
+        m, n = self._along
+        return np.array([(m * node + slope if power == 0 else -1, n * node + slope,
+                          (k - m) % max(self.section.number, 1), power, slope)
+                         for node in (0, 1)
+                         for k, (_, slope, power) in enumerate(self.functionals)]).T
+
+    def _unit(self, X: Array, i: Any = slice(None)) -> Array:
+        """Functions of height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
+        axis, of_node, number = self._factors[:3, i]
+        out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
+        of_axis, of_section = axis >= 0, axis < 0
+        for d in (0, 1):
+            out[d, of_axis] = hermite_basis(self._along[0], X[0], d)[axis[of_axis]]
+        if np.any(of_section):
+            S, dS = (hermite_basis(self._along[1], X[0], d)[of_node[of_section]] for d in (0, 1))
+            P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
+            out[:, of_section] = S * P, dS * P, S * dP
+        return out
 
     def local(self, X: Array, h: float | Array, i: int | slice = slice(None),
               rate: float | Array = 0.0) -> tuple[Array, Array, Array, Any]:
@@ -202,91 +215,22 @@ class ElementBeam(Frozen, Element):
             Arrays of shape X.shape[1:], or (n,) + X.shape[1:] of a slice; of the shape of h where
             that has more axes.
         slope
-            The power of L that a function takes: how many derivatives along X its coordinate is.
+            The power of L that a function takes: how many derivatives along X it belongs to.
         """
         if not isinstance(i, slice):
             if not 0 <= i < 2 * self.nodal_dofs:
                 self._index_error()
             value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1), rate)
             return value[0], d_xi[0], d_eta[0], int(slope)
-        (value, d_xi, d_eta), power, slope = self._of_height(X, h, i)
-        if isinstance(h, np.ndarray):  # h^p P(Y / h) of a height that varies
+        power, slope = self._factors[3:, i]
+        unit = self._unit(X, i)
+        if np.ndim(h) == unit.ndim - 1:  # the same points of each element
+            unit = unit[:, :, None]
+        column = (-1,) + (1,) * (unit.ndim - 2)
+        value, d_xi, d_eta = np.asarray(h) ** power.reshape(column) * unit
+        if np.ndim(h):  # h^p P(Y / h) of a height that varies
             d_xi += np.multiply.outer(power, rate / h) * value
         return value, d_xi, d_eta, slope
-
-    def _of_height(self, X: Array, h: Any, i: slice = slice(None), parts: slice = slice(None)
-                   ) -> tuple[Array, Array, Array]:
-        """What :meth:`local` returns first, or some of it, at a constant height; both powers."""
-        power, slope = self._factors[3:, i]
-        if few(X):
-            unit = _kept_functions(self._along, self.functionals, self.section, Content(X))
-            unit = unit[parts, i]
-        else:
-            unit = _unit_functions(self._along, self._factors[:, i], self.section, X)[parts]
-        if isinstance(h, np.ndarray) and h.ndim == unit.ndim - 1:  # some points of each element
-            unit = unit[:, :, None]
-        factor = _powers(h, power)
-        return factor.reshape(factor.shape[:1] + (
-            factor.shape[1:] or (1,) * (unit.ndim - 2))) * unit, power, slope
-
-    def series(self) -> tuple[Array, Array, Array]:
-        """The local functions of height 1 and length 1 in products of Chebyshev polynomials.
-
-        Returns
-        -------
-        coefficients
-            As :func:`skfem_ancf.elements.series.coefficients` returns them, which are kept.
-        height, length
-            The powers of both that the functions take, shape (2 nodal_dofs,) each.
-        """
-        p = max(self.axis_degree, 3 if self.sections == "cubic" else 1) + 1
-        m = max(self.order, 1) + 1
-        return (_series(self._along, self.functionals, self.section, p, m), *self._factors[3:])
-
-    def integrals(self, h: float, L: float) -> Array:
-        """The means of the local functions over a straight element of one height; (2 nodal_dofs,).
-
-        Parameters
-        ----------
-        h, L
-            Its height and length.
-        """
-        return self.powers(h, L) * _integrals_of(
-            self._along, self.functionals, self.section, self.axis_degree, max(self.order, 1))
-
-    def products(self, h: float, L: float) -> Array:
-        """The means of products of two of them alike, shape (2 nodal_dofs, 2 nodal_dofs).
-
-        Parameters
-        ----------
-        h, L
-            As for :meth:`integrals`.
-        """
-        powers = self.powers(h, L)
-        return powers[:, None] * powers * _products_of(
-            self._along, self.functionals, self.section, self.axis_degree, max(self.order, 1))
-
-    @property
-    def by_reference(self) -> bool:
-        """True if elements follow from one of length and height 1, straight ones by powers."""
-        return all(getattr(type(self), name) is getattr(ElementBeam, name)
-                   for name in ("local", "of_mesh", "functions", "slopes"))
-
-    def unit_slopes(self, X: Array, Y: Array) -> Array:
-        """Derivatives of the local functions of height 1 and length 1, which are kept.
-
-        Parameters
-        ----------
-        X, Y
-            Reference points of derivatives along the axis, shape (2, n), and of those across, (2,
-            m).
-
-        Returns
-        -------
-        ndarray
-            Shape (n + m, 2 nodal_dofs).
-        """
-        return _slopes(self._along, self.functionals, self.section, Content(X, Y))
 
     def powers(self, h: float, L: float | Array) -> Array:
         """What height and length multiply the local functions by, shape (..., 2 nodal_dofs).
@@ -298,6 +242,47 @@ class ElementBeam(Frozen, Element):
         """
         power, slope = self._factors[3:]
         return h**power * L**slope
+
+    @property
+    def by_reference(self) -> bool:
+        """True if elements follow from one of length and height 1, straight ones by powers."""
+        return all(getattr(type(self), name) is getattr(ElementBeam, name)
+                   for name in ("local", "of_mesh", "functions", "slopes"))
+
+    def unit_slopes(self, X: Array, Y: Array) -> Array:
+        """Derivatives of the local functions of height 1 and length 1, (n + m, 2 nodal_dofs).
+
+        Parameters
+        ----------
+        X, Y
+            Reference points of derivatives along the axis, shape (2, n), and of those across, (2,
+            m).
+        """
+        out = np.concatenate([self._unit(X)[1].T, self._unit(Y)[2].T])
+        # the positions of both nodes together are a translation: exactly, or round-off resists it
+        out[:, self.nodal_dofs] = -out[:, 0]
+        return out
+
+    def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
+                i: slice = slice(None)) -> list[Array]:
+        """Local functions of elements of a mesh, and their derivatives by xi and eta.
+
+        Parameters
+        ----------
+        mapping, X, tind, i
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,); a slice of the functions.
+
+        Returns
+        -------
+        value, d_xi, d_eta
+            Shape (n, nelements, npoints) each.
+        """
+        h, rate = mapping.height(X[0], tind) if self.section.number else (1.0, 0.0)
+        *found, slope = self.local(X, h, i, rate)
+        lengths = mapping.mesh.lengths if tind is None else mapping.mesh.lengths[tind]
+        scale = (lengths ** slope[:, None])[:, :, None]
+        return [scale * (x[:, None] if x.ndim == 2 else x) for x in found]
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
@@ -326,95 +311,17 @@ class ElementBeam(Frozen, Element):
 
     def functions(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                   which: slice = slice(None)) -> tuple[Array, Array]:
-        """All local functions on the body, with their gradients.
+        """Local functions on the body, (n, nelements, npoints), with their gradients, (n, 2, ...).
 
         Parameters
         ----------
-        mapping, X, tind
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+        mapping, X, tind, which
+            As for :meth:`of_mesh`, shapes (2, npoints) or (2, nelements, npoints), and
             (nelements,).
-        which
-            Some of them.
-
-        Returns
-        -------
-        value, grad
-            Shapes (n, nelements, npoints) and (n, 2, nelements, npoints).
         """
-        mesh = mapping.mesh
-        value, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind, which)
-        if value.ndim == 2:  # the same points of all elements
-            value, d_xi, d_eta = value[:, None], d_xi[:, None], d_eta[:, None]
-        scale = self._scale(mesh, slope, tind)[:, :, None]
+        value, d_xi, d_eta = self.of_mesh(mapping, X, tind, which)
         invDF = mapping.invDF(X, tind)
-        grad = scale[:, None] * (invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None])
-        return scale * value, grad
-
-    def values(self, mapping: MappingBeam, X: Array, tind: Array | None = None) -> Array:
-        """All local functions on the body, without their gradients; shape (n, nelements, npoints).
-
-        Parameters
-        ----------
-        mapping, X, tind
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
-        """
-        if not self.by_reference:
-            value, _, _, slope = self.of_mesh(mapping, X, tind)
-        else:
-            h = mapping.height(X[0], tind)[0] if self.section.number else 1.0
-            (value,), _, slope = self._of_height(X, h, parts=slice(1))
-        return self._scaled(mapping.mesh, slope, tind, value)[0]
-
-    def along(self, mapping: MappingBeam, X: Array, tind: Array | None = None
-              ) -> tuple[Array, Array]:
-        """All local functions on the body, and their derivatives by xi.
-
-        Parameters
-        ----------
-        mapping, X, tind
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
-
-        Returns
-        -------
-        value, d_xi
-            Shape (n, nelements, npoints) both.
-        """
-        value, d_xi, _, slope = self.of_mesh(mapping, X, tind)
-        value, d_xi = self._scaled(mapping.mesh, slope, tind, value, d_xi)
-        return value, d_xi
-
-    def _scaled(self, mesh: Chain, slope: Array, tind: Array | None, *values: Array
-                ) -> list[Array]:
-        """Local functions of all elements from those of length 1, which may be the same."""
-        scale = self._scale(mesh, slope, tind)[:, :, None]
-        return [scale * (x[:, None] if x.ndim == 2 else x) for x in values]
-
-    def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
-                i: int | slice = slice(None)) -> tuple[Array, Array, Array, Any]:
-        """As :meth:`local`, with the heights of a mesh.
-
-        Parameters
-        ----------
-        mapping, X, tind, i
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
-
-        Returns
-        -------
-        value, d_xi, d_eta, slope
-            Of a tapered mesh with the axis of the elements, (n, nelements, npoints), where there
-            are functions of the section.
-        """
-        h, rate = mapping.height(X[0], tind) if self.section.number else (1.0, 0.0)
-        return self.local(X, h, i, rate)
-
-    @staticmethod
-    def _scale(mesh: Chain, slope: Array, tind: Array | None) -> Array:
-        """The lengths of elements to the powers of local functions, shape (n, nelements)."""
-        lengths = mesh.lengths if tind is None else mesh.lengths[tind]
-        return lengths ** slope[:, None]
+        return value, invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None]
 
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
@@ -432,38 +339,11 @@ class ElementBeam(Frozen, Element):
             Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints), see
             :meth:`MappingBeam.frame <skfem_ancf.mesh.mapping.MappingBeam.frame>`.
         """
-        _, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind)
-        if d_xi.ndim == 2:  # the same points of all elements
-            d_xi, d_eta = d_xi[:, None], d_eta[:, None]
+        _, d_xi, d_eta = self.of_mesh(mapping, X, tind)
         rates, frame = mapping.in_frame(X, tind)
-        out = rates[:, 0] * d_xi[:, None] + rates[:, 1] * d_eta[:, None]
-        out *= self._scale(mapping.mesh, slope, tind)[:, None, :, None]
-        return out, frame
+        return rates[:, 0] * d_xi[:, None] + rates[:, 1] * d_eta[:, None], frame
 
-    def gradients(self, mapping: MappingBeam, X: Array, tind: Array | None, u_e: Array
-                  ) -> tuple[Array, Array]:
-        """Derivatives of a displacement along the axis and across it, and the beam's frame.
-
-        Parameters
-        ----------
-        mapping, X, tind
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
-        u_e
-            Coordinates of the elements, shape (nelements, n, 2).
-
-        Returns
-        -------
-        H, frame
-            Shape (2, 2, nelements, npoints) both.
-        """
-        mesh = mapping.mesh
-        _, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind)
-        points = "bp" if d_xi.ndim == 2 else "bep"
-        u = np.multiply(u_e.T, self._scale(mesh, slope, tind), order="C")
-        r_xi, r_eta = (np.einsum(f"ibe,{points}->iep", u, d) for d in (d_xi, d_eta))
-        rates, frame = mapping.in_frame(X, tind)
-        return r_xi[:, None] * rates[:, 0] + r_eta[:, None] * rates[:, 1], frame
+    # stabilisation, adaptivity
 
     @cached_property
     def sampling(self) -> Sampling:
@@ -471,32 +351,32 @@ class ElementBeam(Frozen, Element):
         return default_sampling(self.axis_degree, 2 * self._along[1] - 1)
 
     @cached_property
-    def held(self) -> tuple[Held, ...]:
-        """The modes that eps_xx misses there, of the axis and of each section coordinate.
+    def stabilised(self) -> tuple[StabilisedMode, ...]:
+        """The modes that eps_xx misses there, of the axis and of each section function.
 
         Their sizes do not lower the order of the error, which is 2 for linear sections. The more
-        derivatives are coordinates, the more may resist and the less c is: for a quintic axis ten
-        times the size of a cubic one costs little and spares the higher modes.
+        derivatives are degrees of freedom, the more may resist and the less c is: for a quintic
+        axis ten times the size of a cubic one costs little and spares the higher modes.
         """
         (m, k), N = self._along, self.section.number
         n = len(self.sampling.places("xx"))
         size = (1.0, "element") if k == 1 else (10.0 ** (m - 1), "beam")
-        return (*(Held(self._of_both(range(m), w), *size) for w in missed(m, n)),
-                *(Held(self._of_both(range(m + j, m + j + N * k, N), w), 1.0 / N)
+        return (*(StabilisedMode(self._of_both(range(m), w), *size) for w in missed(m, n)),
+                *(StabilisedMode(self._of_both(range(m + j, m + j + N * k, N), w), 1.0 / N)
                   for j in range(N) for w in missed(k, n)))
 
     def _of_both(self, rows: Sequence[int], weights: Array) -> Array:
-        """Weights of some coordinates of both nodes, among zeros for the others."""
+        """Weights of some degrees of freedom of both nodes, among zeros for the others."""
         full = np.zeros((2, self.nodal_dofs))
         full[:, rows] = weights.reshape(2, -1)
         return full.ravel()
 
     @cached_property
     def halving(self) -> Array:
-        """The coordinates of the left half of an element of length 1 and height 1 from its own.
+        """The left half of an element of length 1 and height 1 from the whole of it.
 
-        Shape (2 nodal_dofs, 2 nodal_dofs), for coordinates multiplied by the length to the number
-        of their derivatives along X. The last nodal_dofs rows are those of the middle.
+        Shape (2 nodal_dofs, 2 nodal_dofs), for degrees of freedom multiplied by the length to the
+        number of their derivatives along X. The last nodal_dofs rows are those of the middle.
         """
         n = self.axis_degree + 1, max(self.order, 1) + 1
         X = np.array(np.meshgrid(np.linspace(0, 1, n[0]), np.linspace(0, 1, n[1]))).reshape(2, -1)
@@ -504,13 +384,10 @@ class ElementBeam(Frozen, Element):
         own, child = (self.local(P, 1.0)[0].T for P in (half, X))
         return np.linalg.lstsq(child, own, rcond=None)[0]
 
+    # the reference configuration
+
     def fitted(self, mesh: MeshBeam) -> MeshBeam:
         """The mesh that a beam of this element has: a curved one with sections as its own.
-
-        Parameters
-        ----------
-        mesh
-            A MeshBeam.
 
         Raises
         ------
@@ -532,12 +409,7 @@ class ElementBeam(Frozen, Element):
         return self.sections
 
     def rigid(self, mesh: MeshBeam) -> Array:
-        """The coordinates of the nodes in the stress-free state, less their positions.
-
-        Parameters
-        ----------
-        mesh
-            A MeshBeam whose ``sections`` are those of the element, unless it is straight.
+        """The degrees of freedom of the reference configuration, less the positions of nodes.
 
         Returns
         -------
@@ -547,7 +419,7 @@ class ElementBeam(Frozen, Element):
         Raises
         ------
         MeshError
-            If the mesh is curved and interpolates its sections in another way.
+            If the mesh is curved and its ``sections`` are not those of the element.
         """
         if mesh.sections != self.mesh_sections and not mesh.is_straight:
             raise MeshError(f"the sections of {self!r} are {self.mesh_sections}, those of the "
@@ -568,131 +440,4 @@ class ElementBeam(Frozen, Element):
         return out
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"
-
-
-@lru_cache(64)
-def _integrals(content: Content) -> Array:
-    """From the coefficients of derivatives by eta in 2 eta to those of functions, zero at 0."""
-    derivatives, = content.arrays
-    return read_only(legendre.legint(derivatives, lbnd=0.0, axis=0) / 2)
-
-
-@lru_cache(64)
-def _factors(along: tuple[int, int], functionals: Functionals, number: int) -> Array:
-    """Of all local functions: row of the axis functions, or -1, of those along X that a section
-    function has, its number, the power of h, and that of the length."""
-    m, n = along
-    rows = []
-    for node in (0, 1):
-        for k, (_, slope, power) in enumerate(functionals):
-            of = m * node + slope if power == 0 else -1
-            rows.append((of, n * node + slope, (k - m) % max(number, 1), power, slope))
-    return read_only(np.array(rows).T)
-
-
-@lru_cache(64)
-def _series(along: tuple[int, int], functionals: Functionals, section: SectionFunctions, p: int,
-            m: int) -> Array:
-    factors = _factors(along, functionals, section.number)
-    return read_only(coefficients(lambda X: _unit_functions(along, factors, section, X)[0], p, m))
-
-
-@lru_cache(64)
-def _integrals_of(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
-                  degree: int, order: int) -> Array:
-    X, W = tensor(gauss(degree // 2 + 1), gauss(order // 2 + 1))
-    factors = _factors(along, functionals, section.number)
-    return read_only(_unit_functions(along, factors, section, X)[0] @ W)
-
-
-@lru_cache(64)
-def _products_of(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
-                 degree: int, order: int) -> Array:
-    X, W = tensor(gauss(degree + 1), gauss(order + 1))
-    N = _unit_functions(along, _factors(along, functionals, section.number), section, X)[0]
-    return read_only(N * W @ N.T)
-
-
-@lru_cache(64)
-def _slopes(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
-            content: Content) -> Array:
-    factors, (X, Y) = _factors(along, functionals, section.number), content.arrays
-    out = np.concatenate([_unit_functions(along, factors, section, X)[1].T,
-                          _unit_functions(along, factors, section, Y)[2].T])
-    # the positions of both nodes together are a translation: exactly, or round-off resists it
-    out[:, len(functionals)] = -out[:, 0]
-    return read_only(out)
-
-
-@lru_cache(256)
-def _kept_functions(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
-                    content: Content) -> Array:
-    """All of :func:`_unit_functions`, of one array of points."""
-    X, = content.arrays
-    return read_only(_unit_functions(along, _factors(along, functionals, section.number), section,
-                                     X))
-
-
-def _powers(h: float | Array, power: Array) -> Array:
-    """h to several powers, shape (n,) + h.shape; of an array each found once."""
-    if not isinstance(h, np.ndarray):
-        return h**power
-    found = np.ones((power.max(initial=0) + 1, *h.shape), h.dtype)
-    for k in range(1, len(found)):
-        np.multiply(found[k - 1], h, out=found[k])
-    return found.take(power, axis=0)
-
-
-def _unit_functions(along: tuple[int, int], factors: Array, section: SectionFunctions,
-                    X: Array) -> Array:
-    """Local functions of height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
-    axis, of_node, number, _, _ = factors
-    out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
-    of_axis, of_section = axis >= 0, axis < 0
-    for d in (0, 1):
-        out[d, of_axis] = hermite_basis(along[0], X[0], d)[axis[of_axis]]
-    if np.any(of_section):
-        S, dS = (hermite_basis(along[1], X[0], d)[of_node[of_section]] for d in (0, 1))
-        P, dP = (values[number[of_section]] for values in section(X[1] - 0.5))
-        out[:, of_section] = S * P, dS * P, S * dP
-    return out
-
-
-class SectionFunctions(Frozen):
-    """Polynomials P_k(eta), P_k(0) = 0, given by their derivatives in the Legendre basis.
-
-    The beam's section function is ``h^m P_k(Y / h)`` for a coordinate that is an m-th derivative.
-
-    Parameters
-    ----------
-    derivatives
-        Legendre coefficients of P_k' on [-1/2, 1/2], shape (degree, n).
-    """
-
-    def __init__(self, derivatives: ArrayLike) -> None:
-        self._dP = require_finite("derivatives", derivatives, (None, None))
-        self._P = _integrals(Content(self._dP))
-
-    def __eq__(self, other: object) -> bool:
-        return self is other or (type(self) is type(other) is SectionFunctions
-                                 and self._content == other._content)
-
-    def __hash__(self) -> int:
-        return hash(self._content) if type(self) is SectionFunctions else id(self)
-
-    @cached_property
-    def _content(self) -> Content:
-        return Content(self._dP)
-
-    @property
-    def degree(self) -> int:
-        return self._dP.shape[0]
-
-    @property
-    def number(self) -> int:
-        return self._dP.shape[1]
-
-    def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
-        """P_k and its derivative at eta in [-1/2, 1/2]; of all k, shape (n,) + eta.shape."""
-        return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])
+        return f"<{type(self).__name__} of order {self.order}: {', '.join(self.dofnames)}>"

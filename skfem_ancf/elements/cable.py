@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.frozen import read_only
-from ..core.kept import cached_property
-from ..core.quadrature import gauss
 from ..mesh.reference_cell import SECTIONS, hermite_basis
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
-from .sampling import Held, Sampling
+from .sampling import Sampling, StabilisedMode
 
 if TYPE_CHECKING:
     from ..core.types import Array
@@ -81,7 +78,7 @@ class ElementBeamCable(ElementBeam):
         return "linear" if self.axis_degree < 7 else SECTIONS[self.nodal_dofs - 1]
 
     def axis(self, xi: Array, derivative: int) -> Array:
-        """The 2 m Hermite functions of the axis, or a derivative of them by xi.
+        """The Hermite functions of the axis, or a derivative of them by xi, (2 m,) + xi.shape.
 
         Parameters
         ----------
@@ -89,43 +86,15 @@ class ElementBeamCable(ElementBeam):
             Points, of any shape (...).
         derivative
             Number of derivatives.
-
-        Returns
-        -------
-        ndarray
-            Shape (2 m,) + xi.shape, m coordinates a node.
         """
         return hermite_basis(self.nodal_dofs, xi, derivative)
-
-    def derivatives_at_gauss_points(self, n: int) -> Array:
-        """The first and second derivatives of :meth:`axis` at n Gauss points, which are kept.
-
-        Parameters
-        ----------
-        n
-            Number of points.
-
-        Returns
-        -------
-        ndarray
-            One below the other, shape (2 n, 2 m).
-        """
-        if type(self) is ElementBeamCable:
-            return _derivatives(self.nodal_dofs, n)
-        xi = gauss(n)[0]
-        return np.concatenate([self.axis(xi, d).T for d in (1, 2)])
 
     @cached_property
     def sampling(self) -> Sampling:
         return Sampling(self.axis_degree - 1, {})
 
-    @cached_property
-    def held(self) -> tuple[Held, ...]:
-        # the mode that a higher degree misses in one element is held where two meet, and that of
-        # the cubic axis by a third point
+    @property
+    def stabilised(self) -> tuple[StabilisedMode, ...]:
+        # the mode that a higher degree misses in one element is resisted where two meet, and that
+        # of the cubic axis by a third point
         return ()
-
-
-@lru_cache(64)
-def _derivatives(m: int, n: int) -> Array:
-    return read_only(np.concatenate([hermite_basis(m, gauss(n)[0], d).T for d in (1, 2)]))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..core.frozen import read_only
+from ..core.immutable import read_only
 from ..core.quadrature import gauss, gauss_lobatto
 from ..mesh.reference_cell import hermite_basis
 
@@ -36,23 +36,17 @@ class Sampling(NamedTuple):
     volume: int = 0
 
     def places(self, component: str) -> Array:
-        """Where a strain component is evaluated, xi in [0, 1], shape (n,).
-
-        Parameters
-        ----------
-        component
-            "xx", "yy" or "xy".
-        """
+        """Where a strain component "xx", "yy" or "xy" is evaluated, xi in [0, 1], shape (n,)."""
         return np.array(self.samples.get(component, gauss(self.points)[0]))
 
 
-class Held(NamedTuple):
-    """A mode that the samples miss, held by ``1/2 k L |c|^2``, L the length of the element.
+class StabilisedMode(NamedTuple):
+    """A mode that the samples miss, stabilised by ``1/2 k L |c|^2``, L the length of the element.
 
     Attributes
     ----------
     weights
-        c of the coordinates of an element of length 1, shape (2 nodal_dofs,): a derivative along X
+        c of the degrees of freedom of an element of length 1, shape (2 nodal_dofs,): a derivative along X
         of a field, zero where that is linear in X.
     size
         k in units of E I over the square of the length that ``per`` names.
@@ -68,21 +62,20 @@ class Held(NamedTuple):
 def default_sampling(p: int, s: int) -> Sampling:
     """The samples that leave an element something to bend with, found by counting.
 
-    In a chain each element adds a node: (p + 1) / 2 vectors of the axis and (s + 1) / 2 of a
+    Each element of a chain adds a node: (p + 1) / 2 vectors of the axis and (s + 1) / 2 of a
     section slope, p + s + 2 numbers. When nothing stretches, shears or gets thinner each sample
     takes one of them; of those at the nodes neighbours share one. If none is left the element
-    locks; fewer samples miss modes that :func:`missed` has to hold.
+    locks; fewer samples miss modes, see :func:`missed`, to be stabilised.
 
     * eps_xx, of degree 2 (p - 1), vanishes best at p - 1 Gauss points.
-    * eps_yy vanishes at the nodes, where the slope is a coordinate, and between them best at the s
-      Gauss-Lobatto points, zeros of the mode of the slope that eps_xx misses.
+    * eps_yy vanishes at the nodes, where the slope is a degree of freedom, and between them best
+      at the s Gauss-Lobatto points, zeros of the mode of the slope that eps_xx misses.
     * eps_xy: sections as rich as the axis follow it at (s + 3) / 2 Gauss-Lobatto points, others at
       the points of eps_xx.
 
     Linear sections, p = 3 and s = 1, have 1 of 6 left, p = s = 3 has 2 of 8, p = s = 5 1 of 12.
-    Counting ends there: sections of degree 7 and more that keep enough points to resist each
-    mode, s for eps_yy and s - 1 for eps_xy, have none left. They do without: what they do not meet
-    exactly between the samples is as small as the error of polynomials of their degree.
+    Sections of degree 7 and more that keep enough points to resist each mode have none left; what
+    they do not meet between the samples is as small as the error of polynomials of their degree.
 
     Parameters
     ----------
@@ -103,27 +96,23 @@ def _lobatto(n: int) -> tuple[float, ...]:
     return tuple(0.5 + 0.5 * gauss_lobatto(n))
 
 
+@lru_cache(64)
 def missed(m: int, n: int) -> list[Array]:
-    """What n Gauss points of the slope of a field with m coordinates at each node miss.
+    """What n Gauss points of the slope of a field with m derivatives at each node miss.
 
     Parameters
     ----------
     m
-        Derivatives along X that are coordinates, the 0th included.
+        Derivatives along X that are degrees of freedom, the 0th included.
     n
         Number of Gauss points.
 
     Returns
     -------
     list of ndarray
-        Combinations of the coordinates of an element of length 1, each of shape (2 m,): the
-        coefficients of the Legendre polynomials of degree n to 2 m - 2 in the slope.
+        Combinations of those of an element of length 1, each of shape (2 m,): the coefficients of
+        the Legendre polynomials of degree n to 2 m - 2 in the slope.
     """
-    return list(_missed(m, n))
-
-
-@lru_cache(64)
-def _missed(m: int, n: int) -> list[Array]:
     x, w = gauss(2 * m)
     out = []
     for degree in range(n, 2 * m - 1):

@@ -28,31 +28,23 @@ class Assumed(Formulation):
     A cubic axis cannot keep ``|r_X|`` constant while it bends, and sections that turn linearly get
     thinner between two nodes that have turned. Sampled where the interpolation can vanish, and
     interpolated between, neither is seen, and the error of a mesh does not grow with the
-    slenderness. The element says where, in :attr:`~skfem_ancf.elements.ElementBeam.sampling`:
+    slenderness. The element says where, :attr:`~skfem_ancf.elements.ElementBeam.sampling`: linear
+    sections eps_xx and eps_xy at two Gauss points, eps_yy at the nodes; cubic sections eps_xx at
+    two Gauss points, eps_xy and eps_yy at xi = 0, 1/2, 1, integrated with three Gauss points.
 
-    * linear sections: eps_xx and eps_xy at two Gauss points, eps_yy at the nodes,
-    * cubic sections: eps_xx at two Gauss points, eps_xy and eps_yy at xi = 0, 1/2, 1, integrated
-      with three Gauss points,
-    * others: :func:`~skfem_ancf.elements.sampling.default_sampling`.
-
-    What the samples miss, of a cubic axis equal slopes at both nodes while the nodes rest, is held
-    by ``1/2 k L |c|^2``. The element says which combinations c of its coordinates and what k in
-    :attr:`~skfem_ancf.elements.ElementBeam.held`: ``c = (r_X1 + r_X2) / 2 - (r_2 - r_1) / L`` for
-    a cubic axis, and likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. Where the
-    stress-free state is curved, c less ``beta (r_2 - r_1) / L``, with the complex number beta that
-    makes it vanish there, is held; it turns with the beam, so the term is objective, quadratic,
-    and its matrix constant. For linear sections k = E I / L^2; for cubic ones k = 10 E I / l^2 for
-    the axis, l the length of the beam, and E I / N for each section coordinate, which keeps their
-    higher order. A cubic cable has a third point of integration instead, whose weight
+    What the samples miss is stabilised by ``1/2 k L |c|^2``, with the combinations c of degrees of
+    freedom and the stiffness k of :attr:`~skfem_ancf.elements.ElementBeam.stabilised`: for a cubic
+    axis ``c = (r_X1 + r_X2) / 2 - (r_2 - r_1) / L`` and k = E I / L^2 (10 E I / l^2 with cubic
+    sections, l the length of the beam, which keeps their order). Where the reference configuration
+    is curved, c less ``beta (r_2 - r_1) / L`` with the complex number beta that makes it vanish
+    there: it turns with the beam, so the term is objective, quadratic, and its matrix constant. A
+    cubic cable has a third point of integration instead, whose weight
     ``alpha * 1200 E I / (E A l^2)`` is small, and at most 4/9, that of three Gauss points.
 
-    Linear sections of order 2 and more in plane strain: eps_yy is continuous from element to
-    element, the curvature is not, so their sum cannot vanish at two points of each. The volumetric
-    part of the law (:meth:`~skfem_ancf.materials.base.Material.volumetric_split`) is integrated
-    with one point, the same strains interpolated to it: selective reduced integration, which does
-    not lock as nu goes to 1/2. The rest, of the shear modulus, is positive at both points. The
-    stress of :meth:`stress` has the volumetric part of the element's middle; its work over the
-    two points is that of the internal force.
+    Linear sections of order 2 and more in plane strain: the volumetric part of the law
+    (:meth:`~skfem_ancf.materials.base.Material.volumetric_split`) is integrated with one point,
+    the same strains interpolated to it: selective reduced integration, which does not lock as nu
+    goes to 1/2. The stress has the volumetric part of the element's middle.
 
     Sections of order 1 cannot change their thickness linearly in Y. For them, and a law with
     constant moduli, the Poisson coupling acts on the mean of the strain over the section.
@@ -125,7 +117,7 @@ class Assumed(Formulation):
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:
-        if not element.held:
+        if not element.stabilised:
             return None
         straight, n = mesh.is_straight, element.nodal_dofs
         L = mesh.lengths[:1 if mesh.is_uniform else None]
@@ -137,8 +129,8 @@ class Assumed(Formulation):
             z[0] = mesh.p[0] + 1j * mesh.p[1]
             z = z[:, mesh.t].swapaxes(0, 1).reshape(2 * n, -1).T
             chord = z[:, n] - z[:, 0]
-        held = np.zeros((len(L), 2 * n, 2 * n), float if straight else complex)
-        for mode in element.held:
+        K = np.zeros((len(L), 2 * n, 2 * n), float if straight else complex)
+        for mode in element.stabilised:
             c = mode.weights * along
             of = L if mode.per == "element" else mesh.chain_lengths[:len(L)] if mode.per else 1.0
             k = self.alpha * mode.size * EI / of**2 * L
@@ -147,8 +139,8 @@ class Assumed(Formulation):
                 c = c + 0j
                 c[:, 0] += turned
                 c[:, n] -= turned
-            held += (k[:, None] * c.conj())[:, :, None] * c[:, None]
+            K += (k[:, None] * c.conj())[:, :, None] * c[:, None]
         out = np.empty((len(L), 2 * n, 2, 2 * n, 2))
-        out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = held.real
-        out[:, :, 1, :, 0], out[:, :, 0, :, 1] = held.imag, -held.imag
+        out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = K.real
+        out[:, :, 1, :, 0], out[:, :, 0, :, 1] = K.imag, -K.imag
         return out.reshape(len(L), 4 * n, 4 * n)

@@ -106,10 +106,7 @@ class Sections:
     @cached_property
     def _functions(self):
         """Local functions and their slopes, (nb, n, k) each."""
-        mesh = self.beam.mesh
-        value, slope, _, powers = self.beam.element.of_mesh(mesh.mapping(), self.X, self.e)
-        scale = (mesh.lengths[self.e][:, None] ** powers).T[:, :, None]
-        return value * scale, slope * scale
+        return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.X, self.e)[:2]
 
     def field(self, q: Array, slope: bool = False) -> Array:
         """A field of element coordinates (ne, nb, 2), or its derivative by xi; (2, n, k)."""

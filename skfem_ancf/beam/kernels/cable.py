@@ -530,9 +530,7 @@ class CableKernel(Chain):
 
     def _derivatives(self, element, n):
         """The first and second derivatives of the axis' functions at the points, (2 n, nb)."""
-        if n == 3 and self.rule[1][1] < 4.0 / 9.0:
-            return np.concatenate([element.axis(self.points, d).T for d in (1, 2)])
-        return element.derivatives_at_gauss_points(n)
+        return np.concatenate([element.axis(self.points, d).T for d in (1, 2)])
 
     def _stiffness(self):
         """EA, EI and - ES at the points, (3, points, 1 or elements)."""
