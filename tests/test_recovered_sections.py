@@ -223,25 +223,13 @@ def test_tapered_profiles_are_the_plane_body(name):
 
 
 class Strip(Section):
-    """A section of one's own, whose measure is known by its rules alone."""
-
-    def __init__(self, says):
-        self.says = says
+    """A user-defined section."""
 
     def slabs(self, mesh, material):
-        return [slab_of(material, 0.02, Rules() if not self.says else Uniform())]
+        return [slab_of(material, 0.02, Uniform())]
 
 
-class Rules:
-    low, high = 0.0, 1.0
-
-    def gauss(self, n):
-        return Uniform().gauss(n)
-
-
-def test_sections_of_ones_own_are_recovered_if_they_say_their_width():
-    states = [cantilever(Beam(line(), ElementBeamANCF(2), STEEL, section=Strip(says)), (0.0, -P))
-              for says in (True, False)]
-    assert states[0].recovered == {0: ""} and "pieces" in states[1].recovered[0]
-    assert states[0].stress((0.5, 0.0))[2] == pytest.approx(-1.5 * P / 0.002, rel=1e-5)
-    assert_allclose(*(state.u for state in states), rtol=1e-9)
+def test_sections_of_ones_own_are_recovered():
+    state = cantilever(Beam(line(), ElementBeamANCF(2), STEEL, section=Strip()), (0.0, -P))
+    assert state.recovered == {0: ""}
+    assert state.stress((0.5, 0.0))[2] == pytest.approx(-1.5 * P / 0.002, rel=1e-5)

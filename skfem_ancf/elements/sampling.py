@@ -46,7 +46,7 @@ class StabilisedMode(NamedTuple):
     Attributes
     ----------
     weights
-        c of the degrees of freedom of an element of length 1, shape (2 nodal_dofs,): a derivative along X
+        c of the degrees of freedom of an element of length 1, (2 nodal_dofs,): a derivative along X
         of a field, zero where that is linear in X.
     size
         k in units of E I over the square of the length that ``per`` names.

@@ -136,9 +136,6 @@ class Recovery:
         self.why = "" if beam.section.has_fields else (
             f"{beam.section!r} does not say what it is made of: strain and stress are those of a "
             "rectangle with these numbers; State.resultants() has what is known")
-        if not all(hasattr(slab.measure, "pieces") for slab in slabs):
-            raise NotRecovered(f"{beam.section!r} has a measure that does not say its width: give "
-                               "it pieces and mean, as Weighted has")
         self.intervals = Intervals(slabs, beam.element.order)
         laws = [slab.material.law(slab.shear) for slab in slabs]
         if forces.small:  # the law of small strains

@@ -3,58 +3,80 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial, reduce
-from typing import TYPE_CHECKING, Any, Protocol
+from functools import cached_property, partial, reduce
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
 from numpy.polynomial.legendre import legvander
 
 from ..core.errors import InputError
-from ..core.frozen import Frozen
-from ..core.kept import cached_property
+from ..core.immutable import Immutable
 from ..core.quadrature import gauss
-from .section import Rectangle
+from .section import Rectangle, asked
 from .jumps import BEND, KINK, jumps
-from .measure import measure_of
 from .shear import shear_factor
-from .within import NAMES, Within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from ..core.types import Array, Rule
     from ..elements.base import ElementBeam
     from ..materials import Material
     from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array, Rule
     from .section import Section, Slab
 
-#: Points across a slab for areas and moments.
+#: Points across a layer for areas and moments.
 POINTS = 4
 
 #: Degree of the polynomial of the height that a shear factor is between the least and the largest.
 HEIGHTS = 7
 
+#: What messages call the functions of a layer.
+NAMES = {"width": "width", "grade": "E", "density": "density"}
 
-#: Attributes of a plain section that do not depend on its material and width.
-_OF_PLACES = "mesh", "element", "plain", "simple", "constant", "uniform", "moving"
-
-
-class Integrals(Protocol):
-    """What a section asks of a formulation, a :class:`~skfem_ancf.formulations.Formulation`."""
-
-    name: str
-
-    def terms(self, element: ElementBeam, material: Material) -> Sequence[Any]:
-        """The integrals that make up the strain energy of one material."""
-
-    def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
-                      width: float) -> Array | None:
-        """A constant element stiffness that is added to that of the terms, or None."""
+#: Moduli and factors of the integrals that :meth:`Across.moments` finds.
+MODULI = {"stiffness": "axial_modulus", "E": "E"}
+TIMES = {"stiffness": "grade", "E": "grade", "mass": "density", "area": ""}
 
 
-class Across(Frozen):
+class LayerPoints:
+    """Points of a layer on a mesh; :meth:`Across.at` makes it."""
+
+    def __init__(self, across: Across, slab: Slab, X: Array, tind: Array | None = None) -> None:
+        self.across, self.slab, self.X, self.tind = across, slab, X, tind
+
+    def moved(self, X: Array) -> LayerPoints:
+        """Other points (2, npoints) or (2, nelements, npoints) of the layer."""
+        return LayerPoints(self.across, self.slab, X, self.tind)
+
+    @property
+    def heights(self) -> Array:
+        """Of the sections, shape (nelements, npoints)."""
+        return self.across.heights(self.X[0], self.tind)
+
+    def asked(self, name: str) -> Array:
+        """What a function of the layer, of :data:`NAMES`, is there, (nelements, npoints)."""
+        return asked(NAMES[name], getattr(self.slab, name),
+                     *self.across.coordinates(self.X, self.tind))
+
+    def factor(self, name: str, whole: bool = False) -> Any:
+        """A number of the layer, or what its function is there, or the mean of its sections."""
+        value = getattr(self.slab, name)
+        if callable(value):
+            return self.slab.measure.values(self, name, whole)
+        if value is None and name == "density":
+            raise InputError(f"{self.slab.material!r} has no density: give one to use mass or "
+                             "gravity")
+        return 1.0 if value is None else value
+
+
+class Across(Immutable):
     """A :class:`~skfem_ancf.sections.Section` on a mesh.
+
+    Points X are reference points (2, npoints) or (2, nelements, npoints), of elements ``tind``
+    (nelements,) or, if that is None, of all. What is returned at points has the shape (nelements,
+    npoints), or is a number.
 
     Parameters
     ----------
@@ -68,7 +90,7 @@ class Across(Frozen):
     Attributes
     ----------
     slabs
-        The parts of the section, a tuple of :class:`~skfem_ancf.sections.section.Slab`.
+        The layers of the section, a tuple of :class:`~skfem_ancf.sections.section.Slab`.
     plain, simple : bool
         A rectangle of one width and one material; and that on a mesh of one height.
     constant, uniform : bool
@@ -77,24 +99,18 @@ class Across(Frozen):
         What jumps across it does so at other parts of the height from place to place.
     """
 
-    mesh: MeshBeam
-    element: ElementBeam
-    slabs: tuple[Slab, ...]
-    plain: bool
-    simple: bool
-    constant: bool
-    uniform: bool
-    moving: bool
-
     def __init__(self, mesh: MeshBeam, element: ElementBeam, section: Section,
                  material: Material | None) -> None:
-        slabs = tuple(_for(element, slab) for slab in section.slabs(mesh, material))
-        varying, even = any(s.varies for s in slabs), mesh.heights is None
-        plain = isinstance(section, Rectangle) and not varying
-        vars(self).update(mesh=mesh, element=element, slabs=slabs, plain=plain,
-                          simple=plain and even, constant=even and not varying,
-                          uniform=even and not varying and mesh.is_uniform,
-                          moving=any(s.measure.moves for s in slabs))
+        self.mesh, self.element = mesh, element
+        self.slabs: tuple[Slab, ...] = tuple(
+            replace(s, measure=s.measure.of_order(element.order))
+            for s in section.slabs(mesh, material))
+        varying, even = any(s.varies for s in self.slabs), mesh.heights is None
+        self.plain = isinstance(section, Rectangle) and not varying
+        self.simple = self.plain and even
+        self.constant = even and not varying
+        self.uniform = self.constant and mesh.is_uniform
+        self.moving = any(s.measure.moves for s in self.slabs)
         if varying:
             self._check()
 
@@ -103,7 +119,7 @@ class Across(Frozen):
         X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
         for slab in self.slabs:
             low, *_, high = self._ends(slab, X[0])
-            inside = Within(self, slab, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
+            inside = self.at(slab, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
             for name in NAMES:
                 if callable(getattr(slab, name)):
                     inside.asked(name)
@@ -134,8 +150,7 @@ class Across(Frozen):
         return jumps(axis.mapping().curvature, mesh.nelements, np.array([0.5]), BEND / mesh.height)
 
     def _given(self, name, slab, X, tind):
-        """What a function of a slab, one of ``NAMES``, returns at points."""
-        return slab.measure.values(Within(self, slab, X, tind), name)
+        return slab.measure.values(self.at(slab, X, tind), name)
 
     # points
 
@@ -144,15 +159,8 @@ class Across(Frozen):
 
         Parameters
         ----------
-        X
-            Reference points, shape (2, npoints) or (2, nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
-
-        Returns
-        -------
-        x, y
-            Shape (nelements, npoints) both.
+        X, tind
+            Points, shape (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
         """
         s, t = self.mesh.parameters, self.mesh.t if tind is None else self.mesh.t[:, tind]
         a, b = s[t][:, :, None]
@@ -160,14 +168,12 @@ class Across(Frozen):
         return x, np.broadcast_to(self.mesh.mapping().offset(X, tind), x.shape)
 
     def heights(self, xi: Array, tind: Array | None = None) -> Array:
-        """Heights at places along elements, shape (nelements, npoints).
+        """Heights at places xi along elements.
 
         Parameters
         ----------
-        xi
-            Reference coordinates along the axis, shape (npoints,) or (nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
+        xi, tind
+            Shape (npoints,) or (nelements, npoints), and (nelements,).
         """
         return self.mesh.mapping().height(xi, tind)[0]
 
@@ -176,15 +182,12 @@ class Across(Frozen):
         return slab.measure.ends(self.heights(xi)) if self.moving else slab.measure.highest
 
     def which(self, X: Array, tind: Array | None = None) -> Array:
-        """The number of the slab at each of reference points (2, ...); shape (...).
+        """The number of the layer at each point; one between two layers is in the upper.
 
         Parameters
         ----------
-        X
-            Reference points, shape (2, ...); one between two slabs is in the upper.
-        tind
-            Where slabs have other parts of the height from place to place, the elements, shape
-            (nelements,), or None for all; points are (2, npoints) or (2, nelements, npoints).
+        X, tind
+            Points, shape (2, ...), and elements, (nelements,), which only count where layers move.
         """
         if self.moving:
             h = self.heights(X[0], tind)
@@ -193,19 +196,18 @@ class Across(Frozen):
         tops = np.array([s.measure.high for s in self.slabs[:-1]])
         return np.searchsorted(tops, np.asarray(X[1]), side="right")
 
-    def of_slabs(self, X: Array, like: Array, values: list[Callable[[], Array]],
+    def of_slabs(self, X: Array, like: Array, values: Sequence[Callable[[], Array]],
                  tind: Array | None = None, graded: bool = True) -> Array:
-        """A field that each slab has by its own law.
+        """A field that each layer has by its own law.
 
         Parameters
         ----------
         X, tind
-            Reference points, shape (2, npoints) or (2, nelements, npoints), and elements, shape
-            (nelements,), or None for all.
+            Points, shape (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
         like
             An array of the shape of the field, (..., nelements, npoints).
         values
-            For each slab a function without arguments that returns the field as if all were of it.
+            For each layer a function without arguments that returns the field as if all were of it.
         graded
             It is proportional to the energy.
         """
@@ -221,18 +223,26 @@ class Across(Frozen):
                 out[..., on] = np.broadcast_to(found, like.shape)[..., on]
         return out
 
-    def volume(self, slab: Slab, X: Array, W: Array, tind: Array | None = None,
-               whole: bool = False, times: str = "", full: bool = False) -> Array:
-        """Volumes that the points of a rule of a slab stand for, shape (nelements, npoints).
+    def at(self, slab: Slab, X: Array, tind: Array | None = None) -> LayerPoints:
+        """Points of a layer, as its measure takes them.
 
         Parameters
         ----------
-        slab
-            One of :attr:`slabs`.
+        slab, X, tind
+            The layer, its points (2, npoints) or (2, nelements, npoints), elements (nelements,).
+        """
+        return LayerPoints(self, slab, X, tind)
+
+    def volume(self, slab: Slab, X: Array, W: Array, tind: Array | None = None,
+               whole: bool = False, times: str = "", full: bool = False) -> Array:
+        """Volumes that the points of a rule of a layer stand for.
+
+        Parameters
+        ----------
+        slab, tind
+            The layer, and elements, (nelements,).
         X, W
             Points (2, npoints) and weights (npoints,) of the rule on the reference cell.
-        tind
-            Elements, shape (nelements,), or None for all.
         whole
             The points stand for their sections.
         times
@@ -250,97 +260,49 @@ class Across(Frozen):
 
     def breadth(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False,
                 times: str = "") -> Any:
-        """What the weights of a slab's rules, whose sum is 1, are multiplied by: area over height.
+        """What the weights of a layer's rules, whose sum is 1, stand for: area over height.
 
         Parameters
         ----------
-        slab, X, tind, whole
-            As for :meth:`grade`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
-        times
-            As for :meth:`volume`.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
+        slab, X, tind, whole, times
+            As for :meth:`volume`, X of shape (2, npoints) or (2, nelements, npoints), tind of
+            shape (nelements,).
         """
-        return slab.measure.breadth(Within(self, slab, X, tind), whole, times)
+        return slab.measure.breadth(self.at(slab, X, tind), whole, times)
 
-    def width(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
-        """The width at points of a slab, that of its piece there.
+    def grade(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+        """The factor on the energy of a layer at points.
 
         Parameters
         ----------
         slab, X, tind
-            As for :meth:`grade`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
+            As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
         """
-        return slab.measure.width(Within(self, slab, X, tind))
+        return self.at(slab, X, tind).factor("grade")
 
-    def grade(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
-        """The factor on the energy of a slab at points.
+    def density(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+        """Mass per volume of a layer at points; raises InputError if its material has none.
 
         Parameters
         ----------
-        slab, X, tind, whole
-            As for :meth:`volume`, X of shape (2, npoints) or (2, nelements, npoints), tind of
-            shape (nelements,).
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or 1.
+        slab, X, tind
+            As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
         """
-        return Within(self, slab, X, tind).factor("grade", whole)
-
-    def density(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
-        """Mass per volume of a slab at points; arguments as for :meth:`grade`.
-
-        Parameters
-        ----------
-        slab, X, tind, whole
-            As for :meth:`grade`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
-
-        Raises
-        ------
-        InputError
-            If its material has none.
-        """
-        return Within(self, slab, X, tind).factor("density", whole)
+        return self.at(slab, X, tind).factor("density")
 
     def face(self, side: int, X: Array, tind: Array | None = None) -> Any:
-        """The width of the bottom (0) or the top (1).
+        """The width of the bottom (0) or the top (1); raises InputError of a circle.
 
         Parameters
         ----------
         side
             Which.
         X, tind
-            Points on it, shape (2, npoints) or (2, nelements, npoints), and elements, shape
-            (nelements,), or None for all.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
-
-        Raises
-        ------
-        InputError
-            If there is no face, as of a circle.
+            Points on it, (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
         """
         slab = self.slabs[-side]
         if slab.face is None:
-            return self.width(slab, X, tind)
+            return slab.measure.width(self.at(slab, X, tind))
         if slab.face[side] == 0.0:
             raise InputError("this section has no width at its bottom and its top: load the axis, "
                              "by scene.line_load")
@@ -352,30 +314,15 @@ class Across(Frozen):
         Parameters
         ----------
         X, tind
-            Points of the axis, shape (2, npoints) or (2, nelements, npoints), and elements, shape
-            (nelements,), or None for all.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
+            Points of the axis, (2, npoints) or (2, nelements, npoints), elements, (nelements,).
         """
-        widths = (s.measure.outline(Within(self, s, X, tind)) for s in self.slabs)
+        widths = (s.measure.outline(self.at(s, X, tind)) for s in self.slabs)
         return reduce(np.maximum, widths, 0.0 * X[0])
 
     def ends(self, xi: Array | None = None) -> Array:
-        """Where pieces of one law and width begin and end, from the bottom to the top.
+        """Where pieces of one law and width end, from the bottom to the top, (npieces + 1, ...).
 
-        Parameters
-        ----------
-        xi
-            Places along the elements, shape (npoints,), for sections that have other parts of the
-            height from place to place; None for where these are highest.
-
-        Returns
-        -------
-        ndarray
-            Places eta, shape (npieces + 1,), or (npieces + 1, nelements, npoints).
+        At places xi (npoints,) along the elements, or where the section is highest.
         """
         found = [slab.measure.highest if xi is None else self._ends(slab, xi)
                  for slab in self.slabs]
@@ -384,58 +331,45 @@ class Across(Frozen):
     # rules
 
     def rules(self, n: int, inertia: bool = False) -> list[tuple[Slab, Rule]]:
-        """Each slab with its rule of n points across it.
+        """Each layer with its rule of n points across it.
 
         Parameters
         ----------
-        n
-            Number of points.
-        inertia
-            Those for mass.
+        n, inertia
+            Number of points; True for the rules of the mass.
         """
         return [(slab, (slab.inertia if inertia and slab.inertia is not None else
                         slab.measure).gauss(n)) for slab in self.slabs]
 
     def points(self, slab: Slab, e: Array, xi: Array, n: int) -> tuple[Array, Array]:
-        """Points of a slab at sections, for fields that are its own.
+        """Places across a layer, and the area over height they stand for, (nsections, q).
 
         Parameters
         ----------
-        slab
-            One of :attr:`slabs`.
-        e, xi
-            Elements and places along them, shapes (nsections,).
+        slab, e, xi
+            The layer, elements and places along them, shapes (nsections,).
         n
             Number of points, at least.
-
-        Returns
-        -------
-        eta, weights
-            Places across, and what of area over height they stand for, (nsections, q).
         """
-        at = Within(self, slab, np.repeat(xi[None, :, None], 2, 0), e)
-        return slab.measure.sampled(at, n)
+        return slab.measure.sampled(self.at(slab, np.repeat(xi[None, :, None], 2, 0), e), n)
 
-    def terms(self, formulation: Integrals) -> list[tuple[Slab, list[Any]]]:
-        """The terms of the strain energy of each slab.
-
-        Parameters
-        ----------
-        formulation
-            That of the beam.
+    def terms(self, formulation: Any) -> list[tuple[Slab, list[Any]]]:
+        """The terms of the strain energy of each layer, by a formulation.
 
         Raises
         ------
         InputError
             If the rules of the formulation do not know the section.
         """
-        if self.plain:
-            slab = self.slabs[0]
-            return [(slab, _terms(formulation, self.element, slab.material))]
         out = []
         for slab in self.slabs:
-            terms = _terms(formulation, self.element.measured(slab.measure, self.shear),
-                           slab.material)
+            terms = list(formulation.terms(self.element_of(slab), slab.material))
+            if not terms:
+                raise InputError(f"{formulation!r} has no terms, so that nothing is stiff: "
+                                 "terms(element, material) returns a list of one Term at least")
+            out.append((slab, terms))
+            if self.plain:
+                return out
             eta, w = slab.measure.gauss(2)
             for term in terms:
                 if self.element.order and term.section_samples is not None and slab.measure.moves:
@@ -451,7 +385,6 @@ class Across(Frozen):
                         f"formulation {formulation.name!r} has a rule across the section that is "
                         f"not that of {slab.measure!r}: take the rules that "
                         "self.full_rules(element) returns")
-            out.append((slab, terms))
         return out
 
     def element_of(self, slab: Slab) -> ElementBeam:
@@ -483,29 +416,19 @@ class Across(Frozen):
         soft = w * self.mesh.lengths[:, None] / chebval(z, GA)
         return float(np.sum(soft) / np.sum(soft / chebval(z, factor)))
 
-    def stabilisation(self, formulation: Integrals) -> Array | None:
-        """The constant element stiffness of a formulation, for the section's own E I.
+    def stabilisation(self, formulation: Any) -> Array | None:
+        """The constant element stiffness of a formulation, (1 or nelements, 2 nb, 2 nb), or None.
 
         It is asked for a width of 1 and the largest height, and is proportional to the width.
-
-        Parameters
-        ----------
-        formulation
-            That of the beam.
-
-        Returns
-        -------
-        ndarray or None
-            Shape (1 or nelements, 2 nb, 2 nb).
         """
         first = self.slabs[0]
         if self.simple:
             return formulation.stabilisation(self.mesh, self.element, first.material, first.width)
-        held = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
-        if held is None:
+        K = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
+        if K is None:
             return None
         width = 12.0 * self.bending / (first.material.E * self.mesh.height**3)
-        return held * width[:, None, None]
+        return K * width[:, None, None]
 
     # integrals over the section
 
@@ -528,31 +451,17 @@ class Across(Frozen):
             Shape (3, nelements, npoints).
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
-        out = np.zeros((3, ne, n))
-        if self.plain:
-            h = self.mesh.height if self.simple else self.heights(xi, tind)
-            out[0], _, out[2] = self._plain_moments(h, what)
-            return out
-        mapping = self.mesh.mapping()
+        mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
         for slab, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
-            w = np.tile(w, n)
             h, y = mapping.height(X[0], tind)[0], mapping.offset(X, tind)
-            size = w * h * self.breadth(slab, X, tind, times=_TIMES.get(what, ""))
-            if what in _MODULI:
-                size = size * getattr(slab.material, _MODULI[what])
-            size = np.broadcast_to(size, (ne, len(w))).reshape(ne, n, -1)
-            y = np.broadcast_to(y, (ne, len(w))).reshape(size.shape)
+            size = np.tile(w, n) * h * self.breadth(slab, X, tind, times=TIMES[what])
+            if what in MODULI:
+                size = size * getattr(slab.material, MODULI[what])
+            size, y = (np.broadcast_to(a, (ne, X.shape[-1])).reshape(ne, n, -1) for a in (size, y))
             out += np.array([np.sum(size * y**k, axis=-1) for k in range(3)])
         out[1, np.abs(out[1]) <= 1e-13 * np.sqrt(out[0] * out[2])] = 0.0  # as symmetric as it is
         return out
-
-    def _plain_moments(self, h, what):
-        """Those of plain sections of heights h."""
-        slab = self.slabs[0]
-        size = slab.width * h * (1.0 if what == "area" else self.density(slab, _NOWHERE)
-                                 if what == "mass" else getattr(slab.material, _MODULI[what]))
-        return size, 0.0, size * h**2 / 12.0
 
     @cached_property
     def bending(self) -> Array:
@@ -565,23 +474,3 @@ class Across(Frozen):
         """E I over the mass per length, where it is least."""
         mass = self.moments(np.array([0.5]), what="mass")[0]
         return float(np.min(self.bending[:, None] / mass))
-
-
-_NOWHERE = np.zeros((2, 0))
-_MODULI = {"stiffness": "axial_modulus", "E": "E"}
-_TIMES = {"stiffness": "grade", "E": "grade", "mass": "density"}
-
-
-def _for(element, slab):
-    """A slab with the measure for an element."""
-    measure = measure_of(slab.measure).of_order(element.order)
-    return slab if measure is slab.measure else replace(slab, measure=measure)
-
-
-def _terms(formulation, element, material):
-    """Those of a formulation, of which there has to be one."""
-    terms = list(formulation.terms(element, material))
-    if not terms:
-        raise InputError(f"{formulation!r} has no terms, so that nothing is stiff: terms(element, "
-                         "material) returns a list of one Term at least")
-    return terms

@@ -20,12 +20,7 @@ JUMP, KINK, BEND = 1e-3, 0.02, 0.05
 
 
 def beside(X: Array) -> Array:
-    """Points of elements, those at ends moved into them: what jumps there is that of the element.
-
-    Parameters
-    ----------
-    X
-        Reference points, shape (2, ...).
+    """Points (2, ...), those at ends of elements moved into them: what jumps is the element's.
 
     Examples
     --------

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
-from ..core.frozen import Frozen
+from ..core.immutable import Immutable
 from ..core.quadrature import gauss
 
 if TYPE_CHECKING:
@@ -19,29 +18,8 @@ if TYPE_CHECKING:
 #: Points more, where the weight is no polynomial of Y.
 MORE = 4
 
-#: Points across a slab for means of functions.
+#: Points across a layer for means of functions.
 MEAN = 8
-
-
-class InSlab(Protocol):
-    """Points of a slab on a mesh, a :class:`~skfem_ancf.sections.within.Within`."""
-
-    X: Array
-    body: Any
-    slab: Any
-    tind: Array | None
-
-    @property
-    def heights(self) -> Array: ...
-
-    def moved(self, X: Array) -> Any:
-        """Other points of the slab."""
-
-    def asked(self, name: str) -> Array:
-        """What a function of the slab returns there."""
-
-    def factor(self, name: str, whole: bool = False) -> Any:
-        """A number of the slab, or what its function is there."""
 
 
 class Piece(NamedTuple):
@@ -60,10 +38,12 @@ class Piece(NamedTuple):
     width: float | Callable[[Array], Array]
 
 
-class Measure(Frozen):
-    """What a slab has across: rules with its width in their weights, and what these stand for.
+class Measure(Immutable):
+    """What a layer has across: rules with its width in their weights, and what these stand for.
 
     Its ends are the same parts of the height all along a beam, and its width but for a factor.
+    Methods take points of a layer, ``at``, as :meth:`.Across.at` gives them, and return numbers or
+    arrays (nelements, npoints).
 
     Attributes
     ----------
@@ -82,33 +62,15 @@ class Measure(Frozen):
     moves = False
 
     def gauss(self, n: int) -> Rule:
-        """Points eta (m,) and weights (m,), whose sum is 1, exact to degree 2 n - 1.
-
-        Parameters
-        ----------
-        n
-            Number of points asked for.
-        """
+        """Points eta (m,) and weights (m,), whose sum is 1, exact to degree 2 n - 1."""
         raise NotImplementedError
 
     def of_order(self, order: int) -> Measure:
-        """The measure for an element whose strain energy is of degree 4 N across.
-
-        Parameters
-        ----------
-        order
-            N.
-        """
+        """The measure for an element whose strain energy is of degree 4 N across, N the order."""
         return self
 
     def at(self, height: float) -> Measure:
-        """The measure of one section.
-
-        Parameters
-        ----------
-        height
-            Its height.
-        """
+        """The measure of one section."""
         return self
 
     @property
@@ -117,37 +79,11 @@ class Measure(Frozen):
         return np.array([self.pieces[0].low, *(p.high for p in self.pieces)])
 
     def ends(self, h: Array) -> Array:
-        """Ends of the pieces, from the bottom to the top.
-
-        Parameters
-        ----------
-        h
-            Heights, shape (...).
-
-        Returns
-        -------
-        ndarray
-            Shape (npieces + 1, ...).
-        """
+        """Ends of the pieces at heights h (...), (npieces + 1, ...)."""
         return np.multiply.outer(self.highest, np.ones(h.shape))
 
-    def values(self, at: InSlab, name: str, whole: bool = False) -> Array:
-        """A function of the slab at points, or the means of their sections.
-
-        Parameters
-        ----------
-        at
-            The points; one beside a slab that moves stands for the slab's end.
-        name
-            One of :data:`~skfem_ancf.sections.within.NAMES`.
-        whole
-            They stand for their sections.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints).
-        """
+    def values(self, at: Any, name: str, whole: bool = False) -> Array:
+        """A function of the layer at points, or the means of their sections, ``whole``."""
         if not whole:
             return at.asked(name)
         X, (eta, w) = at.X, self.gauss(MEAN)
@@ -156,116 +92,37 @@ class Measure(Frozen):
         values = at.moved(points.reshape(X.shape[:-1] + (-1,))).asked(name)
         return values.reshape(values.shape[0], -1, len(eta)) @ w
 
-    def breadth(self, at: InSlab, whole: bool = False, times: str = "") -> Any:
-        """What the weights of rules are multiplied by: area over height.
+    def breadth(self, at: Any, whole: bool = False, times: str = "") -> Any:
+        """What the weights of rules are multiplied by: area over height, or integrals over it.
 
-        Parameters
-        ----------
-        at
-            Points of the slab.
-        whole
-            They stand for their sections.
-        times
-            "grade" or "density" for the integrals of these, "" for the area.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
+        Of points that stand for their sections if ``whole``; of "grade" or "density".
         """
-        slab, mesh, size = at.slab, at.body.mesh, at.factor("width", whole)
+        slab, mesh, size = at.slab, at.across.mesh, at.factor("width", whole)
         if callable(slab.width):
             size = size * slab.part
         elif slab.by_height and mesh.heights is not None:
             size = size * at.heights / mesh.height
         return size * at.factor(times, whole) if times else size
 
-    def width(self, at: InSlab) -> Any:
-        """The width at points of the slab.
-
-        Parameters
-        ----------
-        at
-            The points.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
-        """
+    def width(self, at: Any) -> Any:
+        """The width at points of the layer."""
         return self.breadth(at) / at.slab.part
 
-    def outline(self, at: InSlab) -> Any:
-        """The largest width of sections, or where that is a function the one at points.
-
-        Parameters
-        ----------
-        at
-            Points of the axis.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, npoints), or a number.
-        """
+    def outline(self, at: Any) -> Any:
+        """The largest width of sections, or where that is a function the one at points."""
         slab = at.slab
         scale = slab.outer * slab.part / slab.width if slab.outer else 1.0
         return scale * self.breadth(at) / slab.part
 
-    def sampled(self, at: InSlab, n: int) -> tuple[Array, Array]:
-        """Points of sections, for fields that are the slab's own.
+    def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
+        """At least n points of sections, for fields that are the layer's own.
 
-        Parameters
-        ----------
-        at
-            One point of each section, (2, nsections, 1).
-        n
-            Number of points, at least.
-
-        Returns
-        -------
-        eta, weights
-            Places across, and what of area over height they stand for, (nsections, q).
+        Places across, and what of area over height they stand for, (nsections, q); of one point of
+        each section, (2, nsections, 1).
         """
         eta, w = self.gauss(n)
         eta = np.repeat(eta[None], at.X.shape[1], 0)
         return eta, self.breadth(at.moved(np.array([at.X[0] + 0.0 * eta, eta]))) * w + 0.0 * eta
-
-
-class Ruled(Measure):
-    """A measure of one's own, of which only the rules are known.
-
-    Parameters
-    ----------
-    rules
-        With ``low``, ``high`` and ``gauss(n)``; it may have ``pieces`` and ``mean``.
-    """
-
-    def __init__(self, rules: Any) -> None:
-        self.rules, self.low, self.high = rules, rules.low, rules.high
-        vars(self).update({name: getattr(rules, name) for name in ("pieces", "mean", "spent")
-                           if hasattr(rules, name)})
-
-    def gauss(self, n: int) -> Rule:
-        return self.rules.gauss(n)
-
-    @property
-    def highest(self) -> Array:
-        return super().highest if hasattr(self, "pieces") else np.array([self.low, self.high])
-
-    def __repr__(self) -> str:
-        return repr(self.rules)
-
-
-def measure_of(given: Any) -> Measure:
-    """A measure, which may be one's own.
-
-    Parameters
-    ----------
-    given
-        A Measure, or what :class:`Ruled` takes.
-    """
-    return given if isinstance(given, Measure) else Ruled(given)
 
 
 class Uniform(Measure):
@@ -320,10 +177,6 @@ class Weighted(Measure):
         self.low, self.high = self.pieces[0].low, self.pieces[-1].high
         #: Integral of the width over eta, the mean width of a section that fills [0, 1].
         self.mean = float(np.sum(self._discrete(20)[1]))
-        self._rules = lru_cache(64)(self._gauss)
-
-    def __reduce__(self):
-        return Weighted, (self.pieces,)
 
     def __repr__(self) -> str:
         return f"<{len(self.pieces)} widths, one above the other>"
@@ -342,10 +195,6 @@ class Weighted(Measure):
         return np.concatenate(points), np.concatenate(weights)
 
     def gauss(self, n: int) -> Rule:
-        x, w = self._rules(n)
-        return x.copy(), w.copy()
-
-    def _gauss(self, n):
         x, w = self._discrete(2 * n)
         w = w / np.sum(w)
         a, b = np.zeros(n), np.zeros(n)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..core.types import Array, Rule
-    from .measure import InSlab, Piece
+    from .measure import Piece
 
 #: Least degree of the series of a width, and its points more where that is a square root.
 LEAST, ROUND = 8, 40
@@ -35,7 +35,7 @@ class Moving(Measure):
         Called with heights h, (..., 1), it returns the pieces of the width from the bottom to the
         top, with ends of this shape.
     height
-        Where panels of recovered fields have their places: the largest.
+        Where intervals of recovered fields have their places: the largest.
     degree
         That of the series.
 
@@ -68,11 +68,7 @@ class Moving(Measure):
     def gauss(self, n: int) -> Rule:
         """Points eta and weights, whose sum is 1, exact to degree 2 n - 1 times the series.
 
-        Parameters
-        ----------
-        n
-            Number of points that a constant width would take; for 1 it is a place of the section
-            where it is highest.
+        For n = 1 a place of the section where it is highest.
         """
         if n == 1:
             return np.array([0.5 * (self.pieces[0].low + self.pieces[-1].high)]), np.ones(1)
@@ -84,15 +80,15 @@ class Moving(Measure):
                          for end in (found[0].low, *(p.high for p in found))])
 
     def _inside(self, at):
-        """The points, and in place of those beside the slab points at its ends."""
+        """The points, and in place of those beside the layer points at its ends."""
         low, *_, high = self.ends(at.heights)
         return at.moved(np.array([np.broadcast_to(at.X[0], low.shape),
                                   np.clip(at.X[1], low, high)]))
 
-    def values(self, at: InSlab, name: str, whole: bool = False) -> Array:
+    def values(self, at: Any, name: str, whole: bool = False) -> Array:
         return self._inside(at).asked(name)
 
-    def width(self, at: InSlab) -> Array:
+    def width(self, at: Any) -> Array:
         eta, h = (x[..., None] for x in np.broadcast_arrays(at.X[1], at.heights))
         found = self.pieces_of(h)
         out = 0.0 * eta
@@ -101,12 +97,12 @@ class Moving(Measure):
             out = np.where(inside, piece.width(eta) if callable(piece.width) else piece.width, out)
         return at.factor("width") * out[..., 0]
 
-    def outline(self, at: InSlab) -> Any:
+    def outline(self, at: Any) -> Any:
         if at.slab.by_height:  # a tube
             return at.heights
         return at.slab.outer or at.factor("width")
 
-    def breadth(self, at: InSlab, whole: bool = False, times: str = "") -> Array:
+    def breadth(self, at: Any, whole: bool = False, times: str = "") -> Array:
         xi = np.asarray(at.X[0])
         back: Any = slice(None)
         if xi.ndim == 1:
@@ -122,28 +118,18 @@ class Moving(Measure):
             there = at.moved(X.reshape(2, len(eta), -1))
             return np.prod([there.asked(name) for name in functions], axis=0).reshape(eta.shape)
 
-        c = c * self.moments(at.body.heights(xi, at.tind), product if functions else None)
+        c = c * self.moments(at.across.heights(xi, at.tind), product if functions else None)
         return c[0][:, back] if whole else self.series(c[:, :, back], at.X[1])
 
-    def sampled(self, at: InSlab, n: int) -> tuple[Array, Array]:
+    def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
         eta, w = self.points(at.heights[:, 0], n)
         there = at.moved(np.array([at.X[0] + 0.0 * eta, eta]))
         return eta, w * (there.asked("width") if callable(at.slab.width) else at.slab.width)
 
     def points(self, h: Array, n: int) -> tuple[Array, Array]:
-        """Points in the pieces of sections, and what they stand for.
+        """Points in the pieces of sections of heights (...), n in each of constant width.
 
-        Parameters
-        ----------
-        h
-            Heights, shape (...).
-        n
-            Gauss points of a piece of constant width.
-
-        Returns
-        -------
-        eta, weights
-            Places across, and weights that have the width: shapes (..., q).
+        Places across, and weights that have the width, (..., q).
         """
         places, weights = [], []
         for low, high, width in self.pieces_of(h[..., None]):
@@ -157,19 +143,9 @@ class Moving(Measure):
         return np.concatenate(places, axis=-1), np.concatenate(weights, axis=-1)
 
     def moments(self, h: Array, times: Callable[[Array], Any] | None = None) -> Array:
-        """Coefficients of the Legendre series of the width.
+        """Coefficients (degree + 1, ...) of the Legendre series of the width at heights (...).
 
-        Parameters
-        ----------
-        h
-            Heights, shape (...).
-        times
-            What the width is multiplied by: a function of places eta (..., q), or None.
-
-        Returns
-        -------
-        ndarray
-            Shape (degree + 1, ...).
+        Of the width times a function of places eta (..., q), if it is given.
         """
         eta, w = self.points(h, self.degree // 2 + 1 + (0 if times is None else 2 * MORE))
         if times is not None:
@@ -180,13 +156,5 @@ class Moving(Measure):
 
     @staticmethod
     def series(moments: Array, eta: Any) -> Array:
-        """The series at places.
-
-        Parameters
-        ----------
-        moments
-            What :meth:`moments` returns, shape (degree + 1, ...).
-        eta
-            Places across, shape (...).
-        """
+        """The series at places eta (...), of what :meth:`moments` returns."""
         return legval(2.0 * np.asarray(eta) - 1.0, moments, tensor=False)

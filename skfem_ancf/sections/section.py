@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import (CallError, InputError, ask_array, require_flag, require_option,
                            require_positive, shown)
-from ..core.frozen import Frozen
+from ..core.immutable import Immutable
 from ..materials import Material, StVenantKirchhoff
 from .measure import MORE, WHOLE, Piece, Uniform, Weighted
 from .moving import Moving
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Slab:
-    """A part of a section, all along the beam.
+    """A layer of a section, all along the beam.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Slab:
         return callable(self.width) or callable(self.grade) or callable(self.density)
 
 
-class Section(Frozen):
+class Section(Immutable):
     """The section of a beam: what lies across it. It does not change.
 
     Sections are made by :meth:`profile`, :meth:`layers` and :meth:`numbers`, and given to
@@ -219,8 +219,7 @@ class Rectangle(Section):
     Parameters
     ----------
     width
-        A positive number, or a function of material coordinates: x, the parameter of the axis, and
-        y, the distance from it; arrays of one shape, of which it returns another.
+        A positive number, or a function of material coordinates (x, y).
     """
 
     def __init__(self, width: float | Callable[..., Any]) -> None:
@@ -234,15 +233,7 @@ class Rectangle(Section):
 
 
 def slab_of(material: Material, width: Any, measure: Any = None, **more: Any) -> Slab:
-    """The Slab of a material that may be graded.
-
-    Parameters
-    ----------
-    material
-        Its moduli or its density may be functions.
-    width, measure, **more
-        As for :class:`Slab`; a measure of None is the whole height.
-    """
+    """The Slab of a material that may be graded; without a measure the whole height."""
     uneven = callable(width) or material.graded
     if measure is None:
         measure = Uniform(more=MORE) if uneven else WHOLE
@@ -253,27 +244,7 @@ def slab_of(material: Material, width: Any, measure: Any = None, **more: Any) ->
 
 
 def asked(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
-    """A function of material coordinates, whose values must be positive.
-
-    Parameters
-    ----------
-    what
-        What messages call it, as ``"width"``.
-    function
-        Takes arrays of one shape.
-    x, y
-        Material coordinates, shape (...).
-
-    Returns
-    -------
-    ndarray
-        Shape (...).
-
-    Raises
-    ------
-    InputError
-        If a value is not positive.
-    """
+    """Positive values of a function of material coordinates, which messages call ``what``."""
     x, y = (np.ascontiguousarray(a) for a in np.broadcast_arrays(x, y))
     out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
     if not np.all(out > 0.0):
@@ -288,16 +259,7 @@ FILLS = 1e-9
 
 
 class Layers(Section):
-    """Bonded layers, from the bottom to the top; :meth:`Section.layers` makes it.
-
-    Parameters
-    ----------
-    *layers
-        Pairs of a thickness and a material; a third entry is the width of that layer. The
-        thickness of one may be None: what the others leave of the height.
-    width
-        Width of the others: a positive number, or a function of material coordinates (x, y).
-    """
+    """Bonded layers; :meth:`Section.layers` makes it, and has the parameters."""
 
     has_materials = True
 
@@ -375,22 +337,10 @@ class _Layer:
 
 
 class Numbers(Section):
-    """A section by its numbers; :meth:`Section.numbers` makes it.
+    """A section by its numbers; :meth:`Section.numbers` makes it, and has the parameters.
 
     It is a rectangle of the material E = EA / (b h), nu = 0, whose height sqrt(12 EI / EA) need
     not be that h of the mesh: this is where section coordinates are, and what pictures show.
-
-    Parameters
-    ----------
-    EA, EI
-        Stiffnesses against extension and bending about the axis.
-    GA
-        Against shear, its factor included; None for that of a rectangle, 5/12 EA. A cable has none.
-    rhoA, rhoI
-        Mass per length, and its moment of inertia about the axis; rhoI is that of the height
-        sqrt(12 EI / EA) if it is None.
-    width
-        Of the faces, where pressures and tractions act.
     """
 
     has_materials = True
@@ -439,18 +389,7 @@ SIZES = {"rectangle": ("width",), "I": ("width", "web", "flange"), "T": ("width"
 
 
 class Profile(Section):
-    """A section of one material by its width; :meth:`Section.profile` makes it.
-
-    Parameters
-    ----------
-    name
-        One of :data:`SIZES`.
-    scaled
-        On a tapered mesh what lies across the height is the same part of it everywhere; else
-        flanges and walls keep their thickness.
-    **sizes
-        Its sizes.
-    """
+    """A section of one material; :meth:`Section.profile` makes it, and has the parameters."""
 
     def __init__(self, name: str, scaled: bool = False, **sizes: float) -> None:
         self.name = require_option("profile", name, SIZES)
@@ -466,12 +405,7 @@ class Profile(Section):
                              f"{sizes['width']:g}")
 
     def pieces(self, h: Any) -> list[Piece]:
-        """The width, piece by piece from the bottom to the top.
-
-        Parameters
-        ----------
-        h
-            Height, or several (..., 1): then ends of the pieces are of this shape.
+        """The width, piece by piece from the bottom to the top, at heights h, one or (..., 1).
 
         Raises
         ------

@@ -32,11 +32,6 @@ def shear_factor(slabs: Sequence[Slab], order: int) -> float:
         The section, from the bottom to the top, the same all along the beam.
     order
         N, at least 1.
-
-    Returns
-    -------
-    float
-        At most 1.
     """
     t, w = gauss(POINTS)
     till = np.array([b * (gauss(POINTS)[1] @ lagrange(t, b * t)) for b in t])
@@ -55,12 +50,9 @@ def _points(slabs, t, w):
     """Points of each piece with their weights, widths and moduli."""
     for slab in slabs:
         law, m = slab.material, slab.measure
-        # a measure of one's own may not say its width
-        pieces, mean = (m.pieces, m.mean) if hasattr(m, "pieces") else (
-            [(m.low, m.high, 1.0)], m.high - m.low)
-        for low, high, width in pieces:
+        for low, high, width in m.pieces:
             half = 0.5 * (high - low)
             eta, one = 0.5 * (low + high) - half * np.cos(t), np.ones(len(t))
-            width = (width(eta) if callable(width) else width) * slab.width / mean
+            width = (width(eta) if callable(width) else width) * slab.width / m.mean
             yield (eta, half * np.sin(t) * w, width * one,
                    law.axial_modulus * one, law.G * one)
