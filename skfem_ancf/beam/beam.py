@@ -12,7 +12,7 @@ from skfem.element import ElementVector
 
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
                            require_label, require_like, require_names, require_unmasked, shown)
-from ..core.frozen import Frozen, read_only
+from ..core.immutable import Immutable, read_only
 from ..elements import ElementBeam, choose_element
 from ..formulations import get_formulation
 from ..materials import Material
@@ -67,7 +67,7 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
-class Beam(Frozen):
+class Beam(Immutable):
     """A planar beam. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters

@@ -59,21 +59,9 @@ class Sampled:
                                                 np.ndim(factor), 0))
 
     def at(self, e: Array, xi: Array, eta: Array, nelements: int) -> Array:
-        """The density on sections.
+        """The density (2, ..., n, k) on sections e, xi (n,) at points eta (n, k) across them.
 
-        Parameters
-        ----------
-        e, xi
-            Sections, shapes (n,).
-        eta
-            Points across them, shape (n, k).
-        nelements
-            How many elements there are.
-
-        Returns
-        -------
-        ndarray
-            Shape (2, ..., n, k); of a face or the axis k = 1.
+        Of a face or the axis k = 1.
         """
         row = np.full(nelements, -1)
         row[self.elements] = np.arange(len(self.elements))
@@ -95,11 +83,6 @@ class Sampled:
         """Stations at which it is another one on both sides, by a tenth of its largest value.
 
         Less is from element to element what polynomials miss of a smooth density.
-
-        Parameters
-        ----------
-        nelements
-            How many elements there are.
         """
         eta = np.array([0.0]) if self.eta is None else self.eta
         return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
@@ -107,19 +90,7 @@ class Sampled:
 
 
 class Facets(NamedTuple):
-    """Facets of one kind: where they are, as for :class:`Sampled`.
-
-    Attributes
-    ----------
-    where
-        BOTTOM, TOP or AXIS.
-    chosen
-        Which of the facets they are, numbers (n,).
-    elements
-        Their elements, (n,).
-    xi
-        Points along each, (p,).
-    """
+    """Numbers (n,) of facets of one kind, their elements (n,), and points xi (p,) along each."""
 
     where: int
     chosen: Array
@@ -128,15 +99,7 @@ class Facets(NamedTuple):
 
 
 def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float, ...]]:
-    """The facets of a FacetBasis along a beam, and the stations of those across it.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    basis
-        Its FacetBasis.
-    """
+    """The facets of a FacetBasis along a beam, and the stations of those across it."""
     n, ne, find = mesh.p.shape[1], mesh.nelements, np.asarray(basis.find)
     found = []
     for side in (BOTTOM, TOP):
@@ -190,17 +153,7 @@ class Spread:
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
-    """The Spread of a load on facets: faces of elements, or sections.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    facets
-        Numbers of facets, shape (n,).
-    **how
-        ``traction`` or ``pressure`` of the :class:`Spread`.
-    """
+    """The Spread of a ``traction`` or ``pressure`` on facets (n,), faces or sections."""
     n, ne = mesh.p.shape[1], mesh.nelements
     on = np.zeros(n + 2 * ne, dtype=bool)
     on[np.asarray(facets)] = True
@@ -209,41 +162,16 @@ def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
 
 
 def station_of_node(mesh: MeshBeam, node: int) -> float:
-    """A node as element + xi.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    node
-        Number of the node.
-
-    Returns
-    -------
-    float
-        Of the element on its left, if there is one, the end; else of that on its right the start.
-    """
+    """A node as element + xi: the end of the element on its left, if there is one."""
     right = np.nonzero(mesh.t[1] == node)[0]
     return float(right[0]) + 1.0 if len(right) else float(np.nonzero(mesh.t[0] == node)[0][0])
 
 
 def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | None:
-    """Where a force on few coordinates acts: element + xi; None if it is spread.
+    """Where a force on few degrees of freedom acts: element + xi; None if it is distributed.
 
-    A force on a point inside an element acts on the coordinates ``r`` of its two nodes as the
-    Hermite functions of xi say, whose values are found again.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    vector
-        A force on its coordinates, shape (N,).
-
-    Returns
-    -------
-    tuple of float, or None
-        Element + xi of each place; None if the force is spread over neighbouring nodes.
+    A force on a point inside an element acts on the ``r`` of its two nodes as the Hermite functions
+    of xi say, whose values are found again.
     """
     rows = np.asarray(vector).reshape(-1, beam.nd)
     loaded = np.nonzero(np.any(rows != 0, axis=1))[0]

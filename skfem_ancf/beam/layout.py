@@ -52,17 +52,12 @@ class Layout(Protocol):
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     """The beam meant by a Beam, a name, a number, or None where there is only one.
 
-    Parameters
-    ----------
-    beams
-        The beams of a scene.
-    beam
-        A Beam, its name or its number, or None.
-
     Raises
     ------
     NameUnknown
-        If there is no such beam, or None is given and there are several.
+        If there is no such beam.
+    InputError
+        If None is given and there are several.
     """
     if beam is None and len(beams) == 1:
         return beams[0]
@@ -90,18 +85,7 @@ def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody],
                   which: WhichMember) -> Beam | RigidBody:
     """As :func:`select_beam`, of beams and of rigid bodies, which are numbered behind them.
 
-    Parameters
-    ----------
-    beams, bodies
-        Those of a scene.
-    which
-        A Beam or a RigidBody, its name or its number; None for the only beam, without beams for
-        the only body.
-
-    Raises
-    ------
-    NameUnknown
-        If there is none, or None is given and there are several beams.
+    None is the only beam, without beams the only body.
     """
     if which is None and not beams and len(bodies) == 1:
         return bodies[0]

@@ -49,12 +49,6 @@ def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
     ------
     MeshError
         If it is neither, with what was probably meant.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> as_points([(0, 0.5), (1, 0.5), (2, 0.5)]).shape, as_points(np.zeros((2, 5))).shape
-    ((2, 3), (2, 5))
     """
     if not is_many(points):
         return as_point(points, mesh)
@@ -76,16 +70,9 @@ def _ragged(p):
 
 
 class Points:
-    """Finds the points of a scene.
+    """Finds the points of a scene: of beams and bodies with their ``slices`` of degrees of freedom.
 
-    Parameters
-    ----------
-    beams, slices
-        The beams, and the coordinates in the scene of them and of the bodies behind them.
-    bodies
-        Rigid bodies.
-    lines
-        Of a frame the number of the line of each chain of elements, beam after beam, (chains,).
+    ``lines`` are of a frame the numbers of the line of each chain of elements, beam after beam.
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
@@ -110,10 +97,6 @@ class Points:
             of elements of the beam.
         ask
             Raise InputError where several axes are nearest, as at a node; if False it is the first.
-
-        Returns
-        -------
-        Located
 
         Raises
         ------
@@ -144,13 +127,7 @@ class Points:
         return np.cumsum([0] + [int(b.mesh.chains[-1]) + 1 for b in self.beams])
 
     def chain_of(self, line: int, beam: WhichMember = None) -> tuple[Beam, int]:
-        """The beam of a line, and its number among the chains of elements of that beam.
-
-        Parameters
-        ----------
-        line, beam
-            As for :meth:`find`.
-        """
+        """The beam of a line, and its number among the chains of elements of that beam."""
         if self._lines is None:
             b = select_beam(self.beams, beam)
             return b, require_integer("line", line, 0, int(b.mesh.chains[-1]))
@@ -262,15 +239,7 @@ class Points:
 
 
 def require_body(system: Any, which: WhichMember) -> RigidBody:
-    """The rigid body meant by itself, its name or its number; raises InputError of a beam.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    which
-        The RigidBody, its name or its number.
-    """
+    """The rigid body of a System by itself, its name or number; InputError of a beam."""
     body = None if which is None else select_member(system.beams, system.bodies, which)
     if not isinstance(body, RigidBody):
         raise InputError(f"this is asked of rigid bodies, got {shown(which)}; those of the scene "

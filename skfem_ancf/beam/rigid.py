@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import (InputError, NameUnknown, require_finite, require_finite_scalar,
                            require_label, require_names, require_positive, shown)
-from ..core.frozen import Frozen, read_only
+from ..core.immutable import Immutable, read_only
 from ..core.linear import angle_of
 from ..mesh.places import as_point
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 NAMES = ("r^1", "r^2", "d^1", "d^2")
 
 
-class RigidBody(Frozen):
+class RigidBody(Immutable):
     """A rigid body in the plane. It does not change; :meth:`replace` returns a changed copy.
 
     Its coordinates are the position r of the centre of mass and a unit vector d that turns with it.
@@ -130,7 +130,7 @@ class RigidBody(Frozen):
 
     @property
     def q0_local(self) -> Array:
-        """Coordinates at the start with the position measured from :attr:`origin`, shape (4,)."""
+        """As :attr:`q0`, with the position measured from :attr:`origin`."""
         return np.append(np.zeros(2), self.q0[2:])
 
     @property
@@ -145,7 +145,7 @@ class RigidBody(Frozen):
 
     @property
     def sizes(self) -> Array:
-        """What the coordinates change by where it moves by its size and turns, shape (4,)."""
+        """Changes of the degrees of freedom where it moves by its size and turns, (4,)."""
         return np.array([self.size, self.size, 1.0, 1.0])
 
     @property
@@ -163,13 +163,10 @@ class RigidBody(Frozen):
         return np.append(self.mass * require_finite("g", g, (2,)), np.zeros(2))
 
     def velocity_of(self, field: Callable[[Array], Array]) -> Array:
-        """The rates of the coordinates in a field of velocities, shape (4,).
+        """The rates (4,) of the degrees of freedom in a field of velocities.
 
-        Parameters
-        ----------
-        field
-            A function of points x (2, n) of the start that returns velocities (2, n): it is asked
-            at the centre of mass and at the tip of the director.
+        It takes points x (2, n) of the start and returns velocities (2, n): it is asked at the centre
+        of mass and at the tip of the director.
         """
         v = field(self.position[:, None] + self.size * np.array([[0.0, 1.0], [0.0, 1.0]])
                   * self.q0[2:, None])
@@ -184,7 +181,7 @@ class RigidBody(Frozen):
         return out[rows]
 
     def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
-        """Numbers of coordinates by their names, shape (n,).
+        """Numbers of degrees of freedom by their names, shape (n,).
 
         Parameters
         ----------
@@ -192,11 +189,6 @@ class RigidBody(Frozen):
             None, or a point: a body is one place.
         names
             Of :attr:`dofnames`, or without component, as ``"r"``; None for all.
-
-        Raises
-        ------
-        NameUnknown
-            If a name is not known; the message lists the known ones.
         """
         if boundary is not None and not isinstance(boundary, RigidBody):
             self.place(boundary)
@@ -213,35 +205,18 @@ class RigidBody(Frozen):
     # points
 
     def place(self, at: Any) -> Array:
-        """A point in the state of the start, shape (2,).
-
-        Parameters
-        ----------
-        at
-            Its place (x, y) at the start; None for the centre of mass.
-
-        Raises
-        ------
-        MeshError
-            If it is no point.
-        """
+        """A point (x, y) of the start as an array (2,); None for the centre of mass."""
         return self.position if at is None else as_point(at)
 
     def local(self, x: ArrayLike) -> Array:
-        """Coordinates in its own frame of points of the start, from the centre: shape (2, ...).
-
-        Parameters
-        ----------
-        x
-            Places at the start, shape (2, ...).
-        """
+        """Coordinates in its own frame, from the centre, of points (2, ...) of the start."""
         x = require_finite("x", x)
         if x.ndim < 1 or len(x) != 2:
             raise InputError(f"x must have shape (2, ...), got {x.shape}")
         return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
 
     def probe(self, at: Any) -> tuple[Array, Array]:
-        """Coordinate numbers and weights of the position of a material point.
+        """Numbers and weights of the degrees of freedom in the position of a material point.
 
         Parameters
         ----------
@@ -257,13 +232,7 @@ class RigidBody(Frozen):
         return np.array([[0, 2, 3], [1, 3, 2]]), np.array([[1.0, a, -b], [1.0, a, b]])
 
     def contains(self, x: ArrayLike) -> Array:
-        """Whether points of the start are inside of the outline or on it, shape (n,).
-
-        Parameters
-        ----------
-        x
-            Places at the start, shape (2, n).
-        """
+        """Whether points (2, n) of the start are inside of the outline or on it, shape (n,)."""
         p = self.local(require_finite("x", x, (2, None))).T
         corners = self.outline.T
         inside, near = np.zeros(len(p), dtype=bool), np.zeros(len(p), dtype=bool)
@@ -277,25 +246,13 @@ class RigidBody(Frozen):
         return inside | near
 
     def outline_at(self, u: Array) -> Array:
-        """The corners of the outline at a displacement of the coordinates, shape (2, n).
-
-        Parameters
-        ----------
-        u
-            Shape (4,).
-        """
+        """The corners (2, n) of the outline at a displacement (4,)."""
         q = self.q0 + u
         d = q[2:]
         return q[:2, None] + np.array([[d[0], -d[1]], [d[1], d[0]]]) @ self.outline
 
     def angle_at(self, u: Array) -> Array:
-        """The angle at displacements of the coordinates, no more than pi from :attr:`angle`.
-
-        Parameters
-        ----------
-        u
-            Shape (..., 4).
-        """
+        """The angle at displacements (..., 4), no more than pi from :attr:`angle`."""
         d = self._frame.T @ (self.q0[2:] + u[..., 2:])[..., None]
         return self.angle + angle_of(d[..., 0, 0], d[..., 1, 0])
 
@@ -305,20 +262,14 @@ class RigidBody(Frozen):
         Parameters
         ----------
         u, v
-            Displacement of the coordinates and its rate, shapes (..., 4).
+            Displacement of the degrees of freedom and its rate, shapes (..., 4).
         """
         d = self.q0[2:] + u[..., 2:]
         return d[..., 0] * v[..., 3] - d[..., 1] * v[..., 2]
 
 
 def on_body(place: Any, beam: Any) -> tuple[Any, Any]:
-    """A place and a beam; a RigidBody in place of a place is its centre of mass, or all of it.
-
-    Parameters
-    ----------
-    place, beam
-        As a method takes them.
-    """
+    """A place and a beam; a RigidBody in place of a place is its centre of mass, or all of it."""
     return (None, place) if isinstance(place, RigidBody) else (place, beam)
 
 

@@ -59,14 +59,12 @@ class Surface(NamedTuple):
 
 
 def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
-    """The points of a place, by sides and slabs of the section.
+    """The points of a place, by sides and layers of the section.
 
     Parameters
     ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    place
-        A place, see :func:`skfem_ancf.mesh.places.facets_of`.
+    beam, place
+        A :class:`~skfem_ancf.Beam`, and a place, see :func:`skfem_ancf.mesh.places.facets_of`.
     points
         Number of Gauss points of a facet; of end sections that are no plain rectangles those that
         the element needs.
@@ -92,15 +90,7 @@ def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
 
 def groups_of(mesh: MeshBeam, surfaces: Sequence[Surface]
               ) -> tuple[list[Facets], tuple[float, ...]]:
-    """What is along a beam, numbered as points come that are those of ``surfaces``; and stations.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    surfaces
-        As :func:`surfaces_of` returns them: the bottom and the top first.
-    """
+    """Facets along a beam, numbered as the points of ``surfaces`` come, and stations across it."""
     groups, stations, first = [], [], 0
     for one in surfaces:
         if one.side in (BOTTOM, TOP):
@@ -129,19 +119,7 @@ def _surface(beam, side, facets, elements, X, weights):
 
 
 def add_nodal(beam: Beam, elements: Array, forces: Array, out: Array) -> None:
-    """Add forces on the local functions of elements to a vector of coordinates.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    elements
-        Numbers, shape (n,).
-    forces
-        Shape (n, 2 nodal_dofs, 2).
-    out
-        Shape (N,).
-    """
+    """Add forces (n, 2 nodal_dofs, 2) on the local functions of elements (n,) to a vector (N,)."""
     half, nodes = forces.shape[1] // 2, out.reshape(-1, forces.shape[1] // 2, 2)
     np.add.at(nodes, beam.mesh.t[0, elements], forces[:, :half])
     np.add.at(nodes, beam.mesh.t[1, elements], forces[:, half:])

@@ -17,43 +17,12 @@ if TYPE_CHECKING:
 
 
 def chebyshev(x: Any, n: int) -> Array:
-    """The polynomials T_0 ... T_(n-1) of 2 x - 1.
-
-    Parameters
-    ----------
-    x
-        A number, or an array of shape (k,), on [0, 1].
-    n
-        How many.
-
-    Returns
-    -------
-    ndarray
-        Shape (n,), or (n, k).
-
-    Examples
-    --------
-    >>> chebyshev(0.75, 3).tolist()
-    [1.0, 0.5, -0.5]
-    """
+    """The polynomials T_0 ... T_(n-1) of 2 x - 1 at a number or an array (k,): (n,) or (n, k)."""
     return np.array(polynomials(x, n))
 
 
 def polynomials(x: Any, n: int) -> list[Any]:
-    """As :func:`chebyshev`, as a list: of numbers for a number.
-
-    Parameters
-    ----------
-    x
-        A number, or an array of any shape, on [0, 1].
-    n
-        How many.
-
-    Examples
-    --------
-    >>> polynomials(0.75, 3)
-    [1.0, 0.5, -0.5]
-    """
+    """As :func:`chebyshev`, as a list; x of any shape."""
     z = 2.0 * x - 1.0
     before, last, twice = 1.0 + 0.0 * z, z, 2.0 * z
     out = [before, last]
@@ -89,11 +58,6 @@ def coefficients(function: Callable[[Array], Array], p: int, m: int) -> Array:
     -------
     ndarray
         Those of eta come first, shape (k, m, p).
-
-    Examples
-    --------
-    >>> coefficients(lambda X: np.array([X[0] * X[1]]), 2, 2).round(12).tolist()
-    [[[0.25, 0.25], [0.25, 0.25]]]
     """
     X = np.array([np.repeat(places(p), m), np.tile(places(m), p)])
     values = function(X).reshape(-1, p, m)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..elements.base import ElementBeam
     from ..materials.base import Material
-    from ..mesh.mesh_beam import MeshBeam
     from ..core.types import Array
 
 
@@ -380,28 +378,6 @@ def pressure(width: float | Array = 1.0) -> BilinearForm:
 # a beam's own forms
 
 
-class HasKernel(Protocol):
-    """What :func:`of` reads of a :class:`~skfem_ancf.Beam`.
-
-    Attributes
-    ----------
-    mesh, element
-        Those of the basis on which the forms are assembled.
-    N, q0
-        Number of degrees of freedom, and their values in the reference configuration, (N,).
-    kernel
-        Energies, forces and tangents of all elements.
-    """
-
-    mesh: MeshBeam
-    element: ElementBeam
-    q0: Array
-    kernel: Any
-
-    @property
-    def N(self) -> int: ...
-
-
 class BeamForms(NamedTuple):
     """The forms of one beam; :func:`of` makes them."""
 
@@ -410,7 +386,7 @@ class BeamForms(NamedTuple):
     tangent: BilinearForm
 
 
-def of(beam: HasKernel) -> BeamForms:
+def of(beam: Any) -> BeamForms:
     """The weak forms of a beam's own formulation, whatever it is.
 
     They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that
@@ -422,12 +398,6 @@ def of(beam: HasKernel) -> BeamForms:
     beam
         A :class:`~skfem_ancf.Beam`. A ``Basis`` of ``ElementVector(element)`` on its mesh, or a
         part of it, takes the forms.
-
-    Returns
-    -------
-    BeamForms
-        ``energy``, ``internal_force`` and ``tangent``: a ``Functional``, a ``LinearForm`` and a
-        ``BilinearForm``.
 
     Raises
     ------

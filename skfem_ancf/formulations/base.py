@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from ..core.linear import stress_of
 from ..core.errors import require_like
-from ..core.frozen import Content, Frozen, read_only
-from ..core.kept import cached_property
+from ..core.frozen import Content
+from ..core.immutable import Immutable, read_only
 from ..core.quadrature import gauss, lagrange, product_rule
 
 if TYPE_CHECKING:
@@ -67,20 +68,12 @@ class Term:
         return np.asarray(self.samples.get(component, self.axis[0]), dtype=float)
 
     def interpolation(self, component: str, xi: ArrayLike) -> Array | None:
-        """From the samples of a component to points along the axis.
+        """From the m samples of a component to points along the axis, (n, m); None if it has none.
 
         Parameters
         ----------
-        component
-            "xx", "yy" or "xy".
-        xi
-            Points on [0, 1], shape (n,).
-
-        Returns
-        -------
-        ndarray or None
-            Shape (n, m), m the number of samples; None if the component is evaluated where it
-            is wanted.
+        component, xi
+            "xx", "yy" or "xy", and points on [0, 1], shape (n,).
         """
         if component not in self.samples:
             return None
@@ -113,24 +106,18 @@ class Integrated(Protocol):
         """The strain of a term, or its mean over sections; (3, nelements, npoints)."""
 
 
-class Formulation(Frozen):
+class Formulation(Immutable):
     """Base class of the formulations; a subclass gives its name and its terms."""
 
     name = ""
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
-        """The integrals that make up the strain energy.
+        """The integrals that make up the strain energy, a list of :class:`Term`.
 
         Parameters
         ----------
-        element
-            A beam element.
-        material
-            A material.
-
-        Returns
-        -------
-        list of Term
+        element, material
+            A beam element and a material.
         """
         raise NotImplementedError(f"{type(self).__name__} has no terms: a formulation defines "
                                   "terms(element, material), a list of Term")
@@ -149,7 +136,8 @@ class Formulation(Frozen):
                       width: float) -> Array | None:
         """A constant element stiffness, added to that of the terms, or None for none.
 
-        It must vanish for rigid motions of the stress-free state, large ones included.
+        It must vanish for rigid motions of the reference configuration, large ones included. Its
+        shape is (nelements, 2 nb, 2 nb), or (1, ...) where it is the same for all elements.
 
         Parameters
         ----------
@@ -157,12 +145,6 @@ class Formulation(Frozen):
             Those of the beam.
         width
             Width of its section.
-
-        Returns
-        -------
-        ndarray or None
-            Shape (nelements, 2 nb, 2 nb), or (1, ...) where it is the same for all; nb
-            coordinates a node.
         """
         return None
 

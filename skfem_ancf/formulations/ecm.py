@@ -23,24 +23,10 @@ AXIS = (np.array([0.5]), np.array([1.0]))
 
 
 def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[Array, Array]:
-    """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D in the normal block.
+    """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D, (3, 3) both.
 
-    Parameters
-    ----------
-    name
-        Of the formulation, for the message.
-    material, element
-        Those of the beam.
-
-    Returns
-    -------
-    uncoupled, coupling
-        Shapes (3, 3); their sum are the moduli of the law.
-
-    Raises
-    ------
-    InputError
-        If the material's stress is not linear in the strain.
+    Raises InputError, with the ``name`` of the formulation, unless the stress is linear in the
+    strain.
     """
     require_like("material", material, "Material", "law")
     law = material.law(material.shear_factor(element))

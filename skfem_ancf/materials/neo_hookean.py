@@ -96,21 +96,6 @@ class NeoHookean(TextMaterial):
     of the plane follows from S_33 = 0. Parameters and errors are those of
     :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` stays below 1/2.
 
-    Parameters
-    ----------
-    E
-        Young's modulus (force per area), positive.
-    nu
-        Poisson ratio, in (-1, 1/2).
-    density
-        Mass per volume in the stress-free state, positive, or None.
-    plane
-        "stress" or "strain".
-    shear_correction
-        "auto", "paper" or a positive number, see :class:`~skfem_ancf.materials.base.Material`.
-    thermal_expansion
-        Strain for a degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.
-
     References
     ----------
     Simo, Pister (1984); Bonet, Wood, "Nonlinear continuum mechanics for finite element
