@@ -14,7 +14,7 @@ import numpy as np
 from .layout import select_beam, select_member
 from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
 from .interpolation import BeamPoints, BodyPoints, Located
-from ..mesh.places import as_point
+from ..mesh.places import as_point, node_of
 from .rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -110,16 +110,21 @@ class Points:
             beam, chain = self.chain_of(line, beam)
         if isinstance(points, str):
             beam = select_beam(self.beams, beam)
-            points = tuple(as_point(points, beam.mesh).tolist())
+            points = beam.mesh.p[:, node_of(beam.mesh, points)]
         if self.bodies:
             found = self._of_body(points, beam)
             if found is not None:
                 return found
         if isinstance(points, (int, float)):
             as_points(points)  # x and y as two arguments: y is no beam
-        one = beam is not None or self._alone
-        return self._find(as_points(points, select_beam(self.beams, beam).mesh if one else None),
-                          beam, chain, ask)
+        if beam is not None:
+            beam = select_beam(self.beams, beam)
+        elif len(self.beams) == 1 and not self.bodies:
+            beam = self.beams[0]
+        x = as_points(points, None if beam is None else beam.mesh)
+        one, x = x.ndim == 1, np.reshape(x, (2, -1))
+        return Located(one, x.shape[1], self._in_all(x, ask) if beam is None else
+                       [self._in_one(x, beam, chain, ask)])
 
     @cached_property
     def _chains(self):
@@ -161,10 +166,6 @@ class Points:
             self._lines[self._chains[self.beams.index(b)] + chain]) for b, chain in found)
         raise InputError(f"{where}lines {numbers}: say which, as line={numbers[0]}")
 
-    @property
-    def _alone(self):
-        return len(self.beams) == 1 and not self.bodies
-
     def _of_body(self, points, beam):
         """Located of a body that is named; None if none is."""
         if isinstance(points, RigidBody):
@@ -182,17 +183,18 @@ class Points:
     def _coordinates(self, body):
         return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
 
-    def _find(self, x, beam, chain, ask):
-        one, x = x.ndim == 1, np.reshape(x, (2, -1))
-        if beam is not None or self._alone:
-            beam = select_beam(self.beams, beam)
-            e, X, outside, tied = beam.finder.find(x, chain)
-            if np.any(outside > beam.finder.allowed):
-                raise beam.finder.refuse(x, outside, chain)
-            if ask and np.any(tied):
-                self._ask(x[:, [np.argmax(tied)]], [beam])
-            k = self.beams.index(beam)
-            return Located(one, len(e), [BeamPoints(beam, k, self.slices[k], None, e, X)])
+    def _in_one(self, x, beam, chain, ask):
+        """Points (2, n) of one beam."""
+        e, X, outside, tied = beam.finder.find(x, chain)
+        if np.any(outside > beam.finder.allowed):
+            raise beam.finder.refuse(x, outside, chain)
+        if ask and np.any(tied):
+            self._ask(x[:, [np.argmax(tied)]], [beam])
+        k = self.beams.index(beam)
+        return BeamPoints(beam, k, self.slices[k], None, e, X)
+
+    def _in_all(self, x, ask):
+        """Points (2, n), each in the beam whose axis is nearest, or in a body."""
         which, least = np.full(x.shape[1], -1), np.full(x.shape[1], np.inf)
         elements, cells = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape)
         several, parts = np.zeros(x.shape[1], dtype=bool), list[Any]()
@@ -234,8 +236,7 @@ class Points:
                             f"beams{more}; {where}")
         if len(parts) == 1:
             parts[0].index = None
-        return Located(one, x.shape[1], parts)
-
+        return parts
 
 
 def require_body(system: Any, which: WhichMember) -> RigidBody:

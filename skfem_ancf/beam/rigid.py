@@ -165,8 +165,8 @@ class RigidBody(Immutable):
     def velocity_of(self, field: Callable[[Array], Array]) -> Array:
         """The rates (4,) of the degrees of freedom in a field of velocities.
 
-        It takes points x (2, n) of the start and returns velocities (2, n): it is asked at the centre
-        of mass and at the tip of the director.
+        It takes points x (2, n) of the start and returns velocities (2, n), and is asked at the
+        centre of mass and at the tip of the director.
         """
         v = field(self.position[:, None] + self.size * np.array([[0.0, 1.0], [0.0, 1.0]])
                   * self.q0[2:, None])
