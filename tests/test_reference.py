@@ -15,7 +15,8 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
            "sweeps"]
 #: Returned by public methods, and machinery all the same.
 MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "System", "Spread",
-             "Interpolation", "Layer", "LayerPoints", "Law", "Amplitude", "BodyFields", "Link", "Part",
+             "Interpolation", "Layer", "LayerPoints",
+             "Law", "Amplitude", "BodyFields", "Link", "Part",
              "StabilisedMode", "Sampling", "Rule", "Point", "Critical", "Vector"}
 
 

@@ -20,7 +20,6 @@ from skfem_ancf.elements import base
 from skfem_ancf.equations.tables import _NO_JOINTS, Tables
 from skfem_ancf.core.errors import CallbackError, ModelWarning
 from skfem_ancf.mesh.location import Finder
-from skfem_ancf.actions.forces import system as forces
 from skfem_ancf.beam.inertia import points_along
 from skfem_ancf.actions.joints import OnLine
 from skfem_ancf.actions.joints.base import Joint
@@ -51,20 +50,6 @@ def counted(monkeypatch, owner, name):
 
     monkeypatch.setattr(owner, name, call)
     return calls
-
-
-@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(3), lambda: ElementBeamCable(5)])
-def test_local_functions_are_made_once_a_process(monkeypatch, element):
-    cantilever(element()).solve_static().displacement((1.0, 0.0))
-    functions = counted(monkeypatch, base, "_unit_functions")
-    layouts = section._layout.cache_info().misses
-    facets = counted(monkeypatch, MeshBeam, "_init_facets")
-    contacts = counted(monkeypatch, forces, "Contacts")
-    scene = cantilever(element(), 7, length=1.2, height=0.02, E=3e9)  # all of it is another
-    assert scene.solve_static().displacement((1.2, 0.0))[1] < 0
-    assert not functions and not facets and not contacts
-    assert "box" not in vars(scene.beams[0].finder)
-    assert section._layout.cache_info().misses == layouts
 
 
 @pytest.mark.parametrize("element", [lambda: ElementBeamANCF(3), lambda: ElementBeamCable(5)])
