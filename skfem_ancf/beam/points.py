@@ -14,7 +14,7 @@ import numpy as np
 from .layout import select_beam, select_member
 from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
 from .interpolation import BeamPoints, BodyPoints, Located
-from ..mesh.places import as_point, node_of
+from ..mesh.places import as_point
 from .rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class Points:
             beam, chain = self.chain_of(line, beam)
         if isinstance(points, str):
             beam = select_beam(self.beams, beam)
-            points = beam.mesh.p[:, node_of(beam.mesh, points)]
+            points = as_point(points, beam.mesh)
         if self.bodies:
             found = self._of_body(points, beam)
             if found is not None:

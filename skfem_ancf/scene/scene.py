@@ -38,7 +38,7 @@ from ..actions.joints.prescribed import Turned
 from ..actions.loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
                              bind_load)
 from ..results.path import CriticalPoint, Path
-from ..mesh.places import as_point, on_other_mesh
+from ..mesh.places import as_point, node_of, on_other_mesh
 from .plan import make_plan
 from ..results.state import State
 from ..beam.rigid import RigidBody, on_body
@@ -936,7 +936,10 @@ class Scene:
         """
         boundary, beam = on_body(boundary, beam)
         k = self._number(beam)
-        load = EndMoment(self.members[k], boundary, require_finite_scalar("M", M), amplitude)
+        member = self.members[k]
+        if not isinstance(member, RigidBody):
+            node_of(member.mesh, boundary)  # raises MeshError unless it is one section
+        load = EndMoment(member, boundary, require_finite_scalar("M", M), amplitude)
         return self._put(loads=[(k, load)])
 
     def load(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
