@@ -293,11 +293,6 @@ class Beam(Immutable):
         """What finds the elements that hold points, a :class:`~skfem_ancf.mesh.location.Finder`."""
         return Finder(self.mesh)
 
-    @cached_property
-    def tables(self) -> dict:
-        """Tables of recovered fields that do not change with the state."""
-        return {}
-
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:
         """Numbers and weights of the degrees of freedom in the position of a material point.
 

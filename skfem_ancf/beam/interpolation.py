@@ -40,7 +40,6 @@ class BeamPoints:
                  e: Array, X: Array) -> None:
         self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
         self.n, self.e, self.X = len(e), e, X
-        self.tables: dict[Any, Any] = {}  # of others, that depend on the beam and the points only
 
     @cached_property
     def at(self) -> Array:

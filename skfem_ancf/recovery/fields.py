@@ -154,7 +154,8 @@ class Values(Mapping):
         The beam's frame in the reference configuration, ``frame[:, 0]`` along the axis, (2, 2, n).
     """
 
-    def __init__(self, part: BeamPoints, u: Array, find: Callable[[], Recovery | None] | None = None,
+    def __init__(self, part: BeamPoints, u: Array,
+                 find: Callable[[], Recovery | None] | None = None,
                  eigen: Sequence[tuple[Any, Any]] = ()) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)

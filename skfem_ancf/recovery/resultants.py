@@ -246,8 +246,11 @@ def _own_of_cable(beam, u, eigen, e, xi):
 
 def _forces_of_cable(beam, u, eigen, e, xi):
     """Normal force and moment of a cable, and angle, stretch, shear and curvature of its axis."""
-    (_, t), extension, bending, _ = cable_axis(beam, u, e, xi)
-    return angle_of(*t), 1.0 + extension, 0.0 * xi, bending
+    (_, t), strain, curvature, _ = cable_axis(beam, u, e, xi)
+    EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
+    N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
+    return (EA * strain - ES * curvature - N0, EI * curvature - ES * strain - M0,
+            (angle_of(*t), 1.0 + strain, 0.0 * xi, curvature))
 
 
 def _strains_of_cable(beam, eigen, e, xi, N, M):
