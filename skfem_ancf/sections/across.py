@@ -270,6 +270,16 @@ class Across(Immutable):
         """
         return slab.measure.breadth(self.at(slab, X, tind), whole, times)
 
+    def width(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+        """The width at points of a layer, that of its piece there.
+
+        Parameters
+        ----------
+        slab, X, tind
+            As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+        """
+        return slab.measure.width(self.at(slab, X, tind))
+
     def grade(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
         """The factor on the energy of a layer at points.
 
@@ -302,7 +312,7 @@ class Across(Immutable):
         """
         slab = self.slabs[-side]
         if slab.face is None:
-            return slab.measure.width(self.at(slab, X, tind))
+            return self.width(slab, X, tind)
         if slab.face[side] == 0.0:
             raise InputError("this section has no width at its bottom and its top: load the axis, "
                              "by scene.line_load")
