@@ -11,7 +11,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         NeoHookean, Scene, Section)
 from skfem_ancf.materials.damping import KelvinVoigt
 from skfem_ancf.recovery.intervals import Intervals
-from skfem_ancf.sections.section import slab_of
+from skfem_ancf.sections.section import layer_of
 from skfem_ancf.sections.measure import Uniform
 
 T = Section.profile("T", width=0.06, web=0.01, flange=0.015)
@@ -175,7 +175,7 @@ def test_numbers_have_section_forces_and_no_fields(element):
 def test_intervals_across():
     """Integrals and values of polynomials, of layers and of a circle."""
     for section, material in ((SANDWICH, None), (PROFILES["circle"][0], STEEL)):
-        across = Intervals(section.slabs(line(), material), 2)
+        across = Intervals(section.layers_on(line(), material), 2)
         middle = across.points(np.ones(1))
         eta = np.array([0.0, 0.3, 0.1, 1.0])
         for k in range(4):
@@ -225,8 +225,8 @@ def test_tapered_profiles_are_the_plane_body(name):
 class Strip(Section):
     """A user-defined section."""
 
-    def slabs(self, mesh, material):
-        return [slab_of(material, 0.02, Uniform())]
+    def layers_on(self, mesh, material):
+        return [layer_of(material, 0.02, Uniform())]
 
 
 def test_sections_of_ones_own_are_recovered():

@@ -15,7 +15,7 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
            "sweeps"]
 #: Returned by public methods, and machinery all the same.
 MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "System", "Spread",
-             "Interpolation", "Layer", "LayerPoints",
+             "Interpolation", "BeamLayer", "LayerPoints",
              "Law", "Amplitude", "BodyFields", "Link", "Part",
              "StabilisedMode", "Sampling", "Rule", "Point", "Critical", "Vector"}
 

@@ -117,7 +117,7 @@ def test_rules_of_a_width_with_jumps_and_round_ends():
         exact = (3.0 * 0.2**(k + 1) + 0.5 * (0.9**(k + 1) - 0.2**(k + 1))
                  + 2.0 * (1 - 0.9**(k + 1))) / (k + 1)
         assert total * np.sum(w * x**k) == pytest.approx(exact, rel=1e-13)
-    round_, = Section.profile("circle").slabs(line(h=2.0), STEEL)
+    round_, = Section.profile("circle").layers_on(line(h=2.0), STEEL)
     x, w = round_.measure.gauss(5)
     # int_{-1}^{1} 2 sqrt(1 - y^2) y^{2 k} dy
     for k, exact in enumerate(np.pi * np.array([1, 1 / 4, 1 / 8, 5 / 64, 7 / 128])):

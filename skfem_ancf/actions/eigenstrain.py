@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..beam.beam import Beam
-    from ..sections import Slab
+    from ..sections import Layer
     from ..core.types import Array, TimeFunction
     from ..beam.layout import WhichBeam
 
@@ -75,13 +75,13 @@ class EigenStrain(Load):
         self.xx, self.yy, self.xy = (_number_or_function(f"eps_{name}", f) for name, f in (
             ("xx", xx), ("yy", yy), ("xy", xy)))
 
-    def of_slab(self, slab: Slab, x: Array, y: Array) -> Array:
-        """(eps_xx, eps_yy, 2 eps_xy) of a slab of a section at material coordinates.
+    def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
+        """(eps_xx, eps_yy, 2 eps_xy) of a layer of a section at material coordinates.
 
         Parameters
         ----------
-        slab
-            A :class:`~skfem_ancf.sections.Slab`.
+        layer
+            A :class:`~skfem_ancf.sections.Layer`.
         x, y
             Coordinates, shape (...).
 
@@ -219,9 +219,9 @@ class EigenStrain(Load):
         across = self.beam.across
         x, y = across.coordinates(X, e)
         which, out = np.broadcast_to(across.which(X, e), x.shape), np.empty((3, *x.shape))
-        for k, slab in enumerate(across.slabs):
+        for k, layer in enumerate(across.layers):
             on = which == k
-            out[:, on] = self.of_slab(slab, x[on], y[on])
+            out[:, on] = self.of_layer(layer, x[on], y[on])
         return out
 
     def stress_at(self, u: Array, X: Array, e: Array, factor: float = 1.0) -> Array:
@@ -241,11 +241,11 @@ class EigenStrain(Load):
             stretch, _ = stretched(on_grid(strain_at, beam, u, X, e)[0])
             return self.nominal_at(X, e, factor) / stretch
         which = np.broadcast_to(beam.across.which(X, e), E0.shape[1:])
-        for k, slab in enumerate(beam.across.slabs):  # what acts on the elements
-            E0[1] -= np.where(which == k, unmatched(beam, self, slab, X, e), 0.0)
+        for k, layer in enumerate(beam.across.layers):  # what acts on the elements
+            E0[1] -= np.where(which == k, unmatched(beam, self, layer, X, e), 0.0)
         E = on_grid(strain_at, beam, u, X, e) if self.grows else 0.0 * factor * E0
         laws = [partial(stress_of, layer.law) for layer in beam.layers]
-        return beam.across.of_slabs(
+        return beam.across.of_layers(
             X, E, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
 
     def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
@@ -257,9 +257,9 @@ class EigenStrain(Load):
             As for :meth:`stress_at`, shapes (2, n, m) and (n,).
         """
         E0 = factor * self.strain_at(X, e) * np.array([1.0, 0.0, 0.0])[:, None, None]
-        return self.beam.across.of_slabs(X, E0, [
-            lambda slab=slab: slab.material.axial_modulus * E0
-            for slab in self.beam.across.slabs], e)
+        return self.beam.across.of_layers(X, E0, [
+            lambda layer=layer: layer.material.axial_modulus * E0
+            for layer in self.beam.across.layers], e)
 
 
 class Temperature(EigenStrain):
@@ -280,13 +280,13 @@ class Temperature(EigenStrain):
         self.change = _number_or_function("the temperature", change, False)
 
     def bind(self, beam: Beam) -> Load:
-        if not any(slab.material.thermal_expansion for slab in beam.across.slabs):
+        if not any(layer.material.thermal_expansion for layer in beam.across.layers):
             raise InputError(f"no material of {beam!r} expands with the temperature: give one a "
                              "thermal_expansion, as StVenantKirchhoff(..., thermal_expansion=1e-5)")
         return super().bind(beam)
 
-    def of_slab(self, slab: Slab, x: Array, y: Array) -> Array:
-        law = slab.material
+    def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
+        law = layer.material
         size = law.thermal_expansion * (1.0 + law.nu if law.plane == "strain" else 1.0)
         T = size * _asked("the temperature", self.change, x, y)
         return np.array([T, T, 0.0 * T])
@@ -353,12 +353,12 @@ def _resultants(beam, eigen):
     xi = beam.kernel.points
     out = np.zeros((2, beam.mesh.nelements, len(xi)))
     across = beam.across
-    for slab, (eta, w) in across.rules(8):
+    for layer, (eta, w) in across.rules(8):
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
         x, y = across.coordinates(X)
-        size = (slab.material.axial_modulus * across.breadth(slab, X, times="grade")
+        size = (layer.material.axial_modulus * across.breadth(layer, X, times="grade")
                 * beam.mesh.mapping().height(X[0])[0] * np.tile(w, len(xi)))
-        S0 = size * eigen.of_slab(slab, x, y)[0]
+        S0 = size * eigen.of_layer(layer, x, y)[0]
         for k, moment in enumerate((S0, -S0 * y)):
             out[k] += moment.reshape(*out[k].shape, -1).sum(axis=-1)
     return np.ascontiguousarray(out.transpose(0, 2, 1))

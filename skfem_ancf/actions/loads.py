@@ -450,7 +450,7 @@ def _warn_of_lever(beam, surfaces, forces):
     for one, force in zip(surfaces, forces):
         along, across = np.einsum("ikep,iep->kep", mapping.frame(one.X, one.elements), force)
         moment = np.sum(along * mapping.offset(one.X, one.elements), axis=1)
-        lost[one.side] = lost.get(one.side, 0.0) + moment  # of the slabs of an end together
+        lost[one.side] = lost.get(one.side, 0.0) + moment  # of the layers of an end together
         kept += length * np.sum(np.abs(across))
         size += beam.mesh.height * np.sum(np.hypot(along, across))
     left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
@@ -527,7 +527,7 @@ def _density(form, basis, beam, vector):
     if not beam.across.plain:
         return None
     xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
-    values = (f / beam.across.slabs[0].width).reshape(*f.shape[:2], len(xi), len(eta))
+    values = (f / beam.across.layers[0].width).reshape(*f.shape[:2], len(xi), len(eta))
     return Spread(sampled=(Sampled(BODY, np.arange(shape[0]), xi, values, eta),))
 
 

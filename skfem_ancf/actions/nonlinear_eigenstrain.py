@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..core.types import Array
 
 
-#: Half of the points across a slab, and what is no part of a strain relative to the largest.
+#: Half of the points across a layer, and what is no part of a strain relative to the largest.
 SECTION, ROUND_OFF = 6, 1e-12
 
 
@@ -72,15 +72,15 @@ def sampled(beam: Beam, table: Any, eigen: Any) -> Array:
     for row, name in enumerate(COMPONENTS):
         xi, eta = term.nodes(name), term.section_nodes
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-        values = eigen.of_slab(table.slab, *beam.across.coordinates(X))[row]
+        values = eigen.of_layer(table.layer, *beam.across.coordinates(X))[row]
         if name == "yy":
-            values = values - unmatched(beam, eigen, table.slab, X)
+            values = values - unmatched(beam, eigen, table.layer, X)
         matrix = term.matrix(name)
         out.append(values if matrix is None else values @ matrix.T)
     return np.ascontiguousarray(np.array(out).transpose(0, 2, 1))
 
 
-def unmatched(beam: Beam, eigen: Any, slab: Any, X: Array, tind: Array | None = None) -> Array:
+def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:
     """The part of eps_yy that a section takes freely and that its element cannot have.
 
     A section that bends freely under E0 has a plane eps_xx, and S_yy = 0: eps_yy is E0_yy - nu
@@ -93,8 +93,8 @@ def unmatched(beam: Beam, eigen: Any, slab: Any, X: Array, tind: Array | None = 
         A :class:`~skfem_ancf.Beam` with sections.
     eigen
         The :class:`~skfem_ancf.actions.eigenstrain.EigenStrain`.
-    slab, X, tind
-        The slab of all points, the points, shape (2, npoints) or (2, nelements, npoints), and
+    layer, X, tind
+        The layer of all points, the points, shape (2, npoints) or (2, nelements, npoints), and
         elements (nelements,), or None for all.
 
     Returns
@@ -116,7 +116,7 @@ def unmatched(beam: Beam, eigen: Any, slab: Any, X: Array, tind: Array | None = 
                 * one.material.axial_modulus * across.breadth(one, Z, tind, times="grade"))
         size = np.broadcast_to(size, (len(x), Z.shape[-1])).reshape(shape)
         s, t = across.coordinates(Z, tind)
-        E0 = eigen.of_slab(one, s, t).reshape(3, *shape)
+        E0 = eigen.of_layer(one, s, t).reshape(3, *shape)
         parts.append((size, t.reshape(shape), legvander(2.0 * eta - 1.0, degree), E0,
                       one.material.lateral_ratio))
         pushed += np.sum(size * E0[0], axis=-1), np.sum(size * E0[0] * parts[-1][1], axis=-1)
@@ -134,6 +134,6 @@ def unmatched(beam: Beam, eigen: Any, slab: Any, X: Array, tind: Array | None = 
         fit += np.einsum("enk,ki,kj->enij", size, P, P)
         right += np.einsum("enk,ki->eni", size * yy, P)
     c = np.linalg.solve(fit, right[..., None])[..., 0]
-    out = free(y, mean, slope, eigen.of_slab(slab, x, y), slab.material.lateral_ratio) - np.sum(
+    out = free(y, mean, slope, eigen.of_layer(layer, x, y), layer.material.lateral_ratio) - np.sum(
         c * legvander(2.0 * np.broadcast_to(X[1], x.shape) - 1.0, degree), axis=-1)
     return np.where(np.abs(out) > ROUND_OFF * largest, out, 0.0)

@@ -24,7 +24,7 @@ from ..sections import Across, Rectangle, Section
 from . import kinematics
 from .inertia import exact_rule, inertia_of
 from .interpolation import probe
-from .strains import Interpolation, Layer, on_grid, strain_at, stress_at
+from .strains import BeamLayer, Interpolation, on_grid, strain_at, stress_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -186,7 +186,7 @@ class Beam(Immutable):
     @cached_property
     def basis(self) -> Basis:
         """A scikit-fem ``Basis`` of the position field with the formulation's quadrature."""
-        if len(self.across.slabs) > 1:
+        if len(self.across.layers) > 1:
             return self.exact_basis()
         return Basis(self.mesh, ElementVector(self.element), quadrature=self.terms[0].quadrature)
 
@@ -230,9 +230,10 @@ class Beam(Immutable):
         return [term for layer in self.layers for term in layer.terms]
 
     @cached_property
-    def layers(self) -> list[Layer]:
-        """The layers of the section with their terms, :class:`~skfem_ancf.beam.strains.Layer`."""
-        return [Layer(self, slab, terms) for slab, terms in self.across.terms(self.formulation)]
+    def layers(self) -> list[BeamLayer]:
+        """The layers of the section with their terms, :class:`~.strains.BeamLayer`."""
+        return [BeamLayer(self, layer, terms)
+                for layer, terms in self.across.terms(self.formulation)]
 
     @property
     def has_sections(self) -> bool:
@@ -455,4 +456,4 @@ def _material(section, material, mesh):
         raise InputError(f"material must be None, for {section!r} has its own, got "
                          f"{shown(material)}" if section.has_materials else
                          f"material must be a Material, got {shown(material)}")
-    return material or section.slabs(mesh, None)[0].material
+    return material or section.layers_on(mesh, None)[0].material

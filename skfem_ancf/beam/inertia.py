@@ -90,10 +90,10 @@ def inertia_of(beam: Any) -> Inertia:
     across, axis = beam.across, gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     parts = []
-    for slab, rule in across.rules(beam.element.order + 1, inertia=True):
+    for layer, rule in across.rules(beam.element.order + 1, inertia=True):
         X, W = product_rule(axis, rule)
         parts.append((beam.element.of_mesh(beam.mesh.mapping(), X, tind)[0],
-                      across.volume(slab, X, W, tind, times="density", full=True)))
+                      across.volume(layer, X, W, tind, times="density", full=True)))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 

@@ -30,11 +30,11 @@ KERNELS: dict[str, Any] = {"sections": Kernel, "cable": CableKernel}
 
 def require_cable(beam: Any) -> None:
     """Raise InputError for a law that is not Hooke's; warn of a shear stiffness that is ignored."""
-    for slab in beam.across.slabs:
-        if not slab.material.is_hooke:
+    for layer in beam.across.layers:
+        if not layer.material.is_hooke:
             raise InputError(
                 "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
-                f"have the law of {slab.material!r}. Use StVenantKirchhoff, or an element with "
+                f"have the law of {layer.material!r}. Use StVenantKirchhoff, or an element with "
                 "sections, as ElementBeamANCFCubic(2)")
     section, GA = beam.section, getattr(beam.section, "GA", None)
     if GA is None:
@@ -134,7 +134,7 @@ def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
     """
     if not beam.has_sections:
         along = beam.kernel.outer_stretches(u)
-        ratio = beam.across.slabs[0].material.lateral_ratio
+        ratio = beam.across.layers[0].material.lateral_ratio
         if np.iscomplexobj(u):
             return along + ratio * (1.0 - along), along
         return along * np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0)), along

@@ -217,7 +217,7 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array, strain: Array | None = No
     at = X[:, :, None]
     of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
           partial(_stress_of_cable, strain=E, X=at, tind=e))
-    return beam.across.of_slabs(at, E, [partial(of, layer) for layer in beam.layers], e)[..., 0]
+    return beam.across.of_layers(at, E, [partial(of, layer) for layer in beam.layers], e)[..., 0]
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
@@ -244,12 +244,12 @@ def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: A
     return of(beam, u, np.repeat(tind, shape[1]), points, *more).reshape(3, *shape)
 
 
-class Layer:
+class BeamLayer:
     """One layer of a beam, as its formulation asks for it.
 
     Parameters
     ----------
-    beam, slab, terms
+    beam, layer, terms
         The beam, its layer, and the terms of the strain energy of this.
 
     Attributes
@@ -258,9 +258,9 @@ class Layer:
         The constitutive law, with the shear factor of the section.
     """
 
-    def __init__(self, beam: Any, slab: Any, terms: Sequence[Term]) -> None:
-        self.beam, self.material, self.terms = beam, slab.material, terms
-        self._element = beam.across.element_of(slab)
+    def __init__(self, beam: Any, layer: Any, terms: Sequence[Term]) -> None:
+        self.beam, self.material, self.terms = beam, layer.material, terms
+        self._element = beam.across.element_of(layer)
 
     @cached_property
     def law(self) -> Law:
@@ -333,7 +333,7 @@ def fibres(beam: Any, e: Array, X: Array, extension: Array, bending: Array, kapp
     """Strain of the fibres of a cable by their length at points (2, n), and eps_yy over eps_xx."""
     at = X[:, :, None]
     Y, which = beam.mesh.mapping().offset(at, e), beam.across.which(at, e)
-    ratios = np.array([slab.material.lateral_ratio for slab in beam.across.slabs])[which]
+    ratios = np.array([layer.material.lateral_ratio for layer in beam.across.layers])[which]
     Y, ratios = (np.broadcast_to(x, at.shape[1:])[:, 0] for x in (Y, ratios))
     return (extension - Y * bending) / (1.0 - Y * kappa0), -ratios
 

@@ -76,14 +76,14 @@ def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
         on = found[(found >= first) & (found < first + ne)]
         if len(on):
             X = np.array([rule[0], np.full(points, 0.5 * side)])
-            width = across.slabs[0].width if across.plain else (
+            width = across.layers[0].width if across.plain else (
                 across.face(side // TOP, X, on - first))
             out.append(_surface(beam, side, on, on - first, X, width * rule[1]))
     for side, on, elements in _sections(mesh, found[found < n]):
-        for slab, (eta, w) in [(None, rule)] if across.plain else (
+        for layer, (eta, w) in [(None, rule)] if across.plain else (
                 across.rules(beam.element.order + 3)):
             X = np.array([np.full(len(eta), float(side == RIGHT)), eta])
-            width = across.slabs[0].width if slab is None else across.breadth(slab, X, elements)
+            width = across.layers[0].width if layer is None else across.breadth(layer, X, elements)
             out.append(_surface(beam, side, on, elements, X, width * w))
     return out
 

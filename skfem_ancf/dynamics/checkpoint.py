@@ -83,9 +83,10 @@ def fingerprint(system: System) -> dict[str, str]:
         parts[f"width {who}"] = (_digest(beam.width) if beam.across.plain else _digest(
             *(x for pack in beam.kernel.packs for x in (
                 pack.weights, getattr(pack, "stiffness", None), getattr(pack, "moduli", None))),
-            *(x for slab in beam.across.slabs for x in (
-                type(slab.material).__name__, *_numbers(slab.material))),
-            *(beam.inertia[1::2] if all(s.density is not None for s in beam.across.slabs) else ())))
+            *(x for layer in beam.across.layers for x in (
+                type(layer.material).__name__, *_numbers(layer.material))),
+            *(beam.inertia[1::2] if all(layer.density is not None for layer in beam.across.layers)
+              else ())))
         parts[f"damping {who}"] = _digest(beam.damping)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
     for k, body in enumerate(system.bodies):

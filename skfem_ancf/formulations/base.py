@@ -94,7 +94,7 @@ class Term:
 
 
 class Integrated(Protocol):
-    """What a formulation reads of a layer of a beam, a :class:`~skfem_ancf.beam.strains.Layer`."""
+    """What a formulation reads of a layer, a :class:`~skfem_ancf.beam.strains.BeamLayer`."""
 
     terms: Sequence[Term]
 

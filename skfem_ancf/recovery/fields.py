@@ -231,8 +231,8 @@ class Values(Mapping):
         across = self.beam.across
         if across.plain:
             return ask(self.beam.material)
-        return across.of_slabs(self._part.at, np.zeros((self.n, 1), self._u.dtype), [
-            partial(_column, ask, slab.material) for slab in across.slabs], self._part.e,
+        return across.of_layers(self._part.at, np.zeros((self.n, 1), self._u.dtype), [
+            partial(_column, ask, layer.material) for layer in across.layers], self._part.e,
             graded)[:, 0]
 
     @cached_property

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..core.types import Array
-    from ..sections import Slab
+    from ..sections import Layer
 
 #: Points of an interval that is the whole section, at least; of one of several, more than the
 #: order N and at least; and of one whose width is a function, as the chord of a circle.
@@ -98,7 +98,7 @@ class Intervals:
 
     Parameters
     ----------
-    slabs
+    layers
         Of the section.
     order
         N of the element.
@@ -107,10 +107,10 @@ class Intervals:
     ----------
     eta
         The points, shape (m,); those of several intervals are inside of them.
-    slabs
-        For each slab the columns of its points.
+    layers
+        For each layer the columns of its points.
     width
-        Width of a slab at the points over its mean, area by height, shape (m,).
+        Width of a layer at the points over its mean, area by height, shape (m,).
     from_bottom, whole
         From values to the integrals over eta from 0 to the points, (m, m), and to 1, (m,).
     bottom, top
@@ -119,15 +119,15 @@ class Intervals:
         The intervals are other parts of the height from place to place.
     """
 
-    def __init__(self, slabs: Sequence[Slab], order: int) -> None:
-        self._measures = [slab.measure for slab in slabs]
+    def __init__(self, layers: Sequence[Layer], order: int) -> None:
+        self._measures = [layer.measure for layer in layers]
         pieces = [(piece, m.mean) for m in self._measures for piece in m.pieces]
         self._intervals = [_interval(low, high, callable(b), order, len(pieces) == 1)
                            for (low, high, b), _ in pieces]
         ends = np.cumsum([0] + [len(i.nodes) for i in self._intervals])
         self._columns = [slice(a, b) for a, b in pairwise(ends.tolist())]
         counts = np.cumsum([0] + [len(m.pieces) for m in self._measures])
-        self.slabs = [slice(ends[a], ends[b]) for a, b in pairwise(counts)]
+        self.layers = [slice(ends[a], ends[b]) for a, b in pairwise(counts)]
         self.eta = np.concatenate([i.eta for i in self._intervals])
         self.width = np.concatenate([
             (b(i.eta) if callable(b) else b) / mean + 0.0 * i.eta

@@ -132,21 +132,21 @@ class Recovery:
 
     def __init__(self, forces: SectionForces, u: Array) -> None:
         self.forces, self.beam, self._u = forces, forces.beam, u
-        beam, slabs = self.beam, self.beam.across.slabs
+        beam, layers = self.beam, self.beam.across.layers
         self.why = "" if beam.section.has_fields else (
             f"{beam.section!r} does not say what it is made of: strain and stress are those of a "
             "rectangle with these numbers; State.resultants() has what is known")
-        self.intervals = Intervals(slabs, beam.element.order)
-        laws = [slab.material.law(slab.shear) for slab in slabs]
+        self.intervals = Intervals(layers, beam.element.order)
+        laws = [layer.material.law(layer.shear) for layer in layers]
         if forces.small:  # the law of small strains
             laws = [law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
                     for law in laws]
-        self.laws = list(zip(self.intervals.slabs, laws))
+        self.laws = list(zip(self.intervals.layers, laws))
         self.arc = ArcLength(beam)
         #: To the body whose sections turn as its axis at jumps of the curvature.
         self.geometry = None if beam.mesh.sections == "linear" or not len(
             beam.across.bends) else by_element(beam.mesh, beam.across.bends.astype(int)).mapping()
-        self.has_stress = (len(slabs) == 1 and slabs[0].face is None
+        self.has_stress = (len(layers) == 1 and layers[0].face is None
                            and beam.element.carries_shear_parabola
                            and not isinstance(beam.formulation, EnhancedContinuum))
         self.segments = [Segment(self, a, b) for a, b in pairwise(forces.cuts)]
@@ -176,10 +176,11 @@ class Recovery:
         return np.concatenate([function(law, *(f[..., columns] for f in fields))
                                for columns, law in self.laws], axis=-1)
 
-    def of_slabs(self, of: Callable[..., Any], X: Array, e: Array) -> Any:
-        """``of(slab, X, e)`` with the slab of each of the points X, shapes (2, n, m) and (n,)."""
-        return np.concatenate([np.broadcast_to(of(slab, X[..., at], e), X[0, :, at].shape)
-                               for slab, at in zip(self.beam.across.slabs, self.intervals.slabs)],
+    def of_layers(self, of: Callable[..., Any], X: Array, e: Array) -> Any:
+        """``of(layer, X, e)`` with the layer of each of the points X, shapes (2, n, m) and (n,)."""
+        return np.concatenate([np.broadcast_to(of(layer, X[..., at], e), X[0, :, at].shape)
+                               for layer, at in zip(self.beam.across.layers,
+                                                    self.intervals.layers)],
                               axis=-1)
 
     @cached_property

@@ -226,8 +226,8 @@ def _own(beam, u, eigen, e, xi):
 def _across(beam, e, xi):
     """Points across sections, shape (2, n, m), and the areas that they stand for."""
     eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
-        beam.across.points(slab, e, xi, max(beam.element.order, 1) + 2)
-        for slab in beam.across.slabs)))
+        beam.across.points(layer, e, xi, max(beam.element.order, 1) + 2)
+        for layer in beam.across.layers)))
     X = np.array([xi[:, None] + 0.0 * eta, eta])
     return X, breadth * beam.mesh.mapping().height(X[0], e)[0]
 

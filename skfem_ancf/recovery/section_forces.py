@@ -131,8 +131,8 @@ class Sections:
     def density(self) -> Array:
         """Mass per volume, (n, k)."""
         across, zero, X = self.beam.across, np.zeros(self.X.shape[1:]), beside(self.X)
-        return zero + across.of_slabs(X, zero, [partial(across.density, slab, X, self.e)
-                                                for slab in across.slabs], self.e, graded=False)
+        return zero + across.of_layers(X, zero, [partial(across.density, layer, X, self.e)
+                                                for layer in across.layers], self.e, graded=False)
 
 
 class SectionForces:
@@ -234,12 +234,12 @@ class SectionForces:
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
         parts = [self.face(side, e, xi) for side in self.sides]
         whole = not (beam.has_sections or self.lifted)
-        for slab, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
+        for layer, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
             eta, v = WHOLE if whole else (eta, v)
             inside = Sections(beam, e, xi, eta, self.lifted)
             body = self.body(inside)
             if np.any(body):
-                size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.full_volume
+                size = beam.across.breadth(layer, inside.X, e, whole) * v * inside.full_volume
                 parts.append((inside, size * body))
         middle = Sections(beam, e, xi)
         axis = middle.field(self.q)

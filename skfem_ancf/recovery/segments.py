@@ -126,9 +126,9 @@ class Segment:
         self.Y, self.span = h * (at.eta - 0.5), h * at.stretch
         self.lean = slope * (at.eta - 0.5 + h * at.drift)
         self.swell = slope * (1.0 / h + at.swell)
-        self.width = r.of_slabs(across.width, X, e) if r.intervals.moves else (
-            r.intervals.width * (r.of_slabs(across.breadth, X, e) + 0.0 * X[0]))
-        self.grade = r.of_slabs(across.grade, X, e)
+        self.width = r.of_layers(across.width, X, e) if r.intervals.moves else (
+            r.intervals.width * (r.of_layers(across.breadth, X, e) + 0.0 * X[0]))
+        self.grade = r.of_layers(across.grade, X, e)
         self.g = sections.volume / (speed[:, None] * h)
         self.E0 = sum((factor * eigen.strain_at(X, e) for factor, eigen in self.forces.eigen),
                       np.zeros((3,) + self.g.shape))

@@ -291,8 +291,8 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
     weights = np.array([1.0, 1.0, 0.5])  # eps_xy twice, from its double
     ne, (x, w) = beam.mesh.nelements, gauss(5)
     out, e, xi = np.zeros((2, ne)), np.repeat(np.arange(ne), 5), np.tile(x, ne)
-    for slab in beam.across.slabs:
-        eta, v = beam.across.points(slab, e, xi, 2 * max(beam.element.order, 1) + 1)
+    for layer in beam.across.layers:
+        eta, v = beam.across.points(layer, e, xi, 2 * max(beam.element.order, 1) + 1)
         X = np.array([xi[:, None] + 0.0 * eta, eta]).reshape(2, ne, -1)
         dV = (v * np.tile(w, ne)[:, None]).reshape(ne, -1) * beam.mesh.mapping().detDF(X)
         strain = recovery.fields(X)[0]

@@ -125,9 +125,9 @@ def _solution(scene, kind):
     """How the equations are solved, and what is looked at."""
     s, beams, dynamic, linear = scene.system, scene.beams, kind == "dynamic", kind == "linear"
     yield "linear solver", "computed", _linear_solver(s, dynamic)
-    rules = sorted({(b.element.order, t.section_points, t.slab.measure.spent)
+    rules = sorted({(b.element.order, t.section_points, t.layer.measure.spent)
                     for b in beams if b.has_sections for t in b.kernel.firsts})
-    layer = " a layer" if any(len(b.across.slabs) > 1 for b in beams) else ""
+    layer = " a layer" if any(len(b.across.layers) > 1 for b in beams) else ""
     yield "section quadrature", "constant" if rules else "skipped", (
         "; ".join(f"order {n}: {p} points{layer}, exact for degree {2 * p - 1 - spent} of {4 * n}"
                   for n, p, spent in rules) or "a cable has EA and EI")
@@ -193,13 +193,13 @@ def _sections(scene):
 
 def _section(beam):
     """The section of a beam that is no rectangle of one height, width and material, in words."""
-    mesh, slabs = beam.mesh, len(beam.across.slabs)
+    mesh, layers = beam.mesh, len(beam.across.layers)
     what = [repr(beam.section)] if not beam.across.plain else []
     if mesh.heights is not None:
         what.append(f"height {np.min(mesh.heights):.4g} to {mesh.height:.4g}")
-    if slabs > 1:
-        what.append(f"{slabs} laws")
-    if any(slab.grade is not None for slab in beam.across.slabs):
+    if layers > 1:
+        what.append(f"{layers} laws")
+    if any(layer.grade is not None for layer in beam.across.layers):
         what.append("graded")
     return " ".join(what)
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..elements.base import ElementBeam
     from ..materials import Material
     from ..mesh.mesh_beam import MeshBeam
-    from .section import Section, Slab
+    from .section import Section, Layer
 
 #: Points across a layer for areas and moments.
 POINTS = 4
@@ -43,12 +43,12 @@ TIMES = {"stiffness": "grade", "E": "grade", "mass": "density", "area": ""}
 class LayerPoints:
     """Points of a layer on a mesh; :meth:`Across.at` makes it."""
 
-    def __init__(self, across: Across, slab: Slab, X: Array, tind: Array | None = None) -> None:
-        self.across, self.slab, self.X, self.tind = across, slab, X, tind
+    def __init__(self, across: Across, layer: Layer, X: Array, tind: Array | None = None) -> None:
+        self.across, self.layer, self.X, self.tind = across, layer, X, tind
 
     def moved(self, X: Array) -> LayerPoints:
         """Other points (2, npoints) or (2, nelements, npoints) of the layer."""
-        return LayerPoints(self.across, self.slab, X, self.tind)
+        return LayerPoints(self.across, self.layer, X, self.tind)
 
     @property
     def heights(self) -> Array:
@@ -57,16 +57,16 @@ class LayerPoints:
 
     def asked(self, name: str) -> Array:
         """What a function of the layer, of :data:`NAMES`, is there, (nelements, npoints)."""
-        return asked(NAMES[name], getattr(self.slab, name),
+        return asked(NAMES[name], getattr(self.layer, name),
                      *self.across.coordinates(self.X, self.tind))
 
     def factor(self, name: str, whole: bool = False) -> Any:
         """A number of the layer, or what its function is there, or the mean of its sections."""
-        value = getattr(self.slab, name)
+        value = getattr(self.layer, name)
         if callable(value):
-            return self.slab.measure.values(self, name, whole)
+            return self.layer.measure.values(self, name, whole)
         if value is None and name == "density":
-            raise InputError(f"{self.slab.material!r} has no density: give one to use mass or "
+            raise InputError(f"{self.layer.material!r} has no density: give one to use mass or "
                              "gravity")
         return 1.0 if value is None else value
 
@@ -89,8 +89,8 @@ class Across(Immutable):
 
     Attributes
     ----------
-    slabs
-        The layers of the section, a tuple of :class:`~skfem_ancf.sections.section.Slab`.
+    layers
+        The layers of the section, a tuple of :class:`~skfem_ancf.sections.section.Layer`.
     plain, simple : bool
         A rectangle of one width and one material; and that on a mesh of one height.
     constant, uniform : bool
@@ -102,26 +102,26 @@ class Across(Immutable):
     def __init__(self, mesh: MeshBeam, element: ElementBeam, section: Section,
                  material: Material | None) -> None:
         self.mesh, self.element = mesh, element
-        self.slabs: tuple[Slab, ...] = tuple(
+        self.layers: tuple[Layer, ...] = tuple(
             replace(s, measure=s.measure.of_order(element.order))
-            for s in section.slabs(mesh, material))
-        varying, even = any(s.varies for s in self.slabs), mesh.heights is None
+            for s in section.layers_on(mesh, material))
+        varying, even = any(s.varies for s in self.layers), mesh.heights is None
         self.plain = isinstance(section, Rectangle) and not varying
         self.simple = self.plain and even
         self.constant = even and not varying
         self.uniform = self.constant and mesh.is_uniform
-        self.moving = any(s.measure.moves for s in self.slabs)
+        self.moving = any(s.measure.moves for s in self.layers)
         if varying:
             self._check()
 
     def _check(self):
         """Ask functions all over the body, so that they fail when the beam is made."""
         X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
-        for slab in self.slabs:
-            low, *_, high = self._ends(slab, X[0])
-            inside = self.at(slab, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
+        for layer in self.layers:
+            low, *_, high = self._ends(layer, X[0])
+            inside = self.at(layer, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
             for name in NAMES:
-                if callable(getattr(slab, name)):
+                if callable(getattr(layer, name)):
                     inside.asked(name)
 
     @cached_property
@@ -131,10 +131,10 @@ class Across(Immutable):
         A width, a modulus, a density, the slope of the height, or the curvature of the axis.
         """
         n, found = self.mesh.nelements, [np.zeros(0)]
-        for slab in self.slabs:
-            eta = np.linspace(slab.measure.low, slab.measure.high, POINTS + 1)
-            found += [jumps(partial(self._given, name, slab), n, eta)
-                      for name in NAMES if callable(getattr(slab, name))]
+        for layer in self.layers:
+            eta = np.linspace(layer.measure.low, layer.measure.high, POINTS + 1)
+            found += [jumps(partial(self._given, name, layer), n, eta)
+                      for name in NAMES if callable(getattr(layer, name))]
         if self.mesh.heights is not None:
             found.append(jumps(lambda X, e: self.mesh.mapping().height(X[0], e)[1]
                                / self.mesh.lengths[e, None], n, np.array([0.5]), KINK))
@@ -149,8 +149,8 @@ class Across(Immutable):
         axis = mesh if mesh.sections == "linear" else mesh.with_sections("cubic")
         return jumps(axis.mapping().curvature, mesh.nelements, np.array([0.5]), BEND / mesh.height)
 
-    def _given(self, name, slab, X, tind):
-        return slab.measure.values(self.at(slab, X, tind), name)
+    def _given(self, name, layer, X, tind):
+        return layer.measure.values(self.at(layer, X, tind), name)
 
     # points
 
@@ -177,9 +177,9 @@ class Across(Immutable):
         """
         return self.mesh.mapping().height(xi, tind)[0]
 
-    def _ends(self, slab, xi):
-        """Ends of the pieces of a slab at places along the elements, (npieces + 1, ...)."""
-        return slab.measure.ends(self.heights(xi)) if self.moving else slab.measure.highest
+    def _ends(self, layer, xi):
+        """Ends of the pieces of a layer at places along the elements, (npieces + 1, ...)."""
+        return layer.measure.ends(self.heights(xi)) if self.moving else layer.measure.highest
 
     def which(self, X: Array, tind: Array | None = None) -> Array:
         """The number of the layer at each point; one between two layers is in the upper.
@@ -191,12 +191,12 @@ class Across(Immutable):
         """
         if self.moving:
             h = self.heights(X[0], tind)
-            return sum((X[1] >= s.measure.ends(h)[-1] for s in self.slabs[:-1]),
+            return sum((X[1] >= s.measure.ends(h)[-1] for s in self.layers[:-1]),
                        np.zeros(h.shape, dtype=int))
-        tops = np.array([s.measure.high for s in self.slabs[:-1]])
+        tops = np.array([s.measure.high for s in self.layers[:-1]])
         return np.searchsorted(tops, np.asarray(X[1]), side="right")
 
-    def of_slabs(self, X: Array, like: Array, values: Sequence[Callable[[], Array]],
+    def of_layers(self, X: Array, like: Array, values: Sequence[Callable[[], Array]],
                  tind: Array | None = None, graded: bool = True) -> Array:
         """A field that each layer has by its own law.
 
@@ -211,35 +211,35 @@ class Across(Immutable):
         graded
             It is proportional to the energy.
         """
-        if len(self.slabs) == 1:
-            graded = graded and self.slabs[0].grade is not None
-            return values[0]() * self.grade(self.slabs[0], X, tind) if graded else values[0]()
+        if len(self.layers) == 1:
+            graded = graded and self.layers[0].grade is not None
+            return values[0]() * self.grade(self.layers[0], X, tind) if graded else values[0]()
         which = np.broadcast_to(self.which(X, tind), like.shape[-2:])
         out = np.empty(like.shape, like.dtype)
-        for k, (slab, value) in enumerate(zip(self.slabs, values)):
+        for k, (layer, value) in enumerate(zip(self.layers, values)):
             on = which == k
             if np.any(on):
-                found = value() * (self.grade(slab, X, tind) if graded else 1.0)
+                found = value() * (self.grade(layer, X, tind) if graded else 1.0)
                 out[..., on] = np.broadcast_to(found, like.shape)[..., on]
         return out
 
-    def at(self, slab: Slab, X: Array, tind: Array | None = None) -> LayerPoints:
+    def at(self, layer: Layer, X: Array, tind: Array | None = None) -> LayerPoints:
         """Points of a layer, as its measure takes them.
 
         Parameters
         ----------
-        slab, X, tind
+        layer, X, tind
             The layer, its points (2, npoints) or (2, nelements, npoints), elements (nelements,).
         """
-        return LayerPoints(self, slab, X, tind)
+        return LayerPoints(self, layer, X, tind)
 
-    def volume(self, slab: Slab, X: Array, W: Array, tind: Array | None = None,
+    def volume(self, layer: Layer, X: Array, W: Array, tind: Array | None = None,
                whole: bool = False, times: str = "", full: bool = False) -> Array:
         """Volumes that the points of a rule of a layer stand for.
 
         Parameters
         ----------
-        slab, tind
+        layer, tind
             The layer, and elements, (nelements,).
         X, W
             Points (2, npoints) and weights (npoints,) of the rule on the reference cell.
@@ -252,53 +252,53 @@ class Across(Immutable):
             :meth:`~skfem_ancf.mesh.mapping.MappingBeam.full_volume`.
         """
         if self.simple and self.uniform and tind is not None:
-            size = slab.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
-            return size * self.density(slab, X, tind) if times == "density" else size
+            size = layer.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
+            return size * self.density(layer, X, tind) if times == "density" else size
         mapping = self.mesh.mapping()
         of_cell = (mapping.full_volume if full else mapping.detDF)(X, tind)
-        return self.breadth(slab, X, tind, whole, times) * W * of_cell
+        return self.breadth(layer, X, tind, whole, times) * W * of_cell
 
-    def breadth(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False,
+    def breadth(self, layer: Layer, X: Array, tind: Array | None = None, whole: bool = False,
                 times: str = "") -> Any:
         """What the weights of a layer's rules, whose sum is 1, stand for: area over height.
 
         Parameters
         ----------
-        slab, X, tind, whole, times
+        layer, X, tind, whole, times
             As for :meth:`volume`, X of shape (2, npoints) or (2, nelements, npoints), tind of
             shape (nelements,).
         """
-        return slab.measure.breadth(self.at(slab, X, tind), whole, times)
+        return layer.measure.breadth(self.at(layer, X, tind), whole, times)
 
-    def width(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+    def width(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
         """The width at points of a layer, that of its piece there.
 
         Parameters
         ----------
-        slab, X, tind
+        layer, X, tind
             As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
         """
-        return slab.measure.width(self.at(slab, X, tind))
+        return layer.measure.width(self.at(layer, X, tind))
 
-    def grade(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+    def grade(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
         """The factor on the energy of a layer at points.
 
         Parameters
         ----------
-        slab, X, tind
+        layer, X, tind
             As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
         """
-        return self.at(slab, X, tind).factor("grade")
+        return self.at(layer, X, tind).factor("grade")
 
-    def density(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+    def density(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
         """Mass per volume of a layer at points; raises InputError if its material has none.
 
         Parameters
         ----------
-        slab, X, tind
+        layer, X, tind
             As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
         """
-        return self.at(slab, X, tind).factor("density")
+        return self.at(layer, X, tind).factor("density")
 
     def face(self, side: int, X: Array, tind: Array | None = None) -> Any:
         """The width of the bottom (0) or the top (1); raises InputError of a circle.
@@ -310,13 +310,13 @@ class Across(Immutable):
         X, tind
             Points on it, (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
         """
-        slab = self.slabs[-side]
-        if slab.face is None:
-            return self.width(slab, X, tind)
-        if slab.face[side] == 0.0:
+        layer = self.layers[-side]
+        if layer.face is None:
+            return self.width(layer, X, tind)
+        if layer.face[side] == 0.0:
             raise InputError("this section has no width at its bottom and its top: load the axis, "
                              "by scene.line_load")
-        return slab.face[side]
+        return layer.face[side]
 
     def outline(self, X: Array, tind: Array | None = None) -> Any:
         """The largest width of sections, of a function that on the axis.
@@ -326,7 +326,7 @@ class Across(Immutable):
         X, tind
             Points of the axis, (2, npoints) or (2, nelements, npoints), elements, (nelements,).
         """
-        widths = (s.measure.outline(self.at(s, X, tind)) for s in self.slabs)
+        widths = (s.measure.outline(self.at(s, X, tind)) for s in self.layers)
         return reduce(np.maximum, widths, 0.0 * X[0])
 
     def ends(self, xi: Array | None = None) -> Array:
@@ -334,13 +334,13 @@ class Across(Immutable):
 
         At places xi (npoints,) along the elements, or where the section is highest.
         """
-        found = [slab.measure.highest if xi is None else self._ends(slab, xi)
-                 for slab in self.slabs]
+        found = [layer.measure.highest if xi is None else self._ends(layer, xi)
+                 for layer in self.layers]
         return np.concatenate([found[0][:1], *(end[1:] for end in found)])
 
     # rules
 
-    def rules(self, n: int, inertia: bool = False) -> list[tuple[Slab, Rule]]:
+    def rules(self, n: int, inertia: bool = False) -> list[tuple[Layer, Rule]]:
         """Each layer with its rule of n points across it.
 
         Parameters
@@ -348,22 +348,22 @@ class Across(Immutable):
         n, inertia
             Number of points; True for the rules of the mass.
         """
-        return [(slab, (slab.inertia if inertia and slab.inertia is not None else
-                        slab.measure).gauss(n)) for slab in self.slabs]
+        return [(layer, (layer.inertia if inertia and layer.inertia is not None else
+                        layer.measure).gauss(n)) for layer in self.layers]
 
-    def points(self, slab: Slab, e: Array, xi: Array, n: int) -> tuple[Array, Array]:
+    def points(self, layer: Layer, e: Array, xi: Array, n: int) -> tuple[Array, Array]:
         """Places across a layer, and the area over height they stand for, (nsections, q).
 
         Parameters
         ----------
-        slab, e, xi
+        layer, e, xi
             The layer, elements and places along them, shapes (nsections,).
         n
             Number of points, at least.
         """
-        return slab.measure.sampled(self.at(slab, np.repeat(xi[None, :, None], 2, 0), e), n)
+        return layer.measure.sampled(self.at(layer, np.repeat(xi[None, :, None], 2, 0), e), n)
 
-    def terms(self, formulation: Any) -> list[tuple[Slab, list[Any]]]:
+    def terms(self, formulation: Any) -> list[tuple[Layer, list[Any]]]:
         """The terms of the strain energy of each layer, by a formulation.
 
         Raises
@@ -372,49 +372,49 @@ class Across(Immutable):
             If the rules of the formulation do not know the section.
         """
         out = []
-        for slab in self.slabs:
-            terms = list(formulation.terms(self.element_of(slab), slab.material))
+        for layer in self.layers:
+            terms = list(formulation.terms(self.element_of(layer), layer.material))
             if not terms:
                 raise InputError(f"{formulation!r} has no terms, so that nothing is stiff: "
                                  "terms(element, material) returns a list of one Term at least")
-            out.append((slab, terms))
+            out.append((layer, terms))
             if self.plain:
                 return out
-            eta, w = slab.measure.gauss(2)
+            eta, w = layer.measure.gauss(2)
             for term in terms:
-                if self.element.order and term.section_samples is not None and slab.measure.moves:
+                if self.element.order and term.section_samples is not None and layer.measure.moves:
                     raise InputError(
                         f"formulation {formulation.name!r} at order {self.element.order} takes the "
                         "mean of the strain over a section, whose weights change along a taper "
                         "with thicknesses that stay: take order 2 or more by the formulation "
                         "'assumed' or 'continuum', or nu = 0")
-                (x, v), degree = term.section, max(slab.measure.spent, 1)
+                (x, v), degree = term.section, max(layer.measure.spent, 1)
                 if len(x) > 1 and np.max(np.abs((v @ legvander(2.0 * x - 1.0, degree))
                                                 - w @ legvander(2.0 * eta - 1.0, degree))) > 1e-9:
                     raise InputError(
                         f"formulation {formulation.name!r} has a rule across the section that is "
-                        f"not that of {slab.measure!r}: take the rules that "
+                        f"not that of {layer.measure!r}: take the rules that "
                         "self.full_rules(element) returns")
         return out
 
-    def element_of(self, slab: Slab) -> ElementBeam:
+    def element_of(self, layer: Layer) -> ElementBeam:
         """The element as formulations ask for it, with the rules across a layer."""
-        return self.element if self.plain else self.element.measured(slab.measure, self.shear)
+        return self.element if self.plain else self.element.measured(layer.measure, self.shear)
 
     @cached_property
     def shear(self) -> float | None:
         """The shear factor for the element, None for that of a rectangle of one material."""
-        if self.plain or self.element.order == 0 or any(s.varies for s in self.slabs):
+        if self.plain or self.element.order == 0 or any(s.varies for s in self.layers):
             return None
-        return self._mean_shear() if self.moving else shear_factor(self.slabs, self.element.order)
+        return self._mean_shear() if self.moving else shear_factor(self.layers, self.element.order)
 
     def _mean_shear(self):
         """The factor by which one shear force all along shears the beam as those of sections do."""
         def at(height):
-            slabs = [replace(s, measure=m, width=s.width * m.mean) for s, m in (
-                (s, s.measure.at(height)) for s in self.slabs)]
-            return shear_factor(slabs, self.element.order), height * sum(
-                s.material.G * s.width for s in slabs)
+            layers = [replace(s, measure=m, width=s.width * m.mean) for s, m in (
+                (s, s.measure.at(height)) for s in self.layers)]
+            return shear_factor(layers, self.element.order), height * sum(
+                s.material.G * s.width for s in layers)
 
         high = self.mesh.height
         low = min(float(np.min(self.mesh.heights)), (1.0 - 1e-6) * high)
@@ -431,7 +431,7 @@ class Across(Immutable):
 
         It is asked for a width of 1 and the largest height, and is proportional to the width.
         """
-        first = self.slabs[0]
+        first = self.layers[0]
         if self.simple:
             return formulation.stabilisation(self.mesh, self.element, first.material, first.width)
         K = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
@@ -462,12 +462,12 @@ class Across(Immutable):
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
         mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
-        for slab, (eta, w) in self.rules(POINTS, what == "mass"):
+        for layer, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
             h, y = mapping.height(X[0], tind)[0], mapping.offset(X, tind)
-            size = np.tile(w, n) * h * self.breadth(slab, X, tind, times=TIMES[what])
+            size = np.tile(w, n) * h * self.breadth(layer, X, tind, times=TIMES[what])
             if what in MODULI:
-                size = size * getattr(slab.material, MODULI[what])
+                size = size * getattr(layer.material, MODULI[what])
             size, y = (np.broadcast_to(a, (ne, X.shape[-1])).reshape(ne, n, -1) for a in (size, y))
             out += np.array([np.sum(size * y**k, axis=-1) for k in range(3)])
         out[1, np.abs(out[1]) <= 1e-13 * np.sqrt(out[0] * out[2])] = 0.0  # as symmetric as it is

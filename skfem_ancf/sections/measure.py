@@ -97,22 +97,22 @@ class Measure(Immutable):
 
         Of points that stand for their sections if ``whole``; of "grade" or "density".
         """
-        slab, mesh, size = at.slab, at.across.mesh, at.factor("width", whole)
-        if callable(slab.width):
-            size = size * slab.part
-        elif slab.by_height and mesh.heights is not None:
+        layer, mesh, size = at.layer, at.across.mesh, at.factor("width", whole)
+        if callable(layer.width):
+            size = size * layer.part
+        elif layer.by_height and mesh.heights is not None:
             size = size * at.heights / mesh.height
         return size * at.factor(times, whole) if times else size
 
     def width(self, at: Any) -> Any:
         """The width at points of the layer."""
-        return self.breadth(at) / at.slab.part
+        return self.breadth(at) / at.layer.part
 
     def outline(self, at: Any) -> Any:
         """The largest width of sections, or where that is a function the one at points."""
-        slab = at.slab
-        scale = slab.outer * slab.part / slab.width if slab.outer else 1.0
-        return scale * self.breadth(at) / slab.part
+        layer = at.layer
+        scale = layer.outer * layer.part / layer.width if layer.outer else 1.0
+        return scale * self.breadth(at) / layer.part
 
     def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
         """At least n points of sections, for fields that are the layer's own.

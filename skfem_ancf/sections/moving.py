@@ -98,9 +98,9 @@ class Moving(Measure):
         return at.factor("width") * out[..., 0]
 
     def outline(self, at: Any) -> Any:
-        if at.slab.by_height:  # a tube
+        if at.layer.by_height:  # a tube
             return at.heights
-        return at.slab.outer or at.factor("width")
+        return at.layer.outer or at.factor("width")
 
     def breadth(self, at: Any, whole: bool = False, times: str = "") -> Array:
         xi = np.asarray(at.X[0])
@@ -110,7 +110,7 @@ class Moving(Measure):
         elif np.all(xi == xi[:, :1]):
             xi, back = xi[:, :1], np.zeros(xi.shape[1], dtype=int)
         names = ("width", times) if times else ("width",)
-        functions = [name for name in names if callable(getattr(at.slab, name))]
+        functions = [name for name in names if callable(getattr(at.layer, name))]
         c = np.prod([at.factor(name) for name in names if name not in functions])
 
         def product(eta):
@@ -124,7 +124,7 @@ class Moving(Measure):
     def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
         eta, w = self.points(at.heights[:, 0], n)
         there = at.moved(np.array([at.X[0] + 0.0 * eta, eta]))
-        return eta, w * (there.asked("width") if callable(at.slab.width) else at.slab.width)
+        return eta, w * (there.asked("width") if callable(at.layer.width) else at.layer.width)
 
     def points(self, h: Array, n: int) -> tuple[Array, Array]:
         """Points in the pieces of sections of heights (...), n in each of constant width.

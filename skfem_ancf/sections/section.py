@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Slab:
+class Layer:
     """A layer of a section, all along the beam.
 
     Attributes
@@ -78,7 +78,7 @@ class Section(Immutable):
     """The section of a beam: what lies across it. It does not change.
 
     Sections are made by :meth:`profile`, :meth:`layers` and :meth:`numbers`, and given to
-    ``Beam(mesh, element, section=...)``. A subclass of your own gives :meth:`slabs`.
+    ``Beam(mesh, element, section=...)``. A subclass of your own gives :meth:`layers_on`.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ class Section(Immutable):
         """
         return Numbers(EA, EI, GA, rhoA, rhoI, width)
 
-    def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
+    def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         """What it is made of in a beam, from the bottom to the top.
 
         Parameters
@@ -225,22 +225,22 @@ class Rectangle(Section):
     def __init__(self, width: float | Callable[..., Any]) -> None:
         self.width = width if callable(width) else require_positive("width", width)
 
-    def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
-        return [slab_of(material, self.width)]
+    def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
+        return [layer_of(material, self.width)]
 
     def __repr__(self) -> str:
         return f"<rectangle of width {shown(self.width)}>"
 
 
-def slab_of(material: Material, width: Any, measure: Any = None, **more: Any) -> Slab:
-    """The Slab of a material that may be graded; without a measure the whole height."""
+def layer_of(material: Material, width: Any, measure: Any = None, **more: Any) -> Layer:
+    """The Layer of a material that may be graded; without a measure the whole height."""
     uneven = callable(width) or material.graded
     if measure is None:
         measure = Uniform(more=MORE) if uneven else WHOLE
     elif uneven and isinstance(measure, Uniform):
         measure = Uniform(measure.low, measure.high, MORE)
     reference, grade = material.reference()
-    return Slab(reference, width, measure, grade=grade, density=material.density, **more)
+    return Layer(reference, width, measure, grade=grade, density=material.density, **more)
 
 
 def asked(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
@@ -290,7 +290,7 @@ class Layers(Section):
                              "strain")
         self.parts = tuple(found)
 
-    def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
+    def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         given = [thickness for thickness, _, _ in self.parts]
         total = sum(thickness for thickness in given if thickness is not None)
         least = mesh.height if mesh.heights is None else float(np.min(mesh.heights))
@@ -304,7 +304,7 @@ class Layers(Section):
                 raise InputError(f"{self!r} has thicknesses that stay, and does not fill a tapered "
                                  "mesh: give one layer the thickness None, by which it takes what "
                                  "the others leave, or use a mesh of constant height")
-            return [slab_of(law, width, Moving(_Layer(given, k), mesh.height))
+            return [layer_of(law, width, Moving(_Layer(given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
         if abs(tops[-1] - mesh.height) > FILLS * mesh.height:
@@ -313,7 +313,7 @@ class Layers(Section):
                              "one of the thickness None takes what the others leave")
         ends = np.append(0.0, tops / tops[-1])
         ends[-1] = 1.0
-        return [slab_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
+        return [layer_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
                 for a, b, (_, law, width) in zip(ends[:-1].tolist(), ends[1:].tolist(),
                                                  self.parts)]
 
@@ -356,7 +356,7 @@ class Numbers(Section):
         if rhoI is not None and rhoA is None:
             raise InputError("rhoI is given without rhoA: give both, or neither of them")
 
-    def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
+    def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         b, h = self.width_of_faces, mesh.height
         if mesh.heights is not None:
             raise InputError("the numbers of a section are the same all along: use a mesh of "
@@ -368,7 +368,7 @@ class Numbers(Section):
         part = np.sqrt(12.0 * self.EI / self.EA) / h
         own = part if self.rhoI is None or self.rhoA is None else (
             np.sqrt(12.0 * self.rhoI / self.rhoA) / h)
-        return [Slab(law, b, Uniform(0.5 - 0.5 * part, 0.5 + 0.5 * part), face=(b, b), outer=b,
+        return [Layer(law, b, Uniform(0.5 - 0.5 * part, 0.5 + 0.5 * part), face=(b, b), outer=b,
                      density=density, shear=2.4 * GA / self.EA,
                      inertia=Uniform(0.5 - 0.5 * own, 0.5 + 0.5 * own))]
 
@@ -435,19 +435,19 @@ class Profile(Section):
             return [Piece(0.0, 1.0 - thickness, web), flange]
         return [Piece(0.0, thickness, width), Piece(thickness, 1.0 - thickness, web), flange]
 
-    def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
+    def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         pieces = self.pieces(mesh.height)
         if self.name == "rectangle":
-            return [slab_of(material, self.sizes["width"])]
+            return [layer_of(material, self.sizes["width"])]
         round_ = self.name in ("circle", "tube")
         face = (0.0, 0.0) if round_ else (pieces[0].width, pieces[-1].width)
         outer = self.sizes.get("width", mesh.height)
         if mesh.heights is not None and not self.scaled and self.name != "circle":
             self.pieces(mesh.heights)
-            return [slab_of(material, 1.0, Moving(self.pieces, mesh.height), face=face,
+            return [layer_of(material, 1.0, Moving(self.pieces, mesh.height), face=face,
                             by_height=round_, outer=outer)]
         measure = Weighted(pieces)
-        return [slab_of(material, measure.mean, measure, face=face, by_height=round_, outer=outer)]
+        return [layer_of(material, measure.mean, measure, face=face, by_height=round_, outer=outer)]
 
     def __repr__(self) -> str:
         sizes = "".join(f", {k}={v:g}" for k, v in self.sizes.items())

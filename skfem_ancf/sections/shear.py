@@ -12,13 +12,13 @@ from ..core.quadrature import gauss, lagrange
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .section import Slab
+    from .section import Layer
 
 #: Points in each piece of a section.
 POINTS = 24
 
 
-def shear_factor(slabs: Sequence[Slab], order: int) -> float:
+def shear_factor(layers: Sequence[Layer], order: int) -> float:
     """The factor on the shear moduli of a section whose shear strain is a polynomial.
 
     The shear stress of a section in bending is that of Jourawski, ``b tau = Q S / (E I)``, with S
@@ -28,14 +28,14 @@ def shear_factor(slabs: Sequence[Slab], order: int) -> float:
 
     Parameters
     ----------
-    slabs
+    layers
         The section, from the bottom to the top, the same all along the beam.
     order
         N, at least 1.
     """
     t, w = gauss(POINTS)
     till = np.array([b * (gauss(POINTS)[1] @ lagrange(t, b * t)) for b in t])
-    y, dy, b, E, G = (np.array(rows) for rows in zip(*_points(slabs, np.pi * t, np.pi * w)))
+    y, dy, b, E, G = (np.array(rows) for rows in zip(*_points(layers, np.pi * t, np.pi * w)))
     EA = np.sum(dy * b * E)
     first = E * b * (y - np.sum(dy * b * E * y) / EA)
     S = np.cumsum(np.append(0.0, np.sum(dy * first, axis=1)))[:-1, None] + (
@@ -46,13 +46,13 @@ def shear_factor(slabs: Sequence[Slab], order: int) -> float:
     return float(r @ np.linalg.solve(A, r) / np.sum(dy * b * tau**2 / G))
 
 
-def _points(slabs, t, w):
+def _points(layers, t, w):
     """Points of each piece with their weights, widths and moduli."""
-    for slab in slabs:
-        law, m = slab.material, slab.measure
+    for layer in layers:
+        law, m = layer.material, layer.measure
         for low, high, width in m.pieces:
             half = 0.5 * (high - low)
             eta, one = 0.5 * (low + high) - half * np.cos(t), np.ones(len(t))
-            width = (width(eta) if callable(width) else width) * slab.width / m.mean
+            width = (width(eta) if callable(width) else width) * layer.width / m.mean
             yield (eta, half * np.sin(t) * w, width * one,
                    law.axial_modulus * one, law.G * one)

@@ -568,7 +568,7 @@ def _follower(tangent, Ks, k):
 
 def _require_no_flutter(system, tangent, Ks, factor):
     """Raise InputError if oscillations grow below a load factor, as far as linear theory says."""
-    if any(slab.density is None for beam in system.beams for slab in beam.across.slabs):
+    if any(layer.density is None for beam in system.beams for layer in beam.across.layers):
         return
     M, S = _free_mass(system, tangent), tangent.S
     k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE

@@ -318,17 +318,17 @@ def _default(E, mesh):
 def _stiffest(across, elements):
     """The largest modulus and the largest density of the layers, in the middles of elements."""
     E, density = [], []
-    for slab in across.slabs:
-        X = np.array([[0.5], slab.measure.gauss(1)[0]])
-        E.append(np.max(slab.material.E * across.grade(slab, X, elements)))
-        density.append(0.0 if slab.density is None else np.max(across.density(slab, X, elements)))
+    for layer in across.layers:
+        X = np.array([[0.5], layer.measure.gauss(1)[0]])
+        E.append(np.max(layer.material.E * across.grade(layer, X, elements)))
+        density.append(0.0 if layer.density is None else np.max(across.density(layer, X, elements)))
     return float(max(E)), float(max(density))
 
 
 def _face(across, side, X, elements):
     """The width of bottom or top; of a section without any, as a circle, the largest."""
-    slab = across.slabs[-side]
-    if slab.face is not None and slab.face[side] == 0.0:
+    layer = across.layers[-side]
+    if layer.face is not None and layer.face[side] == 0.0:
         return across.outline(X, elements)
     return across.face(side, X, elements)
 

@@ -468,7 +468,7 @@ class CableKernel(Chain):
         mesh, element = across.mesh, across.element
         super().__init__(mesh, element)
         self.constant = across.stabilisation(formulation)
-        n = formulation.points_along(element, across.slabs[0].material)
+        n = formulation.points_along(element, across.layers[0].material)
         if n == 2:
             alpha, length = getattr(formulation, "alpha", 1.0), float(mesh.chain_lengths.min())
             self.rule = softened(alpha * MIDDLE * _square(across) / length**2)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ...elements.base import ElementBeam
     from ...formulations.base import Formulation, Term
     from ...mesh.mesh_beam import MeshBeam
-    from ...sections import Across, Slab
+    from ...sections import Across, Layer
 
 
 class SectionPack(NamedTuple):
@@ -460,8 +460,8 @@ class TermTables:
 
     Parameters
     ----------
-    across, slab, term
-        The section on its mesh, one of its slabs, and a term of it.
+    across, layer, term
+        The section on its mesh, one of its layers, and a term of it.
     constant
         Stabilisation of each element, shape (0, 1 or elements, 2 nb, 2 nb).
     owner
@@ -481,26 +481,26 @@ class TermTables:
     points: Array
     w: Array
 
-    def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
+    def __init__(self, across: "Across", layer: "Layer", term: "Term", constant: Array,
                  owner: Any, rows: dict[Any, Any] | None = None,
                  asked: "list[tuple[Array, ...]] | None" = None) -> None:
-        self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
+        self.law, self.term, self.layer, mesh = term.law, term, layer, across.mesh
         self.shared = across.uniform
         tind = np.array([0]) if self.shared else None
         self.section_points = len(term.section[0])
         whole = self.section_points == 1
         self.points, W = term.quadrature
         rows = {} if rows is None else rows
-        at = id(slab), Content(self.points, W)
+        at = id(layer), Content(self.points, W)
         if at not in rows:
-            rows[at] = across.volume(slab, self.points, W, tind, whole)
+            rows[at] = across.volume(layer, self.points, W, tind, whole)
         self.w = rows[at]
         if term._places not in rows:
             rows[term._places] = _rows(mesh, across.element, term._places, tind,
                                       [] if asked is None else asked)
         G, frame, self._samples, scaled = rows[term._places]
-        weights = self.w if slab.grade is None else across.volume(
-            slab, *term.quadrature, tind, whole, "grade")
+        weights = self.w if layer.grade is None else across.volume(
+            layer, *term.quadrature, tind, whole, "grade")
         law = law_tables(self.law, owner)
         sums = _sums_of(self._samples, law, _interpolation(term), weights.shape[1])
         self.pack: SectionPack = section_pack(
@@ -846,14 +846,14 @@ class Kernel(Chain):
         rows: dict[Any, Any] = {}
         asked: list[tuple[Array, ...]] = []
         self._across = across
-        for slab, terms in across.terms(formulation):
+        for layer, terms in across.terms(formulation):
             for term in terms:
                 constant = constants.pop() if constants else none
-                self.tables.append(TermTables(across, slab, term, constant, self, rows, asked))
+                self.tables.append(TermTables(across, layer, term, constant, self, rows, asked))
         self.packs = [t.pack for t in self.tables]
-        slabs = [id(t.slab) for t in self.tables]
-        #: The tables of the first term of each slab.
-        self.firsts = [t for k, t in enumerate(self.tables) if id(t.slab) not in slabs[:k]]
+        layers = [id(t.layer) for t in self.tables]
+        #: The tables of the first term of each layer.
+        self.firsts = [t for k, t in enumerate(self.tables) if id(t.layer) not in layers[:k]]
 
     @property
     def linear(self) -> bool:
@@ -882,7 +882,7 @@ class Kernel(Chain):
     @property
     def scale(self) -> float:
         """Modulus times volume."""
-        return sum([float(t.pack.weights.sum()) * t.slab.material.E * (
+        return sum([float(t.pack.weights.sum()) * t.layer.material.E * (
             self.t.shape[1] if t.shared else 1) for t in self.firsts])
 
     def inverted(self, u: Array) -> bool:
@@ -916,7 +916,7 @@ class Kernel(Chain):
         """The packs of a linear law with ``time`` times the moduli at no strain."""
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         return [_viscous(t.pack, time, none) if t.pack.law.kind == LINEAR else TermTables(
-            self._across, t.slab, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))),
+            self._across, t.layer, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))),
             none, self).pack for t in self.tables]
 
     def small_packs(self) -> list[SectionPack]:
