@@ -359,7 +359,7 @@ def check(scene, state, tol=1e-5):
     free = system.constraints.free
     rho = np.sqrt(np.sum((R**2 * scale)[free]))
     size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
-    if rho > tol * size + 100.0 * system.work_noise * system.noise:
+    if rho > tol * size + 100.0 * system.scales.force_noise:
         raise Wrong(f"the residual is {rho / size:.3g} of the forces")
     gap = np.max(np.abs(system.constraints.constraint(u, state.load)), initial=0.0)
     if gap > 1e-9 * system.size:

@@ -25,6 +25,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.core.progress import progress_bar
 from skfem_ancf.core.quadrature import gauss
+from skfem_ancf.equations.momentum import angular_momentum, momentum
 
 NU, WIDTH, G = 0.3, 0.01, 9.81
 
@@ -441,9 +442,9 @@ def spin(quick, out):
         system = history.system
         energy = np.array([system.strain_energy(a) + 0.5 * b @ system.mass.multiply(b)
                            for a, b in zip(u, v)])
-        H = np.array([system.angular_momentum(a, b) for a, b in zip(u, v)])
-        P = np.array([system.momentum(b) for b in v])
-        centre = np.array([system.momentum(a) for a in u])  # mass times the centre's displacement
+        H = np.array([angular_momentum(system, a, b) for a, b in zip(u, v)])
+        P = np.array([momentum(system, b) for b in v])
+        centre = np.array([momentum(system, a) for a in u])  # mass times the centre's displacement
         straight = centre[0] + np.outer(history.t[::every], P[0])
         case = f"{turns} turns of {per_turn} steps, {name}"
         yield Row("spin", case, "relative change of energy", np.ptp(energy) / energy[0], 1e-9)

@@ -236,7 +236,7 @@ def test_round_off_has_units():
         beam = Beam(line(4, 0.1 * unit, L=unit), ElementBeamANCF(2),
                     StVenantKirchhoff(1e6 / unit**2, 0.3), 0.1 * unit)
         s = Scene(beam).clamp("left").system
-        return np.array([s.work_noise, s.stiffness_scale])
+        return np.array([s.scales.work_noise, s.scales.strain_noise])
 
     assert_allclose(noise(1e3)**2, 1e3 * noise(1.0)**2, rtol=1e-12)
 
@@ -629,7 +629,7 @@ def test_energy_of_bodies_on_springs():
         body = RigidBody(1.0, 0.5, position=(0.0, -2.0))
         scene = Scene(body).gravity((0.0, -weight))
         system = (scene.spring(k, [(0.0, 0.0), (body, (0.0, -2.0))]) if k else scene).system
-        return system.energy_of_bodies, system.size
+        return system.scales.energy_of_bodies, system.size
 
     for k, weight in ((7.0, 3.0), (7.0, 0.0), (0.0, 3.0)):
         energy, size = asked(k, weight)

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, NeoHookean, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.equations import system
+from skfem_ancf.equations import mass_solver
 from skfem_ancf.core.band import Band
 from skfem_ancf.beam.strain_energy import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
@@ -502,16 +502,16 @@ def test_other_schemes_do_not_conserve():
 
 def test_mass_is_assembled_and_factorised_once(monkeypatch):
     assembled, factorised = [], []
-    assemble, factorize = Beam.mass_elements, system.factorize
+    assemble, factorize = Beam.mass_elements, mass_solver.factorize
     monkeypatch.setattr(Beam, "mass_elements",
                         lambda b, *part: assembled.append(b) or assemble(b, *part))
-    monkeypatch.setattr(system, "factorize", lambda A: factorised.append(A) or factorize(A))
+    monkeypatch.setattr(mass_solver, "factorize", lambda A: factorised.append(A) or factorize(A))
     monkeypatch.setattr(BandMatrix, "factorize", lambda A: pytest.fail("factors made anew"))
     scene = Scene(soft(2, 2)).pin("left").gravity(GRAVITY)
     for scheme in SCHEMES:
         scene.integrate(0.05, 0.01, scheme=scheme)
     assert len(assembled) == 1
-    assert [A.flat is scene.system.mass_factors.band.flat for A in factorised] == [True]
+    assert [A.flat is scene.system.mass_solver.factors.band.flat for A in factorised] == [True]
 
 
 def test_the_start_from_a_place_is_kept(monkeypatch):

@@ -19,7 +19,7 @@ from skfem_ancf.dynamics import integrate
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
                                     SupportError)
-from skfem_ancf.equations.system import System
+from skfem_ancf.equations.linear_solver import LinearSolver
 
 E, H = 2e11, 0.02
 STEEL = StVenantKirchhoff(E, 0.3, density=7800.0)
@@ -153,22 +153,23 @@ def test_the_condensed_solution_solves_the_equations_with_multipliers():
                              hinges=[(3, 2), (4, 0)], material=STEEL, height=H, width=H)
     frame.clamp([0, 3]).pin(4).point_force((400.0, -300.0), at=1)
     state, equations = frame.solve_static(tol=1e-12), frame.system
-    assert isinstance(equations.condensed, Condensed)
+    solver, joints = equations.solver, equations.constraints
+    assert isinstance(solver.condensed, Condensed)
     rng = np.random.default_rng(0)
-    b, c = rng.standard_normal(equations.N), 1e-4 * rng.standard_normal(equations.m)
+    b, c = rng.standard_normal(equations.N), 1e-4 * rng.standard_normal(joints.m)
     equations.assemble(state.u)
     K = equations.K.tocsc().toarray()
-    K += equations.curvature(state.u, 1.0, state.multipliers).toarray()
-    J = equations.jacobian(state.u, 1.0).toarray()
-    d = np.append(1 / np.sqrt(np.abs(K.diagonal())), np.full(equations.m, 1.0))
-    whole = np.block([[K, J.T], [J, np.zeros((equations.m, equations.m))]]) * d * d[:, None]
+    K += joints.curvature(state.u, 1.0, state.multipliers).toarray()
+    J = joints.jacobian(state.u, 1.0).toarray()
+    d = np.append(1 / np.sqrt(np.abs(K.diagonal())), np.full(joints.m, 1.0))
+    whole = np.block([[K, J.T], [J, np.zeros((joints.m, joints.m))]]) * d * d[:, None]
     exact = d * np.linalg.solve(whole, d * np.append(b, c))
-    equations.factorize(state.u, 1.0, state.multipliers)
-    x, multipliers = equations.solve(b, c)
+    solver.factorize(state.u, 1.0, state.multipliers)
+    x, multipliers = solver.solve(b, c)
     error = (np.append(x, multipliers) - exact) / d
     assert np.abs(error).max() < 1e-8 * np.abs(exact / d).max()
-    columns = equations.condensed.solve(np.outer(b, [2.0, -1.0, 0.0]), np.outer(c, [2.0, 3.0, 1.0]))
-    both, alone = equations.condensed.solve(b, 0.0 * c), equations.condensed.solve(0.0 * b, c)
+    columns = solver.condensed.solve(np.outer(b, [2.0, -1.0, 0.0]), np.outer(c, [2.0, 3.0, 1.0]))
+    both, alone = solver.condensed.solve(b, 0.0 * c), solver.condensed.solve(0.0 * b, c)
     for found, of_b, of_c in zip(columns, both, alone):
         for column, factors in zip(found.T, ((2.0, 2.0), (-1.0, 3.0), (0.0, 1.0))):
             wanted = factors[0] * of_b + factors[1] * of_c
@@ -205,8 +206,8 @@ def test_any_frame_is_that_with_multipliers_as_unknowns(seed, monkeypatch):
         "height": 0.03, "element": [ElementBeamCable(3), ElementBeamANCF(2)][seed % 2]}},
         "elements": rng.integers(1, 4, n), "hinges": hinges}
     found = []
-    for condensed in (System.condensed, None):
-        monkeypatch.setattr(System, "condensed", condensed)
+    for condensed in (LinearSolver.condensed, None):
+        monkeypatch.setattr(LinearSolver, "condensed", condensed)
         frame = Frame.from_lines(points.T, lines, height=H, width=H, material=STEEL, **options)
         frame.clamp([0, 1]).pin(2).point_force((300.0, -500.0), at=[6, 8]).moment(7, 40.0)
         state = frame.line_load((0, -200.0), beam="a").solve_static(tol=1e-11)
@@ -426,7 +427,7 @@ def swinging(eliminated, monkeypatch, scheme, n=60, dt=1e-3, **options):
     """A frame of two times two cells, two hinged ends in it, after a step load."""
     monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
     frame = square(2, hinges=[(0, 3), (7, 4)]).point_force((3000.0, 0), at="side")
-    assert frame.system.by_nodes == eliminated
+    assert frame.system.mass_solver.by_nodes == eliminated
     return frame.integrate(n * dt, dt, scheme=scheme, **options)
 
 
@@ -752,7 +753,8 @@ def test_a_tapered_frame_of_any_section_is_that_of_welded_beams(element):
     scene.point_force((1500.0, -300.0), at=(0.0, 1.0), beam=0)
     scene.point_force((0, -5), at=(0.5, 0.6), beam=3)
     state, other = (s.solve_static(tol=1e-10) for s in (frame, scene))
-    assert isinstance(frame.system.condensed, Condensed) and state.recovered == dict.fromkeys(
+    assert isinstance(frame.system.solver.condensed, Condensed)
+    assert state.recovered == dict.fromkeys(
         ("columns", "girder", "brace"), "")
     assert np.abs(state.displacement((0, 1))).max() > 0.02
     for x, beam, k in (((0, 1), "columns", 0), ((1, 1), "columns", 2), ((0.4, 1), "girder", 1)):
@@ -866,14 +868,14 @@ def test_springs_and_other_joints_belong_to_it_too():
     k = 5.0
     frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=STEEL, height=H, width=H)
     frame.clamp(0).spring(k, between=((1, 0), ("ground", (1, -1)))).point_force((0, -1.0), at=1)
-    assert frame.system.condensed is not None
+    assert frame.system.solver.condensed is not None
     tip = frame.solve_linear().displacement((1, 0))[1]
     assert tip == pytest.approx(-1 / (3 * EI + k), rel=1e-9)
     held = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=STEEL, height=H, width=H)
     held.clamp(0)
     held.joint("line", at=(1, 0), direction=(1, 0))
     state = held.moment(1, 1.0).solve_linear()
-    assert held.system.condensed is None
+    assert held.system.solver.condensed is None
     assert held.rotations(state)[1] == pytest.approx(1 / (4 * EI), rel=1e-9)
 
 

@@ -12,7 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.core.errors import InputError, ModelWarning, NameUnknown, SupportError
 from skfem_ancf.actions.joints import JOINTS, get_joint
 from skfem_ancf.core.linalg import dense
-from skfem_ancf.equations.system import System
+from skfem_ancf.equations.linear_solver import SaddlePoint
 
 E, NU, RHO = 1e6, 0.3, 1000.0
 GRAVITY = (0.0, -9.81)
@@ -142,11 +142,11 @@ def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeyp
     b, c = rng.standard_normal(s.N) * s.constraints.free, rng.standard_normal(s.constraints.m)
     expected = np.linalg.solve(np.block([[K, J.T], [J, np.zeros((len(c), len(c)))]]),
                                np.append(b, c))
-    s.factorize(u, t, m)
+    s.solver.factorize(u, t, m)
     assert s.constraints.bordered == border
     assert s.symmetric == (not pressure)
     assert len(s.constraints.stiff[1]) == 4  # nothing but joints holds the forearm
-    x, l = s.solve(b, c)
+    x, l = s.solver.solve(b, c)
     assert np.allclose(x, expected[:s.N], rtol=0, atol=1e-9 * np.abs(expected[:s.N]).max())
     assert np.allclose(l, expected[s.N:], rtol=0, atol=1e-9 * np.abs(expected[s.N:]).max())
 
@@ -154,12 +154,11 @@ def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeyp
 @pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # an elbow of few elements
 def test_a_border_that_is_not_accurate_gives_way_to_sparse_lu(monkeypatch):
     expected = held("weld").solve_static().u
-    monkeypatch.setattr("skfem_ancf.solvers.newton.INACCURATE", 0.0)  # in the iteration
-    monkeypatch.setattr("skfem_ancf.equations.system.INACCURATE", 0.0)
+    monkeypatch.setattr("skfem_ancf.solvers.increment.INACCURATE", 0.0)  # in the iteration
+    monkeypatch.setattr("skfem_ancf.equations.linear_solver.INACCURATE", 0.0)
     calls = []
-    sparse = System._sparse_factors
-    monkeypatch.setattr(System, "_sparse_factors",
-                        lambda self, K: calls.append(1) or sparse(self, K))
+    monkeypatch.setattr("skfem_ancf.equations.linear_solver.SaddlePoint",
+                        lambda *args: calls.append(1) or SaddlePoint(*args))
     state = held("weld").solve_static()
     assert len(calls) >= state.iterations  # also in load steps that were cut
     assert np.allclose(state.u, expected, rtol=0, atol=1e-12)
@@ -178,7 +177,7 @@ def test_sparse_factors_know_no_unit(monkeypatch):
         return scene.pressure("top", 1e5 / unit, b).solve_static()
 
     expected = tee(1.0)
-    for module in ("equations.system", "solvers.newton"):
+    for module in ("equations.linear_solver", "solvers.increment"):
         monkeypatch.setattr(f"skfem_ancf.{module}.INACCURATE", 0.0)
     for unit in (1.0, 1e-4, 1e-7):
         state = tee(unit)

@@ -79,10 +79,10 @@ def iteration(about, watch):
         points = np.shape(s.beams[0].kernel.tables[0].points)[1]
 
         def step(u=u, system=system, residual=residual):
-            _, evaluations = system.assemble(u)
-            system.factorize(u)
-            du, _ = system.solve(residual, np.zeros(0))
-            system.stress_step(evaluations, du)
+            _, stresses = system.assemble(u)
+            system.solver.factorize(u)
+            du, _ = system.solver.solve(residual, np.zeros(0))
+            system.carried_stress(u, stresses, du)
 
         state = s.solve_static()
         solve = seconds(s.solve_static)

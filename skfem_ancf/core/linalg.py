@@ -145,7 +145,8 @@ class BandMatrix:
             view[left[0::2]] += K[0::2]
             view[left[1::2]] += K[1::2]
 
-    def _position(self, i, j):
+    def position(self, i: ArrayLike, j: ArrayLike) -> Array:
+        """Where entries lie among the numbers of the band, rows and columns of shape (k,)."""
         return np.asarray(j) * self._ld + self._diagonal + np.asarray(i) - np.asarray(j)
 
     def add(self, i: ArrayLike, j: ArrayLike, values: ArrayLike) -> None:
@@ -162,7 +163,7 @@ class BandMatrix:
         if self.symmetric:
             keep = i >= j
             i, j, values = i[keep], j[keep], values[keep]
-        np.add.at(self._flat, self._position(i, j), values)
+        np.add.at(self._flat, self.position(i, j), values)
 
     def diagonal(self) -> Array:
         """A copy of the diagonal."""
@@ -341,7 +342,7 @@ class BandMatrix:
         inside = np.abs(row - column) <= self.bandwidth
         if self.symmetric:
             row, column = np.maximum(row, column), np.minimum(row, column)
-        out = np.where(inside, self._flat[np.where(inside, self._position(row, column), 0)], 0.0)
+        out = np.where(inside, self._flat[np.where(inside, self.position(row, column), 0)], 0.0)
         return scale[i0:i1, None] * out * scale[j0:j1]
 
     def determinant_sign(self) -> int:

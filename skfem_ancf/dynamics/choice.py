@@ -58,7 +58,7 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     asked = f"rtol = {rtol:g}"
     if system.forces.contacts.obstacles:
         return Choice(EnergyMomentum(), "obstacles: touching is a kink, and energy is kept")
-    if system.by_nodes:
+    if system.mass_solver.by_nodes:
         return Choice(EnergyMomentum(), "a frame: its nodes are eliminated")
     if rtol > FINE:
         if system.damped:

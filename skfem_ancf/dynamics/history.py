@@ -12,6 +12,7 @@ from ..core.errors import InputError, require_finite, require_index, require_pat
 from ..actions.forces.turns import Turns
 from ..core.kept import cached_property
 from ..beam.points import require_body
+from ..equations.momentum import angular_momentum, momentum
 from ..recovery.resultants import over_time
 from ..results.points import MaterialPoints
 from ..results.state import Reaction, State
@@ -412,12 +413,12 @@ class History(MaterialPoints):
     @cached_property
     def momentum(self) -> Array:
         """Linear momentum, shape (nt, 2)."""
-        return np.array([self.system.momentum(v) for v in self.v])
+        return np.array([momentum(self.system, v) for v in self.v])
 
     @cached_property
     def angular_momentum(self) -> Array:
         """Angular momentum about the origin of the coordinates, shape (nt,)."""
-        return np.array([self.system.angular_momentum(u, v) for u, v in zip(self.u, self.v)])
+        return np.array([angular_momentum(self.system, u, v) for u, v in zip(self.u, self.v)])
 
     # files and pictures
 

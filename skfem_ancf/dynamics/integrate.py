@@ -125,7 +125,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         breakpoints = np.atleast_1d(breakpoints)
     task = task_of(t_start, t_end, dt, t_eval, tol, rtol, [
         *breakpoints, *_samples(system, t_start, t_end)])
-    if not (in_steps(scheme) and system.by_nodes):
+    if not (in_steps(scheme) and system.mass_solver.by_nodes):
         _require_room(system)
     if not system.constraints.passing:
         system.constraints.require_independent_joints()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..equations.step_condensation import Eliminated, EliminatedMass
+from ..equations.condensation import Condensed, CondensedMass
 from ..core.errors import (AncfError, CheckpointError, InputError, SupportError, require_positive,
                            shown)
 from ..core.kept import cached_property, twin_of
@@ -88,12 +88,12 @@ class Integrator:
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
             system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
         M, A = system.mass.band, system.new_band()
-        self._nodes: tuple[Eliminated, EliminatedMass] | None = None
-        if in_steps(scheme) and system.by_nodes:
-            self._nodes = Eliminated(system, A), EliminatedMass(system)
+        self._nodes: tuple[Condensed, CondensedMass] | None = None
+        if in_steps(scheme) and system.mass_solver.by_nodes:
+            self._nodes = Condensed(system, A), CondensedMass(system)
         turned = scheme.conserving and self._nodes is None
         U = halves(system.N if turned else 0, system.bandwidth)
-        self.matrices = Matrices(M, system.mass_factors.band, A.band, U, *_damping(system))
+        self.matrices = Matrices(M, system.mass_solver.factors.band, A.band, U, *_damping(system))
         self._state = np.zeros(STATE)
         self.room: Any = None
         self.asked: Any = None
@@ -122,11 +122,12 @@ class Integrator:
             handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
             self._ruled, self.rule = ruled, Rule(
                 int(scheme.conserving), *map(float, scheme.parameters), self.tol,
-                8.0 * system.stiffness_scale, system.inertia_of_places, *handles)
+                8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles)
         self._state.fill(0.0)
         self._dt, self.substeps, self._lost = np.nan, 0, ""
         self.kept: dict[str, Array] = {}
-        if system.depends_on_time or self.asked is None:
+        motion_varies = system.machine.tables.motion_varies
+        if system.varies or motion_varies or self.asked is None:
             self._courses, self.asked = Courses(scheme.conserving), (None,)
         self._courses.system = system
 
@@ -498,7 +499,7 @@ class Integrator:
     def solve(self, b: Array) -> Array:
         """The inverse of the last iteration matrix times b (N,)."""
         if self._nodes:
-            return self._nodes[0].solve(b)
+            return self._nodes[0].solve(b, np.zeros(self.system.constraints.m))[0]
         x = b.copy()
         solve_rows(factors(self.matrices, self._state), self.matrices.rows, x)
         return x
@@ -564,7 +565,7 @@ class Integrator:
 
 def _damping(system):
     """Rows beside the band, and the Dampers of a system."""
-    modes, M = system.damped_modes, system.mass.band
+    modes, M = system.modal_damping.rows, system.mass.band
     rows = np.concatenate([modes, system.forces.far_rows()])
     k = len(rows)
     D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))

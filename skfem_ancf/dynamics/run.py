@@ -185,6 +185,12 @@ class Run:
 
     # the start
 
+    def _sample(self, u, v, t, first):
+        """Ask controls whose law is asked now and then, if it is their time."""
+        s = self.system
+        if s.forces.sampled:
+            s.forces.sample(s.machine.tables.plain.forces, u, v, t, first)
+
     def begin(self, u: Array, v: Array, memory: Array | None = None,
               turns: Array | None = None) -> None:
         """Begin with a displacement and a velocity.
@@ -198,7 +204,7 @@ class Run:
         turns
             Angles there, those of another motion of this scene, shape (k,), or None.
         """
-        self.system.sample(u, v, self.task.t_start, True)
+        self._sample(u, v, self.task.t_start, True)
         self.y = self._start(u, v, memory)
         known = self._turns
         if turns is None or len(turns) != known.number:
@@ -296,7 +302,7 @@ class Run:
         if self.sizes is not None:
             self.size = 1e-4 * self.task.span
             self.sizes.begin()
-        self.system.sample(y.u, y.v, self._begun, False)
+        self._sample(y.u, y.v, self._begun, False)
         turned = self._start(y.u, y.v, contacts_of(y))
         turned.dissipated = y.dissipated
         return self._follow(y.turns, turned)

@@ -96,7 +96,7 @@ class Rule(NamedTuple):
         Round-off of the strains in that norm, and what the square of that of places is a factor of.
     solver, mass_solver
         Handles of what solves with the iteration matrix and with the mass where joints are
-        eliminated, see :mod:`skfem_ancf.equations.step_condensation`; 0 where they are a border.
+        eliminated, see :mod:`skfem_ancf.equations.condensation`; 0 where they are a border.
     """
 
     conserving: int

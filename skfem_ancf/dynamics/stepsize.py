@@ -159,7 +159,7 @@ class StepSize:
     def _free(self, y, de):
         """What of a change of the displacement joints do not undo."""
         s = self.system
-        if not s.constraints.m or s.by_nodes:
+        if not s.constraints.m or s.mass_solver.by_nodes:
             return de
         J = s.constraints.full_jacobian(y.u, y.t)
         return de + s.mass_solver(y.u, y.t, J)(np.zeros(s.N), -(J @ de))[0]

@@ -1,9 +1,12 @@
-"""The linear systems of a frame: members are condensed to their ends, those to the nodes.
+"""Static condensation: members of a frame are condensed to their ends, those to the nodes.
 
-An end has the coordinates of its node, x, y and the rotation of the section, and private ones: the
-stretch of the section's direction, and what an element has besides. In the frame of its direction
-the first three are those of the node, up to what the equations of the node are open by. So no
-multiplier is unknown: they are the forces left at the ends.
+An end has the unknowns of its node, x, y and the rotation of the section, and unknowns of its own:
+the stretch of the section's direction, and what an element has besides. In the frame of its
+direction the first three are those of the node, up to what the equations of the node are open by.
+So no multiplier is unknown: they are the forces left at the ends.
+
+Statics, modes and motions use the same factors. In a motion kernels ask for them by a handle, see
+:mod:`skfem_ancf.core.callbacks`.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..actions.joints.nodes import chain_ends
-from ..core.linalg import SMALL, Inertia
+from ..core.linalg import NO_FACTORS, SMALL, Inertia
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +37,13 @@ LOST = 1e-13
 SHARED = 3
 #: Members whose matrices are made at once, so that what they are made of takes little memory.
 CHUNK = 1024
+#: Contraction of a refinement and what round-off may leave, up to which factors are kept; the same
+#: of new ones.
+KEPT, NEW = (0.05, 1e-12), (0.5, 1e-6)
+#: Length of a refinement at most, and its accuracy.
+REFINEMENTS, EXACT = 50, 1e-14
+#: Corrections where more iterations follow.
+ROUGHLY = 2
 
 
 class Group(NamedTuple):
@@ -95,14 +105,23 @@ class Condensed:
 
     Parameters
     ----------
-    beams, slices
-        The beams, and the coordinates of each.
-    nodes
-        What joins them, a :class:`~skfem_ancf.actions.joints.nodes.Nodes`, bound.
+    system
+        A :class:`~skfem_ancf.equations.system.System` of a frame that can be condensed.
+    K
+        The matrix of the beams, which is filled before :meth:`factorize`.
+
+    Attributes
+    ----------
+    size : int
+        Unknowns of the nodes.
+    at : tuple of ndarray
+        Displacement (N,) and multipliers (m,) at which it was factorised.
     """
 
-    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice], nodes: Nodes) -> None:
-        self.nodes, self.groups = nodes, groups_of(beams, slices)
+    def __init__(self, system: Any, K: BandMatrix) -> None:
+        nodes: Nodes = system.constraints.frame
+        self._K, self.at = K, (np.zeros(system.N), np.zeros(system.constraints.m))
+        self.nodes, self.groups = nodes, groups_of(system.beams, system.slices)
         self._bases = [[_Basis(nodes, group, ends) for ends in group.ends] for group in self.groups]
         unknown = self._unknown()
         order = _order(nodes)
@@ -142,13 +161,11 @@ class Condensed:
 
     # factors
 
-    def factorize(self, K: BandMatrix, u: Array, multipliers: Array) -> None:
-        """Factorise a tangent.
+    def factorize(self, u: Array, multipliers: Array) -> None:
+        """Factorise what the matrix holds; of one that is not symmetric its symmetric part.
 
         Parameters
         ----------
-        K
-            That of the beams, symmetric and not yet factorised.
         u, multipliers
             Where the joints are linearised, shapes (N,) and (m,).
 
@@ -157,6 +174,8 @@ class Condensed:
         numpy.linalg.LinAlgError, RuntimeError
             If the matrix is singular.
         """
+        self.at = u.copy(), multipliers.copy()
+        K = self._K if self._K.symmetric else self._K.symmetric_part()
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
         scales = self._moves.scales(turns)
         moments = self._moments(multipliers, scales)
@@ -227,6 +246,158 @@ class Condensed:
             part.expand(v[part.group.members], x)
         multipliers = self._pushed @ (f - self._ends @ v).reshape(-1, k)
         return x.reshape(b.shape), multipliers.reshape(phi.shape)
+
+    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                  dm: Array) -> bool:
+        """Solve; without right-hand sides factorise. False if that fails.
+
+        Parameters
+        ----------
+        t, u, multipliers
+            Time, and where the joints are linearised, shapes (N,) and (m,).
+        R, phi
+            Right-hand sides, shapes (N,) and (m,), or empty.
+        du, dm
+            The solution, shapes (N,) and (m,).
+        """
+        try:
+            if len(R):
+                du[:], dm[:] = self.solve(R, phi)
+            else:
+                self.factorize(u, multipliers)
+        except NO_FACTORS as error:
+            logger.debug("no factors: %s", error)
+            return False
+        return True
+
+
+class CondensedMass:
+    """Solves with the mass matrix of a frame and the joints as they are at a displacement.
+
+    The factors are those of an earlier displacement, refined, and made anew where that takes long.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System` of a frame that can be condensed.
+
+    Attributes
+    ----------
+    at : ndarray or None
+        Displacement at which it was factorised, shape (N,).
+    lag : float
+        By how much the joints' forces act before the end of a step.
+    """
+
+    def __init__(self, system: Any) -> None:
+        self._M = system.mass if system.mass.symmetric else system.mass.symmetric_part()
+        self._condensed = Condensed(system, self._M)
+        self.at: Array | None = None
+        self.lag = 0.0
+        self._last: tuple[float, Array, Array] | None = None
+
+    def factorize(self, u: Array) -> None:
+        """Make factors at a displacement (N,)."""
+        self.at = u.copy()
+        self._condensed.factorize(self.at, 0.0 * self._condensed.at[1])
+
+    def forget(self, factors: bool = True) -> None:
+        """Begin anew: what is solved next does not depend on what was solved before.
+
+        Parameters
+        ----------
+        factors
+            On the factors neither: False, if they are those of the same displacement.
+        """
+        self._last = None
+        if factors:
+            self.at = None
+
+    def solve(self, u: Array, t: float, b: Array, rate: Array, forces: Any = None,
+              scale: float = 0.0, most: int = REFINEMENTS) -> tuple[Array, Array]:
+        """x and l with ``M x + J^T l = b`` and ``J1 x = rate``.
+
+        Parameters
+        ----------
+        u, t
+            Where J1 is taken, shape (N,), and when.
+        b, rate
+            Shapes (N,) and (m,).
+        forces
+            J, sparse, shape (m, N); J1 by default.
+        scale
+            A norm of x below which it need not be exact.
+        most
+            Corrections after which it is exact enough.
+
+        Returns
+        -------
+        x, l
+            Shapes (N,) and (m,).
+        """
+        J1 = self._condensed.nodes.derivative(u, t)
+        J = (J1 if forces is None else forces).T
+        # another iterate of this instant begins with what the last one has found
+        start = self._last[1:] if self._last is not None and self._last[0] == t else None
+        rules, found = (scale, most), None
+        if self.at is not None:
+            found = self._refined(J, J1, start, b, rate, rules, *KEPT)
+        if found is None:
+            self.factorize(u)
+            found = self._refined(J, J1, start, b, rate, rules, *NEW)
+        if found is None:
+            raise np.linalg.LinAlgError("the joints are not independent")
+        self._last = (t, *found) if np.all(np.isfinite(found[0])) else None
+        return found
+
+    def _refined(self, J, J1, start, b, rate, rules, contraction, rough):
+        """The solution by the factors that there are; None where it does not contract so fast.
+
+        J is the transpose of what it is elsewhere.
+        """
+        (x, l), before, (scale, most) = start or (0.0, 0.0), np.inf, rules
+        for k in range(most):
+            missing = b, rate
+            if k or start:
+                missing = b - self._M.multiply(x) - J @ l, rate - J1 @ x
+            dx, dl = self._condensed.solve(*missing)
+            x, l = x + dx, l + dl
+            step, size = np.linalg.norm(dx), max(scale, np.linalg.norm(x))
+            left = step * min(1.0, step / before) if before < np.inf else step
+            if left <= EXACT * size or not step < np.inf:
+                return x, l
+            if step > contraction * before:
+                return (x, l) if step <= rough * size else None
+            before = step
+        return (x, l) if most < REFINEMENTS else None
+
+    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                  dm: Array) -> bool:
+        """By how much R, velocities or accelerations, has to change so that joints stay closed.
+
+        Parameters
+        ----------
+        t, u
+            Time and displacement, shape (N,), at which they are closed.
+        multipliers
+            Shape (m,); (0,) where a few corrections will do, as more iterations follow.
+        R, phi
+            What is changed, and by what its product with the joints' derivatives should change,
+            shapes (N,) and (m,).
+        du, dm
+            The change and its multipliers, shapes (N,) and (m,). Before, du is the displacement at
+            which the joints' forces act, at a time :attr:`lag` before t.
+        """
+        try:
+            J = None
+            if self.lag or not np.array_equal(du, u):
+                J = self._condensed.nodes.derivative(du, t - self.lag)
+            du[:], dm[:] = self.solve(u, t, 0.0 * R, phi, J, float(np.linalg.norm(R)),
+                                      REFINEMENTS if len(multipliers) else ROUGHLY)
+        except NO_FACTORS as error:
+            logger.debug("no factors: %s", error)
+            return False
+        return True
 
 
 def _order(nodes):

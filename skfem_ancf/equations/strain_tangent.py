@@ -345,7 +345,7 @@ class Inverse:
         self._by_strains, self._nodes = False, None
         #: relative error of the factors alone, of the last solution
         self.left = np.inf
-        condensed = tangent.system.condensed
+        condensed = tangent.system.solver.condensed
         if condensed is not None and self._n > FEW:
             self._nodes = tangent.condense(condensed, shift)
         else:

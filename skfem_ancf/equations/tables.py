@@ -2,7 +2,7 @@
 
 from functools import cache
 from operator import is_
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from weakref import ref
 
 import numpy as np
@@ -26,10 +26,8 @@ from ..core.callbacks import handle_of
 from ..core.sampling import Sampled
 from ..core.source import F1, I1, by_place
 from ..actions.tables import JointTables, LoadTables
+from .user_defined import UserDefined
 from ..core.types import Array
-
-if TYPE_CHECKING:
-    from ..actions.loads import Load
 
 #: Of a scene without them.
 _NO_INTS = np.zeros(0, np.int64)
@@ -107,7 +105,7 @@ class Tables:
     def __init__(self, system: Any) -> None:
         # the system has the tables: without a circle both go when nobody asks for them any more
         self._system = ref(system)
-        self._own_handle: int | None = None
+        self._user_defined: UserDefined | None = None
         self._words: list[Words] = []
         self._words_of_loads: list[Words] = []
         self._sort(system.loads)
@@ -217,14 +215,15 @@ class Tables:
 
     def _forces(self):
         s = self.system
-        return s.forces.tables(s.K._position, s.symmetric, self.handle if s.forces.own else 0)
+        return s.forces.tables(s.K.position, s.symmetric, self.handle if s.forces.own else 0)
 
     @property
     def handle(self) -> int:
-        """What texts know the system by."""
-        if self._own_handle is None:
-            self._own_handle = handle_of(self.system)
-        return self._own_handle
+        """What kernels know the user-defined items by."""
+        if self._user_defined is None:
+            self._user_defined = UserDefined(self.system, self._loads[-1])
+            self._handle = handle_of(self._user_defined)
+        return self._handle
 
     @property
     def stresses(self) -> Array:
@@ -294,11 +293,6 @@ class Tables:
                     opposite[[i, k]] = k, i
         return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float),
                           opposite)
-
-    @property
-    def own_loads(self) -> list["Load"]:
-        """Loads that are no tables."""
-        return self._loads[-1]
 
     @property
     def _columns(self):
@@ -466,10 +460,10 @@ class Tables:
 
     def _border(self, joints):
         s, none = self.system, _NO_INTS
-        if not s.coupled:
+        if not s.solver.coupled:
             return _NO_BORDER
         if not s.constraints.joints or not s.constraints.bordered or joints.own or s.forces.far:
-            return Border(none, 0, 0, none, none, none, none, int(s.coupled), _NO_ROWS)
+            return Border(none, 0, 0, none, none, none, none, int(s.solver.coupled), _NO_ROWS)
         along, springs = s.constraints.stiff
         i, j, ns = joints.hi, joints.hj, len(springs)
         if not len(i):
@@ -480,7 +474,7 @@ class Tables:
         out, = np.nonzero(outside)
         stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
         row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
-        return Border(picked, ns, s.constraints.loose, s.K._position(i[stored], j[stored]), stored,
+        return Border(picked, ns, s.constraints.loose, s.K.position(i[stored], j[stored]), stored,
                       row * len(picked) + column, out, 0, along)
 
 

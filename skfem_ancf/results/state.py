@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..equations.linearised import linear_energy, linear_external_force, linear_force
 from ..beam.layout import select_beam, select_member
 from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..actions.eigenstrain import EigenStrain
@@ -518,7 +519,7 @@ class State(Immutable, MaterialPoints):
         """
         with self._contact_memory():
             if self.base is not None:
-                return self.system.linear_energy(self.base.u, self.u - self.base.u, self.load)
+                return linear_energy(self.system, self.base.u, self.u - self.base.u, self.load)
             return self.system.strain_energy(self.u, self._time)
 
     @property
@@ -528,7 +529,7 @@ class State(Immutable, MaterialPoints):
             with self._contact_memory():
                 self._force = (
                     self.system.internal_force(self.u, self.t, self.load) if self.base is None else
-                    self.system.linear_force(self.base.u, self.u - self.base.u, self.load))
+                    linear_force(self.system, self.base.u, self.u - self.base.u, self.load))
         return self._force
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
@@ -577,7 +578,7 @@ class State(Immutable, MaterialPoints):
         """What supports do to the coordinates, (N,): all other forces and inertia, negated."""
         system = self.system
         loads = system.external_force(self.u, self.t) if self.base is None else (
-            system.linear_external_force(self.base.u, self.u - self.base.u))
+            linear_external_force(system, self.base.u, self.u - self.base.u))
         total = self.internal_force - self.load * loads + self._inertia
         if system.constraints.joints:
             total = total + self.multipliers @ system.constraints.full_jacobian(

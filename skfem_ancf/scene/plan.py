@@ -151,12 +151,13 @@ def _solution(scene, kind):
 def _linear_solver(s, dynamic):
     """How the linear systems of a system are solved."""
     bandwidth = s.K.bandwidth
-    if dynamic and s.by_nodes:
+    if dynamic and s.mass_solver.by_nodes:
         return ("lines condensed to displacements and rotations of nodes, sparse LDL^T of these, "
                 "for steps and for the mass with its impulses; by 'energy-momentum', "
                 "'generalized-alpha' and its kin")
-    if not dynamic and s.condensed is not None:
-        solver = (f"lines condensed to {s.condensed.size} displacements and rotations of nodes, "
+    if not dynamic and s.solver.condensed is not None:
+        solver = (f"lines condensed to {s.solver.condensed.size} displacements and rotations of "
+                  "nodes, "
                   "sparse LDL^T of these: no multiplier is unknown")
     elif not dynamic and s.forces.far:
         solver = "banded with a border of the points that force elements couple"

@@ -46,6 +46,7 @@ from ..solvers import continuation, newton
 from .adapt import solve_adaptive
 from ..actions.supports import Support
 from ..equations.system import System
+from ..equations.linearised import linear_external_force, linear_force
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -1446,16 +1447,16 @@ class Scene:
         system.constraints.require_supports()
         zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
         system.assemble(zero, 1.0, geometric=False)
-        system.factorize(zero, 1.0, none)
+        system.solver.factorize(zero, 1.0, none)
         u, multipliers = np.zeros(system.N), none
         u[system.constraints.fixed] = system.constraints.values(1.0)
         gap = system.constraints.constraint(zero, 1.0)
         J = system.constraints.full_jacobian(zero, 1.0)
         # solved again with what sums of strains leave: an assembled stiffness rounds off bending
         for _ in range(LINEAR_SOLVES if system.N <= SOLVED_AGAIN else 1):
-            rest = (system.linear_external_force(zero, u) - system.linear_force(zero, u)
+            rest = (linear_external_force(system, zero, u) - linear_force(system, zero, u)
                     - multipliers @ J)
-            du, dm = system.solve(rest, -gap - J @ u)
+            du, dm = system.solver.solve(rest, -gap - J @ u)
             u, multipliers = u + du, multipliers + dm
             if np.max(np.abs(du)) <= CLOSE * np.max(np.abs(u)):
                 break

@@ -1,6 +1,7 @@
 """Static solvers: one file each."""
 
 from .continuation import continuation
-from .newton import LoadStep, StaticResult, solve_static
+from .newton import solve_static
+from .outcome import LoadStep, StaticResult
 
 __all__ = ["LoadStep", "StaticResult", "continuation", "solve_static"]

@@ -156,7 +156,7 @@ def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = N
     x, value = x * system.constraints.mask, np.nan
     for _ in range(iterations + (8 if start is None else 0)):
         x = x / np.sqrt(x @ (D * x))
-        y, m = system.solve(D * x, none)
+        y, m = system.solver.solve(D * x, none)
         value = 1.0 / (x @ (D * y))
         x = y
     return (x, m), value

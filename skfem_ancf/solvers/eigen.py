@@ -15,6 +15,7 @@ from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportEr
 from ..core.linalg import NO_FACTORS
 from ..results.state import State
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
+from ..equations.linearised import linear_external_force, linear_force
 
 if TYPE_CHECKING:
     from ..core.types import Array
@@ -136,8 +137,8 @@ class Modes:
         if not system.constraints.m:
             return np.zeros(0)
         u, load, t = np.array(state.u), state.load, state.load if state.t is None else state.t
-        rest = (system.linear_force(u, d, load) - system.internal_force(u, None, load) + inertia
-                - load * (system.linear_external_force(u, d) - system.external_force(u))
+        rest = (linear_force(system, u, d, load) - system.internal_force(u, None, load) + inertia
+                - load * (linear_external_force(system, u, d) - system.external_force(u))
                 + system.constraints.curvature(u, t, state.multipliers) @ d)
         J = system.constraints.sparse_jacobian(u, t)[:, system.constraints.free].tocsr()
         return -spsolve((J @ J.T).tocsc(), J @ rest[system.constraints.free])
@@ -286,7 +287,7 @@ def _bending_eigenvalue(system):
     """
     if not system.beams:
         mass = sum(body.total_mass for body in system.bodies)
-        return system.energy_of_bodies / (mass * system.size**2) or 1.0
+        return system.scales.energy_of_bodies / (mass * system.size**2) or 1.0
     stiffness = min(b.across.bending_over_mass() for b in system.beams)
     return stiffness * (np.pi / system.size) ** 4
 
@@ -307,15 +308,15 @@ def _shift(tangent, state):
 def _negative(tangent, state, shift):
     """How many eigenvalues of K + shift M between the free coordinates are negative."""
     system = tangent.system
-    if system.condensed is not None:
-        return tangent.condense(system.condensed, shift).inertia().negative
+    if system.solver.condensed is not None:
+        return tangent.condense(system.solver.condensed, shift).inertia().negative
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
-    if shift < 0.0 and not system.coupled:  # as a rule indefinite: without factors
+    if shift < 0.0 and not system.solver.coupled:  # as a rule indefinite: without factors
         fix(system.K.band, system.constraints.fixed)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
-    system.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
-    return system.inertia().negative
+    system.solver.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
+    return system.solver.inertia().negative
 
 
 def _dense(tangent, M, k, shift):
@@ -473,7 +474,7 @@ def buckling(system: System, k: int) -> Buckling:
     theta, X = (_geometric if symmetric else _follower)(tangent, Ks, k)
     # mean strain before buckling over that of the strain energy of a strain of one
     strain = np.sqrt(max(float(du @ tangent.internal(stress)), 0.0)) * np.finfo(float).eps
-    good = theta < -strain / system.stiffness_scale
+    good = theta < -strain / system.scales.strain_noise
     if not np.any(good):
         raise InputError("no positive load factor: these loads pull the beam straight"
                          if symmetric else _FLUTTER)
@@ -494,7 +495,7 @@ def _require_unstressed(system, zero):
     if not len(system.forces.elements):
         return
     push = np.abs(system.internal_force(zero, 0.0, 0.0) * system.constraints.mask).max()
-    held = abs(system._held_by_elements())
+    held = abs(system.stiffness_at_rest())
     if push > UNSTRESSED * (held.max() if held.nnz else 0.0) * system.size:
         raise InputError(
             "springs push before there is any load: buckling() knows the stress-free state and "

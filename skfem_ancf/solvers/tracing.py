@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.linalg import NO_FACTORS
 from .iteration import CLOSED, reference_work, settled
-from .newton import rules_of
+from .increment import rules_of
 from ..equations.stability import position_weights
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Tracer:
         """
         system = self.system
         forces = float(np.abs(system.external_force(point.u)) @ system.constraints.coordinate_sizes)
-        self.of_load = forces / system.energy_of_strains if forces > 0 else 0.0
+        self.of_load = forces / system.scales.energy_of_strains if forces > 0 else 0.0
         self.set_tangent(point)
         motion = self.norm(point.tangent)
         if motion > STILL * self.of_load * point.rate:
@@ -124,7 +124,7 @@ class Tracer:
         if np.any(self.unit):
             du0 = np.zeros(system.N)
             du0[system.constraints.fixed] = self.unit
-            external = external - system.multiply(du0)
+            external = external - system.solver.multiply(du0)
             if system.constraints.joints:
                 phi = phi + system.constraints.full_jacobian(u, load) @ du0
         return external, -phi
@@ -135,9 +135,9 @@ class Tracer:
         system.assemble(point.u, point.load)
         drive = self._drive(system.external_force(point.u), point.u, point.load)
         try:
-            system.factorize(point.u, point.load, point.multipliers)
+            system.solver.factorize(point.u, point.load, point.multipliers)
             if system.symmetric:
-                point.negative = system.inertia().negative
+                point.negative = system.solver.inertia().negative
         except NO_FACTORS:
             raise Failed("the tangent is singular") from None
         return drive
@@ -153,7 +153,7 @@ class Tracer:
             The point before, from which the tangent points on; None for that of a growing load.
         """
         drive, phi = self.factorize(point)
-        dF, mF = self.system.solve(drive, phi)
+        dF, mF = self.system.solver.solve(drive, phi)
         dF[self.system.constraints.fixed] += self.unit
         size = np.hypot(self.norm(dF), self.of_load)
         if not size > 0 or not np.isfinite(size):
@@ -201,14 +201,14 @@ class Tracer:
         """Iterate from ``start`` and a first increment of u, multipliers and load."""
         system, weights = self.system, self.weights
         u, m, load = start.u, start.multipliers, start.load
-        _, evaluations = system.assemble(u, load)
+        _, stresses = system.assemble(u, load)
         du, dm, dl = first
         step, work, rules = np.zeros(system.N), np.inf, self.rules
         for k in range(1, rules.iterations + 1):
-            carried = system.stress_step(evaluations, du)
+            carried = system.carried_stress(u, stresses, du)
             u, m, load, step = u + du, m + dm, load + dl, step + du
             with np.errstate(over="ignore", invalid="ignore"):
-                force, evaluations = system.assemble(u, load, carried)
+                force, stresses = system.assemble(u, load, carried)
                 external = system.external_force(u)
             if not np.all(np.isfinite(force)):
                 raise Failed("the strain is not finite")
@@ -223,9 +223,9 @@ class Tracer:
                              work / reference if reference > 0 else 0.0, k)
             drive, gap = self._drive(external, u, load)
             try:
-                system.factorize(u, load, m)
-                dR, mR = system.solve(residual, -phi)
-                dF, mF = system.solve(drive, gap)
+                system.solver.factorize(u, load, m)
+                dR, mR = system.solver.solve(residual, -phi)
+                dF, mF = system.solver.solve(drive, gap)
             except NO_FACTORS:
                 raise Failed("the tangent is singular") from None
             dF[system.constraints.fixed] += self.unit

@@ -1,0 +1,44 @@
+"""Linear and angular momentum of a scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..core.types import Array
+    from .system import System
+
+
+def momentum(system: System, v: Array) -> Array:
+    """Linear momentum of a velocity, shape (2,).
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    v
+        Velocity of the degrees of freedom, shape (N,).
+    """
+    p, total = system.mass.multiply(v), np.zeros(2)
+    for member, s in zip(system.members, system.slices):  # a unit translation moves r alone
+        total += p[s].reshape(-1, member.nd)[:, :2].sum(axis=0)
+    return total
+
+
+def angular_momentum(system: System, u: Array, v: Array) -> float:
+    """Angular momentum about the origin.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    u, v
+        Displacement and velocity, shape (N,).
+    """
+    p, total = system.mass.multiply(v), 0.0
+    for member, s in zip(system.members, system.slices):
+        q, pb = (member.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)
+        total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
+    return float(total)

@@ -1,0 +1,311 @@
+"""One load increment: from an equilibrium to that of the next load level."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..core.callbacks import handle_of
+from ..core.errors import ConvergenceError
+from ..core.linalg import INACCURATE
+from ..equations import stability
+from . import descent
+from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
+                        Target, Unknowns, equilibrium, room_for_iterations)
+from .outcome import (Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed,
+                      Unstable)
+from .touching import found_touching
+
+if TYPE_CHECKING:
+    from ..core.types import Array
+    from ..equations.system import System
+
+logger = logging.getLogger(__name__)
+
+#: Corrections of the pressure of obstacles in a load step, at most.
+AUGMENTED = 50
+#: Relative error of an equilibrium that is only a start, and iterations to it, at most.
+NEAR, SOON = 1e-2, 15
+
+
+class Route(NamedTuple):
+    """How loads and supports come to their full values as the level goes from 0 to 1.
+
+    Attributes
+    ----------
+    u
+        Displacement at level 0, shape (N,).
+    gap
+        What is missing there to equilibrium under the full load, shape (N,), which is reduced to
+        nothing; None where the loads themselves are applied.
+    loads, times
+        Load factor, and time of supports and obstacles, at levels 0 and 1.
+    """
+
+    u: Array
+    gap: Array | None = None
+    loads: tuple[float, float] = (0.0, 1.0)
+    times: tuple[float, float] = (0.0, 1.0)
+
+    def acting(self, level: float) -> tuple[float, float]:
+        """Load factor and time at a level."""
+        if self.gap is not None:
+            return 1.0, 1.0
+        (a, b), (c, d) = self.loads, self.times
+        return a + level * (b - a), c + level * (d - c)
+
+    @property
+    def proportional(self) -> bool:
+        """True if loads and supports grow together from the reference configuration."""
+        return self.gap is None and self.loads == self.times == (0.0, 1.0)
+
+
+class Options(NamedTuple):
+    """Of the iteration of a load step.
+
+    Attributes
+    ----------
+    route
+        The :class:`Route`.
+    method, tol, most
+        "mixed" or "newton", tolerance of a correction, and iterations at most.
+    watched
+        Whether it is given up where the mixed iteration does not seem to converge.
+    """
+
+    route: Route
+    method: str
+    tol: float
+    most: int
+    watched: bool = False
+
+
+class Increment:
+    """The way from the last equilibrium to a load level.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    start
+        The last equilibrium, a :class:`StaticResult`.
+    level
+        From 0 to 1.
+    options
+        :class:`Options`.
+
+    Attributes
+    ----------
+    record : LoadStep
+        Takes the iterations of all that is tried.
+    """
+
+    def __init__(self, system: System, start: StaticResult, level: float,
+                 options: Options) -> None:
+        self.system, self.start, self.level, self.options = system, start, level, options
+        self.load, self.time = options.route.acting(level)
+        self.record = LoadStep(level)
+
+    def solve(self, stable: bool) -> Equilibrium:
+        """The equilibrium, a stable one if that is wanted; raises StepFailed."""
+        system, start, route = self.system, self.start, self.options.route
+        found = self._augmented()
+        passed = system.forces.contacts.passed((start.u, route.acting(start.load)[1]),
+                                               (found.u, self.time))
+        if passed:
+            raise StepFailed(passed)
+        if not stable or start.unstable:
+            return found
+        if not stability.holds(system, found.u, self.load, found.multipliers, self.time):
+            raise Unstable("the equilibrium found is unstable", found)
+        if (start.rejected and route.proportional and start.load > 0.0
+                and not descent.heads_on(system, start, found.u, self.level)):
+            raise Unstable("the equilibrium found lies on the other side", found)
+        return found
+
+    def _augmented(self):
+        """Again until obstacles that ask for it are entered no deeper than that."""
+        contacts = self.system.forces.contacts
+        contacts.put_back(self.start.memory)
+        found = self._touching()
+        if not contacts.augmented:
+            return found
+        for _ in range(AUGMENTED):
+            if contacts.augment(found.u, self.time) == 0:
+                return found
+            found = self.iterate(found)
+        raise StepFailed(f"the penetration of obstacles is above its tolerance after {AUGMENTED} "
+                         "corrections of the pressure")
+
+    def _touching(self):
+        """Where there are obstacles by :mod:`skfem_ancf.solvers.touching`."""
+        contacts, options = self.system.forces.contacts, self.options
+        if not contacts.obstacles:
+            return self._from_start(options)
+
+        def solve(begin, rough):
+            chosen = options
+            if rough:
+                chosen = options._replace(tol=max(options.tol, NEAR), most=min(options.most, SOON))
+            return self._from_start(chosen) if begin is None else self.iterate(begin, chosen)
+
+        before = self.start.u, options.route.acting(self.start.load)[1]
+        return found_touching(contacts, before, self.time, solve,
+                              lambda u: self.system.strain_energy(u, self.time), StepFailed)
+
+    def _from_start(self, options):
+        """From the last equilibrium; where a law is left behind, by way of its first moduli.
+
+        A correction that turns the beam far strains it for once, more than a law may bear that
+        others than Hooke's are; the equilibrium that Hooke's finds is close to theirs.
+        """
+        machine = None if self.start.diverging else self.system.machine.linearised
+        if machine is None:
+            return self.iterate(options=options)
+        try:
+            return self.iterate(options=options, wary=True)
+        except StepFailed as failed:
+            failure = failed
+        try:
+            close = self.iterate(options=options._replace(tol=max(options.tol, NEAR)),
+                                 machine=machine)
+            return self.iterate(close, options)
+        except StepFailed:
+            self.start.diverging = True
+        if isinstance(failure, Diverging):
+            return self.iterate(options=options)
+        raise failure
+
+    def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
+                machine: Any = None, wary: bool = False) -> Equilibrium:
+        """Iterate to equilibrium; raises StepFailed.
+
+        Parameters
+        ----------
+        begin
+            Displacement and multipliers to begin with; those of the last equilibrium by default.
+        options
+            In place of those of the increment.
+        solver
+            What solves the linear systems, as a :class:`~skfem_ancf.solvers.descent.Descent`.
+        machine
+            That of other laws.
+        wary
+            End where the third correction is not smaller than the first.
+        """
+        system, options = self.system, options or self.options
+        u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
+        machine = machine or system.machine
+        tables, given = machine.tables, solver is not None
+        target = self._target(tables, u)
+        rules = rules_of(system, options.method, options.tol, options.most,
+                         FIRST if wary else WATCHED if options.watched and not given else 0)
+        room = machine.room(room_for_iterations, system.constraints.m)
+        if solver is None and tables.plain.border.wide:
+            solver = system.solver
+        while True:
+            if solver is not None:
+                rules = rules._replace(solver=handle_of(solver))
+            x = Unknowns(u.copy(), multipliers.copy(), np.empty(system.N), tables.stresses,
+                         tables.stresses)
+            residuals = np.zeros((options.most + 1, 2))
+            status, n = machine.of(equilibrium)(target, rules, x, room, residuals)
+            if status != SINGULAR or solver is not None:
+                break
+            solver = system.solver  # factors with exchanges of rows, or sparse ones
+        self.record.iterations += n
+        self.record.force_residuals += residuals[:n + 1, 0].tolist()
+        self.record.energy_residuals += residuals[:n, 1].tolist()
+        self._require_converged(status, n, rules)
+        if system.inverted(x.u):
+            raise StepFailed("the body is turned inside out")
+        if lost := system.constraints.lost(x.u):
+            raise StepFailed(lost)
+        if solver is None:
+            if n:
+                system.solver.take_factors(room.factors)
+            else:
+                system.K.clear()
+        return Equilibrium(x.u, x.multipliers, x.force)
+
+    def _target(self, tables, u):
+        """The :class:`~skfem_ancf.solvers.iteration.Target` of the level."""
+        constraints, route = self.system.constraints, self.options.route
+        gap = route.gap
+        values, fixed = constraints.values(self.time), constraints.fixed
+        if gap is None:
+            gap = np.zeros(self.system.N)
+        else:
+            begin = route.u[fixed]
+            values = begin + self.level * (values - begin)
+            gap = (1.0 - self.level) * gap
+        factors = first = tables.static_factors(self.load)
+        if tables.prestressed:
+            first = tables.static_factors(self.load, route.acting(self.start.load)[0])
+        return Target(factors, first, self.load, self.time, *tables.at(self.time), gap,
+                      values - u[fixed])
+
+    def _require_converged(self, status, n, rules):
+        if status == CONVERGED:
+            return
+        if status == NOT_CONVERGED and n < rules.iterations:
+            if rules.wary == WATCHED and n == 2:
+                raise Soft("the first correction stretches it far beyond its place")
+            raise Diverging("the first corrections do not get smaller" if rules.wary == FIRST else
+                            f"the corrections do not get smaller in {n} iterations")
+        raise StepFailed({
+            SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
+            NOT_CONVERGED: f"no convergence in {rules.iterations} iterations"}[status])
+
+    def rescue(self, failure: StepFailed) -> Equilibrium | None:
+        """A stable equilibrium where the path has lost its stability; None where it has not.
+
+        Parameters
+        ----------
+        failure
+            Why the step failed.
+        """
+        system, start, route = self.system, self.start, self.options.route
+        unstable = isinstance(failure, Unstable)
+        if unstable and route.gap is None and not start.steps and (
+                weak := stability.weak_at_rest(system)):
+            raise ConvergenceError(weak, start)
+        if not unstable and not descent.near_limit(system, start):
+            return None
+        if not stability.has_potential(system, start.u, self.load):
+            if not isinstance(failure, Unstable):
+                return None
+            start.unstable = True
+            start.doubt = (f"the path is unstable from the load level {self.level:.6g} on, and its "
+                           "loads have no potential that would lead to a stable equilibrium")
+            return failure.found
+        with np.errstate(all="ignore"):
+            found, turned = descent.way_down(self)
+        if turned and not start.doubt:
+            start.doubt = (
+                f"the path loses its stability between the load levels {start.load:.6g} and "
+                f"{self.level:.6g}, the solution went on along the direction that gives way to a "
+                "stable equilibrium, which need not be the only one")
+        return found
+
+
+def rules_of(system: System, method: str, tol: float, max_iterations: int,
+             wary: int = 0) -> Rules:
+    """When an iteration of a system has converged.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    method, tol, max_iterations
+        As for :func:`~skfem_ancf.solvers.newton.solve_static`.
+    wary
+        When it ends because corrections do not get smaller, as in
+        :class:`~skfem_ancf.solvers.iteration.Rules`.
+    """
+    scales = system.scales
+    # the residual sums the noise of all degrees of freedom, the work that of the strains
+    return Rules(int(method == "mixed"), max_iterations, tol, 8.0 * scales.work_noise,
+                 8.0 * scales.force_noise, INACCURATE, 0, wary)
