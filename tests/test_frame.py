@@ -174,7 +174,7 @@ def test_the_condensed_solution_solves_the_equations_with_multipliers():
         for column, factors in zip(found.T, ((2.0, 2.0), (-1.0, 3.0), (0.0, 1.0))):
             wanted = factors[0] * of_b + factors[1] * of_c
             assert_allclose(column, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
-    negative, singular = equations.inertia()
+    negative, singular = solver.inertia()
     null = np.linalg.svd(J)[2][len(J):].T
     assert (negative, singular) == (np.sum(np.linalg.eigvalsh(null.T @ K @ null) < 0), False)
 
