@@ -12,7 +12,7 @@ from test_sections import axis_tip, plane
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
                         KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff)
-from skfem_ancf.equations import system, strain_tangent as tangent
+from skfem_ancf.equations import mass_solver, strain_tangent as tangent
 from skfem_ancf.equations.condensation import Condensed
 from skfem_ancf.dynamics import EnergyMomentum
 from skfem_ancf.dynamics import integrate
@@ -425,7 +425,7 @@ def test_a_small_frame_moves_with_its_multipliers():
 
 def swinging(eliminated, monkeypatch, scheme, n=60, dt=1e-3, **options):
     """A frame of two times two cells, two hinged ends in it, after a step load."""
-    monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
+    monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
     frame = square(2, hinges=[(0, 3), (7, 4)]).point_force((3000.0, 0), at="side")
     assert frame.system.mass_solver.by_nodes == eliminated
     return frame.integrate(n * dt, dt, scheme=scheme, **options)
@@ -454,19 +454,19 @@ def test_a_start_by_elimination_makes_factors_once(monkeypatch):
 
     calls, factorize = [], Condensed.factorize
     monkeypatch.setattr(Condensed, "factorize", factorized)
-    monkeypatch.setattr(system, "MANY", 0)
+    monkeypatch.setattr(mass_solver, "MANY", 0)
     made = square(2).point_force((3000.0, 0), at="side").system
     integrator = Integrator(made, EnergyMomentum())
     first, _, second = (integrator.start(np.zeros(made.N), np.full(made.N, v), 0.0, 1e-3)
                         for v in (0.0, 0.1, 0.0))
-    assert made.by_nodes and len(calls) == 3
+    assert made.mass_solver.by_nodes and len(calls) == 3
     assert np.abs(first.acceleration).max() > 0.0
     assert np.array_equal(first.acceleration, second.acceleration)
     assert np.array_equal(first.multipliers, second.multipliers)
 
 
 def test_a_frame_swings_in_its_first_mode(monkeypatch):
-    monkeypatch.setattr(system, "MANY", 0)
+    monkeypatch.setattr(mass_solver, "MANY", 0)
     frame = square(4)
     modes = frame.modes(1)
     period = 2.0 * np.pi / modes.frequencies[0]
@@ -487,7 +487,7 @@ def test_what_else_acts_in_a_motion_by_elimination(change, monkeypatch):
         frame = square(2, **options).point_force((100.0, 0), at="side")
         if change == "pressure":
             frame.pressure("top", 50.0)
-        monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
+        monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
         histories.append(frame.integrate(0.02, dt, rtol=1e-3))
     ours, dense = histories
     if change == "auto":
@@ -576,7 +576,7 @@ def test_supports_that_shake(scheme, monkeypatch):
     """Of nodes eliminated, and by multipliers: a support moves and turns, the other shakes."""
     histories = []
     for eliminated in (True, False):
-        monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
+        monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
         frame = portal().settle(0, x=lambda t: 0.02 * np.sin(40 * t) ** 2,
                                 angle=lambda t: 0.3 * np.sin(20 * t) ** 2)
         frame.settle(3, y=lambda t: 0.01 * (1 - np.cos(30 * t)))
