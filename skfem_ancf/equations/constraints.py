@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from copy import copy
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +17,6 @@ from ..actions.joints.director import UnitDirector
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.part import Part
 from ..actions.joints.settlements import HELD
-from ..core.kept import cached_property, twin_of
 from .redundancy import repeated, shared
 from .signature import DENSE, FREE, first_dependent, null_space, row_sizes, unit_rows
 from ..beam.rigid import RigidBody
@@ -152,7 +153,7 @@ class Constraints:
             f"{len(found)} of {self.m} equations of joints repeat others or supports: "
             f"{', '.join(said[:4])}{more}. The scene moves as without them; joint_force shares "
             "the forces by least squares", ModelWarning, stacklevel=5)
-        self._whole = twin_of(self)
+        self._whole = copy(self)
         self.joints, self.m = parts, self.m - len(found)
         self._left_out, self._unasked = found, unasked
         for name in KEPT_OF_JOINTS:

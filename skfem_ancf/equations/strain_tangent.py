@@ -9,6 +9,7 @@ before. Where the strains ``B x`` are summed first nothing cancels: their round-
 from __future__ import annotations
 
 import logging
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,6 @@ from scipy.sparse.linalg import splu
 from .condensation import Condensed
 from ..core.errors import ConvergenceError, SupportError
 from ..actions.forces.texts import add_elastic_force
-from ..core.kept import twin_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -172,11 +172,11 @@ class StrainTangent:
         """
         (u, load, t, _), system = self._at, self.system
         if self._condensed[0] != shift or self._condensed[1] is not self.multipliers:
-            own = twin_of(condensed)
+            own = copy(condensed)
             system.assemble(u, load, t=t)
             if shift:
                 system.K.combine(1.0, system.K, shift, system.mass)
-            own.factorize(system.K, u, self.multipliers)
+            own.factorize(u, self.multipliers)
             self._condensed = shift, self.multipliers, own
         return self._condensed[2]
 

@@ -1,6 +1,7 @@
 """The equations of a scene as tables that texts take."""
 
-from functools import cache
+from copy import copy
+from functools import cache, cached_property
 from operator import is_
 from typing import Any, NamedTuple
 from weakref import ref
@@ -16,7 +17,6 @@ from .border import Border
 from .compiled.words import Words, constant
 from ..actions.forces.system import NO_FORCES
 from ..actions.forces.texts import ForceTables
-from ..core.kept import cached_property, twin_of
 from ..beam.kernels.base import packed
 from ..beam.kernels.law import LINEAR, text_of
 from ..beam.kernels.moments import MomentPack
@@ -191,7 +191,7 @@ class Tables:
         plain
             In place of those of the system.
         """
-        tables = twin_of(self)
+        tables = copy(self)
         vars(tables).pop("flat", None)
         tables._words, tables._words_of_loads, tables.plain = [], [], plain
         return tables
