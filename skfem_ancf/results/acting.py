@@ -63,8 +63,10 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
     elements = [e for e in system.forces.elements if e.distributed]
     if not elements:
         return sampled, places
-    force = -(system.part_forces(state.u, state.v) if state.base is None else unit
-              * system.small_part_forces(state.base.u, state.u - state.base.u, state.load))
+    tables = system.machine.tables.plain.forces
+    force = -(system.forces.part_forces(tables, state.u, state.v) if state.base is None else unit
+              * system.forces.small_part_forces(tables, state.load, state.base.u,
+                                                state.u - state.base.u))
     for element in elements:
         if element.along is None:
             raise NotRecovered(f"how {element!r} acts along the beam is not known to it")
@@ -113,7 +115,8 @@ def recover(state: Any, number: int, at: list[float], u: Array,
         acceleration = viscous = None
         if state.acceleration is not None:
             acceleration = unit * (
-                state.acceleration + system.damping_acceleration(state.v))[s]
+                state.acceleration + system.damping.mass * state.v
+                + system.modal_damping.acceleration(state.v))[s]
         time = system.retardation[number]
         if state.t is not None and time:
             viscous = viscous_forces(beam, state.u[s], state.v[s], time)
