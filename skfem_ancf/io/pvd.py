@@ -10,7 +10,7 @@ from ..core.errors import require_options, require_path, require_text
 from ..recovery.fields import find_fields
 from ..actions.obstacles.pictures import obstacles_of
 from ..core.archive import output_file
-from .vtu import require_next, save_frame
+from .vtu import require_next, save_vtu
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -68,9 +68,8 @@ class PvdWriter:
                                         "fields", "precision", "encoding"))
         if "fields" in self.options:
             find_fields(self.options["fields"])
-        self._rows: list[str] = []
-        self._packed: dict[str, Any] = {}
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
+        self._obstacles = False
 
     def __enter__(self):
         return self
@@ -121,16 +120,18 @@ class PvdWriter:
     def _frame(self, state, t):
         t = require_next(state, t, self.frames[-1][0] if self.frames else None)
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
-        frame = save_frame(state, self.path.with_name(name), self._packed, **self.options)
+        frame = save_vtu(state, self.path.with_name(name), **self.options)
         self.frames.append((t, name))
-        self._rows.append(f'<DataSet timestep="{t!r}" part="0" file={quoteattr(name)}/>')
-        if obstacles_of(state):
-            beside = quoteattr(name.replace(".vtu", "_obstacles.vtu"))
-            self._rows.append(f'<DataSet timestep="{t!r}" part="1" file={beside}/>')
+        self._obstacles = bool(obstacles_of(state))
         return frame
 
     def _list(self):
+        rows = []
+        for t, name in self.frames:
+            names = [name, name.replace(".vtu", "_obstacles.vtu")][:1 + self._obstacles]
+            rows += [f'<DataSet timestep="{t!r}" part="{k}" file={quoteattr(one)}/>'
+                     for k, one in enumerate(names)]
         with output_file(self.path) as temporary:
             temporary.write_text("\n".join(
                 ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',
-                 "<Collection>", *self._rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+                 "<Collection>", *rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")

@@ -11,16 +11,17 @@ import numpy as np
 from ..core.archive import find_h5py, new_file, put_in_place
 from ..core.errors import (FileError, InputError, require_option, require_options, require_path)
 from ..recovery.fields import find_fields
+from ..actions.obstacles.pictures import around, outlines
 from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
-from .xml import topology
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from ..beam.configuration import Configuration
     from ..core.types import StrPath
 
+#: VTK's numbers of the cells.
+CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
 #: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose
 #: writing fails, and takes the process with it.
@@ -92,7 +93,7 @@ class VtkHdfWriter:
             self._file.close()
             if kind is None and self.times:
                 put_in_place(self._temporary, self.path)
-                save_obstacles(self._first, self.path, self._body)
+                save_obstacles(self._walls, self.path)
         except OSError as error:
             raise self._cannot(error) from error
         finally:
@@ -122,7 +123,7 @@ class VtkHdfWriter:
             self.add(state, state.t)
             done()
 
-    def add(self, state: Configuration, t: float) -> Path:
+    def add(self, state: Any, t: float) -> Path:
         """Append a frame.
 
         Parameters
@@ -141,11 +142,12 @@ class VtkHdfWriter:
         body = body_fields(state, **self.options)
         if not self.times:
             self._begin(body)
-            self._first, self._body = state, body
+            self._cells = _cells(body)
+            self._walls = outlines(state, around(body.points[:, :2].T))
         elif len(body.points) != self._n:
             raise InputError(f"all frames have the same points: the first has {self._n}, this one "
                              f"{len(body.points)}")
-        elif not all(map(np.array_equal, _cells(body), _cells(self._body))):
+        elif not all(map(np.array_equal, _cells(body), self._cells)):
             raise InputError("all frames have the same cells, of the same beams and elements: "
                              "write states of another scene into another file, or as .pvd")
         try:
@@ -158,19 +160,18 @@ class VtkHdfWriter:
         return self.path
 
     def _begin(self, body):
-        connectivity, offsets, types = topology(body)
+        connectivity, offsets, types, *numbers = _cells(body)
         self._n, root = len(body.points), self._root
         root["NumberOfPoints"] = np.array([self._n], dtype="i8")
         root["NumberOfCells"] = np.array([len(types)], dtype="i8")
         root["NumberOfConnectivityIds"] = np.array([len(connectivity)], dtype="i8")
         packed = dict(compression="gzip", shuffle=True)
-        root.create_dataset("Connectivity", data=connectivity.astype("i8"), **packed)
-        root.create_dataset("Offsets", data=np.append(0, offsets).astype("i8"), **packed)
+        root.create_dataset("Connectivity", data=connectivity, **packed)
+        root.create_dataset("Offsets", data=offsets, **packed)
         root.create_dataset("Types", data=types, **packed)
         root.create_group("PointData")
-        for name, parts in body.cell_data.items():
-            root.create_dataset(f"CellData/{name}", data=np.concatenate(parts).astype("i4"),
-                                **packed)
+        for name, values in zip(body.cell_data, numbers):
+            root.create_dataset(f"CellData/{name}", data=values, **packed)
         for name, values in {"Points": body.points, **{
                 f"PointData/{k}": v for k, v in body.point_data.items()}}.items():
             root.create_dataset(name, shape=(0,) + values.shape[1:], dtype=self._dtype,
@@ -197,5 +198,9 @@ class VtkHdfWriter:
 
 
 def _cells(body):
-    """What is stored once of a body: its cells and their numbers."""
-    return *topology(body), *map(np.concatenate, body.cell_data.values())
+    """What is stored once of a body: connectivity, offsets and types of cells, their numbers."""
+    sizes = np.concatenate([np.full(len(c), c.shape[1]) for _, c in body.cells])
+    return (np.concatenate([c.ravel() for _, c in body.cells]).astype("i8"),
+            np.append(0, np.cumsum(sizes)).astype("i8"),
+            np.concatenate([np.full(len(c), CELL_TYPES[kind], np.uint8) for kind, c in body.cells]),
+            *(np.concatenate(parts).astype("i4") for parts in body.cell_data.values()))

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import logging
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import meshio
 import numpy as np
 
+from ..actions.obstacles.pictures import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
-                           require_option, require_path)
-from ..recovery.fields import find_fields, values_on_grid
-from ..actions.obstacles.pictures import around, outlines
-from ..recovery.grids import in_space, lagrange_cell, layout, subdivision
-from .xml import write_vtu
+                           require_option, require_path, warn)
+from ..recovery.fields import find_fields
+from ..recovery.grids import grids, in_space
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ..core.types import Array, StrPath
 
 logger = logging.getLogger(__name__)
@@ -24,16 +25,12 @@ logger = logging.getLogger(__name__)
 #: What a file may end with: formats that meshio writes as one file with data on points.
 SUFFIXES = (".vtu", ".vtk")
 
-ENCODINGS = ("base64", "raw")
-
 #: Numbers of the fields in files.
 PRECISIONS = {"double": np.float64, "single": np.float32}
 
-#: Points of a whole body, at most.
-MAX_POINTS = 10**8
 
 class BodyFields(NamedTuple):
-    """The body of a state on points, in the form that meshio takes.
+    """The body of a state on points: the arguments of a ``meshio.Mesh``.
 
     Attributes
     ----------
@@ -82,71 +79,41 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     >>> sorted(body.point_data)[:4]
     ['S_xx', 'S_xy', 'S_yy', 'displacement']
     """
-    require_like("state", state, "State", "beams", "u_of")
-    m, n = subdivision(subdivide)
-    lagrange = require_flag("lagrange", lagrange)
+    found, wanted = grids(state, subdivide, lagrange, recover), find_fields(fields)
     undeformed = require_flag("undeformed", undeformed)
-    recover = require_flag("recover", recover)
-    wanted = find_fields(fields)
-    total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
-    if total > MAX_POINTS and not lagrange:
-        raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")
-    first, points, cells = 0, [], []
-    data: dict[str, list[Array]] = {}
-    if not state.beams:  # what rigid bodies have
-        data = {field.name: [] for field in wanted if field.name == "displacement"}
-    numbers: dict[str, list[Array]] = {"beam": [], "element": []}
-    for b, beam in enumerate(state.beams):
-        if lagrange:
-            X, local = lagrange_cell(beam)
-        else:
-            X, local = layout(beam, m, n)
-        values = values_on_grid(state, beam, X, recover)
-        x = values.x if undeformed else values.x + values.u
-        points.append(in_space(x))
-        for field in wanted:
-            value = _known(field, values, fields is None)
-            data.setdefault(field.name, []).append(
-                value if field.components == 1 else in_space(value) if field.components == 2 else
-                value.T)
-        ne, npoints = beam.mesh.nelements, X.shape[-1]
-        start = first + npoints * np.arange(ne)
-        cells.append(("VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
-                      (start[:, None, None] + local).reshape(-1, local.shape[1])))
-        numbers["beam"].append(np.full(ne * len(local), b))
-        numbers["element"].append(np.repeat(np.arange(ne), len(local)))
-        first += ne * npoints
-    for k, body in enumerate(getattr(state, "bodies", ())):
-        start = body.outline_at(np.zeros(4))
-        u = body.outline_at(state.u_of(body)) - start
-        n = u.shape[1]
-        points.append(in_space(start if undeformed else start + u))
-        for name, parts in data.items():
-            parts.append(in_space(u) if name == "displacement" else
-                         np.full((n, *parts[0].shape[1:]), np.nan))
-        cells.append(("polygon", first + np.arange(n)[None]))
-        numbers["beam"].append(np.array([len(state.beams) + k]))
-        numbers["element"].append(np.zeros(1, dtype=int))
-        first += n
-    return BodyFields(np.concatenate(points), cells,
-                      {name: np.concatenate(v) for name, v in data.items()}, numbers)
+    first = np.cumsum([0] + [g.x.shape[1] for g in found])
+    data = {field.name: np.concatenate([_values(field, g, fields is None) for g in found])
+            for field in wanted if state.beams or field.name == "displacement"}
+    return BodyFields(
+        np.concatenate([g.points(undeformed) for g in found]),
+        [(g.kind, start + g.cells) for start, g in zip(first, found)], data,
+        {"beam": [np.full(len(g.cells), k) for k, g in enumerate(found)],
+         "element": [g.elements for g in found]})
 
 
-def _known(field, values, lenient):
-    """A field; not a number where a law does not say it, unless it was asked for."""
+def _values(field, grid, lenient):
+    """A field as meshio takes it; not a number where there is none, and, unless it was asked for,
+    where a law does not say it.
+    """
+    n = grid.x.shape[1]
+    if field.name == "displacement":
+        return in_space(grid.u)
+    nan = np.full((n,) if field.components == 1 else (n, 3), np.nan)
+    if grid.values is None:
+        return nan
     try:
-        return field.of(values)
+        value = field.of(grid.values)
     except InputError as error:
         if not lenient:
             raise
         logger.info("%s is not a number: %s", field.name, error)
-        return np.full(values.n if field.components == 1 else (field.components, values.n), np.nan)
+        return nan
+    return in_space(value) if field.components == 2 else value.T
 
 
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              lagrange: bool = False, undeformed: bool = False, recover: bool = True,
-             fields: Any = None, precision: str = "double",
-             encoding: str = "base64") -> Path:
+             fields: Any = None, precision: str = "double", encoding: Any = None) -> Path:
     """Write the deformed body of a state for ParaView.
 
     All beams go into one file. Points belong to one element each, since strains and stresses
@@ -162,14 +129,13 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     S_xx, S_yy, S_xy               second Piola-Kirchhoff stress in the same frame
     sigma_xx, sigma_yy, sigma_xy   Cauchy stress F S F^T / J along the global axes; J holds the
                                    change of thickness in plane stress. NaN where the material
-                                   has no thickness left, or a law of one's own does not say it.
+                                   has no thickness left, or a user-defined law does not say it.
     =============================  ==========================================================
 
-    The outlines of obstacles about the body go into a file of lines beside it, ``name_obstacles``,
-    with their numbers in ``obstacle``.
-
     ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
-    outline, numbered behind the beams, without strain and stress (NaN).
+    outline, numbered behind the beams, without strain and stress (NaN). The outlines of obstacles
+    about the body go into a file of lines beside it, ``name_obstacles``, with their numbers in
+    ``obstacle``.
 
     Parameters
     ----------
@@ -188,17 +154,15 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         Put the points at their stress-free places. ParaView's filter "Warp By Vector" then moves
         them by any multiple of ``displacement``.
     recover
-        Recovered strain and stress (:mod:`skfem_ancf.recovery`) where the state has them; False for
-        those of the elements at the points.
-
+        Recovered strain and stress (:mod:`skfem_ancf.recovery.recovered`) where the state has them;
+        False for those of the elements at the points.
     fields
         Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields, see
         :mod:`skfem_ancf.recovery.fields`; those of the table by default.
     precision
         "double", or "single" for files of half the size.
     encoding
-        "base64", or "raw", a quarter smaller: VTK and ParaView read it, meshio 5.3 reads wrong
-        numbers from it.
+        Deprecated: files are compressed base64, as meshio writes them.
 
     Returns
     -------
@@ -222,75 +186,45 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     ...     print(state.save(f"{folder}/beam.vtu").name)
     beam.vtu
     """
-    return save_frame(state, filename, {}, precision, encoding, subdivide=subdivide,
-                      lagrange=lagrange, undeformed=undeformed, recover=recover, fields=fields)
-
-
-def save_frame(state: Any, filename: StrPath, packed: dict, precision: str = "double",
-               encoding: str = "base64", **options: Any) -> Path:
-    """As :func:`save_vtu`, for the next frame of a series.
-
-    Parameters
-    ----------
-    state, filename, precision, encoding
-        As for :func:`save_vtu`.
-    packed
-        What does not change from frame to frame, see :func:`skfem_ancf.io.xml.write_vtu`.
-    **options
-        Those of :func:`body_fields`.
-    """
     path = require_path("filename", filename, SUFFIXES)
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
-    raw = require_option("encoding", encoding, ENCODINGS) == "raw"
-    body = body_fields(state, **options)
-    _write(path, body, dtype, raw, packed)
+    if encoding is not None:
+        warn("encoding= is no longer used: leave it out", DeprecationWarning)
+    body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
+    _write(path, body, dtype)
     logger.info("wrote %s: %d points", path, len(body.points))
-    save_obstacles(state, path, body, dtype, raw)
+    save_obstacles(outlines(state, around(body.points[:, :2].T)), path, dtype)
     return path
 
 
-def save_obstacles(state: Any, path: Path, body: BodyFields, dtype: Any = np.float64,
-                   raw: bool = False) -> Path | None:
-    """Write the outlines of obstacles about a body into a file beside its own.
+def save_obstacles(walls: list[Array], path: Path, dtype: Any = np.float64) -> None:
+    """Write the outlines of obstacles into a file beside that of the body, if there are any.
 
     Parameters
     ----------
-    state
-        A State, or anything with its ``beams``.
+    walls
+        For each obstacle the ends of its straight pieces, shape (m, 2, 2).
     path
         The file of the body.
-    body
-        Its :class:`BodyFields`.
-    dtype, raw
-        As for :func:`skfem_ancf.io.xml.write_vtu`.
-
-    Returns
-    -------
-    pathlib.Path or None
-        The file; None without obstacles.
+    dtype
+        Of the points.
     """
-    walls = outlines(state, around(body.points[:, :2].T))
     if not walls:
-        return None
+        return
     points = in_space(np.concatenate(walls).reshape(-1, 2).T)
     numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
-    lines = BodyFields(points, [("line", np.arange(len(points)).reshape(-1, 2))], {},
-                       {"obstacle": [numbers]})
     suffix = path.suffix if path.suffix.lower() in SUFFIXES else ".vtu"
-    beside = path.with_name(f"{path.stem}_obstacles{suffix}")
-    _write(beside, lines, dtype, raw)
-    return beside
+    _write(path.with_name(f"{path.stem}_obstacles{suffix}"), BodyFields(
+        points, [("line", np.arange(len(points)).reshape(-1, 2))], {}, {"obstacle": [numbers]}),
+        dtype)
 
 
-def _write(path, body, dtype, raw, packed=None):
+def _write(path, body, dtype):
     with output_file(path) as temporary:
-        if path.suffix.lower() == ".vtu":
-            write_vtu(temporary, body, dtype, raw, packed)
-            return
-        import meshio
-
-        meshio.write(temporary, meshio.Mesh(body.points, body.cells, body.point_data,
-                                            body.cell_data))
+        meshio.write(temporary, meshio.Mesh(
+            body.points.astype(dtype), body.cells,
+            {name: values.astype(dtype) for name, values in body.point_data.items()},
+            body.cell_data))
 
 
 def require_next(state: Any, t: Any, before: float | None) -> float:

@@ -1,13 +1,14 @@
-"""Grids of points over a deformed body, for pictures and files."""
+"""The beams and rigid bodies of a deformed configuration on points, for pictures and files."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import InputError, require_integer, shown
+from ..core.errors import InputError, require_flag, require_integer, require_like, shown
 from ..core.quadrature import tensor
+from .fields import Values, values_on_grid
 
 if TYPE_CHECKING:
     from ..beam.beam import Beam
@@ -19,18 +20,90 @@ MAX_LAGRANGE_DEGREE = 10
 #: Of the height of a layer, how far points beside a jump are from it.
 BESIDE = 1e-9
 
-#: Subdivisions of an element along or across, at most.
-MAX_SUBDIVISION = 1000
+#: Subdivisions of an element along or across, and points of a whole body, at most.
+MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 
-def subdivision(subdivide: Any) -> tuple[int, ...]:
+class Grid(NamedTuple):
+    """One beam or rigid body on points.
+
+    Attributes
+    ----------
+    name : str
+        Its name, or "beam 0", "body 0" and so on.
+    x, u
+        Reference positions of the points, and their displacement, (2, n).
+    kind : str
+        What meshio calls the cells: "quad", "VTK_LAGRANGE_QUADRILATERAL", or "polygon".
+    cells, elements
+        Cells as rows of point numbers, shape (nc, k), and their elements, (nc,).
+    rows : int
+        Points across a section, which follow each other.
+    values
+        The :class:`~skfem_ancf.recovery.fields.Values` of a beam; None of a rigid body.
+    """
+
+    name: str
+    x: Array
+    u: Array
+    kind: str
+    cells: Array
+    elements: Array
+    rows: int
+    values: Values | None
+
+    def points(self, undeformed: bool = False) -> Array:
+        """Positions with a third component of zero, shape (n, 3)."""
+        return in_space(self.x if undeformed else self.x + self.u)
+
+
+def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
+          recover: bool = True) -> list[Grid]:
+    """The :class:`Grid` of each beam and rigid body of a state.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
+    subdivide
+        Quads along and across each element.
+    lagrange
+        One Lagrange cell for each element instead.
+    recover
+        Recovered strain and stress, where the state has them.
+    """
+    require_like("state", state, "State", "beams", "u_of")
+    m, n = subdivision(subdivide)
+    lagrange, recover = require_flag("lagrange", lagrange), require_flag("recover", recover)
+    total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
+    if total > MAX_POINTS and not lagrange:
+        raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")
+    out = []
+    for k, beam in enumerate(state.beams):
+        X, local = lagrange_cell(beam) if lagrange else layout(beam, m, n)
+        values, ne = values_on_grid(state, beam, X, recover), beam.mesh.nelements
+        start = X.shape[-1] * np.arange(ne)
+        out.append(Grid(f"beam {k}" if beam.name is None else beam.name, values.x, values.u,
+                        "VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
+                        (start[:, None, None] + local).reshape(-1, local.shape[1]),
+                        np.repeat(np.arange(ne), len(local)), X.shape[-1] // (m + 1), values))
+    for k, body in enumerate(getattr(state, "bodies", ())):
+        x = body.outline_at(np.zeros(4))
+        out.append(Grid(f"body {k}" if body.name is None else body.name, x,
+                        body.outline_at(state.u_of(body)) - x, "polygon",
+                        np.arange(x.shape[1])[None], np.zeros(1, dtype=int), 1, None))
+    return out
+
+
+def subdivision(subdivide: Any) -> tuple[int, int]:
     """Intervals along and across an element, checked."""
     try:
         m, n = subdivide
     except (TypeError, ValueError):
         m = n = None
     try:
-        return tuple(require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in (m, n))
+        m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in (m, n))
+        return m, n
     except InputError:
         raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
                          f"and across an element, got {shown(subdivide)}") from None

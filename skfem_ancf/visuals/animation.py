@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from ..beam.configuration import Instants
     from ..core.types import Array, StrPath
 
 SUFFIXES = (".gif", ".mp4")
@@ -34,7 +33,7 @@ FRAMES = 100
 LARGEST = 4096
 
 
-def animate(history: Instants, filename: StrPath, field: Any = "eps_yy", *,
+def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
             frames: int | None = None, fps: float | None = None, backend: str | None = None,
             thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,
             limits: Any = None, unit: str | None = None, subdivide: tuple[int, int] = (8, 4),
@@ -152,15 +151,15 @@ def _by_pyvista(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
         if fine > 1:
             plotter.disable_anti_aliasing()
             plotter.render_window.SetDPI(fine * plotter.render_window.GetDPI())
-        mesh = dressed(scenery, plotter, cmap, undeformed, unit)
+        mesh, wall = dressed(scenery, plotter, cmap, undeformed, unit)
         # at a point: text in a corner is fitted to the window in each frame
         clock = plotter.add_text("", position=(0.985, 0.955), viewport=True, font_size=9,
                                  color="#444444")
         clock.GetTextProperty().SetJustificationToRight()
         for k, time in enumerate(t):
             mesh.points = scenery.points(k)
-            if scenery.wall is not None:
-                scenery.wall.copy_from(lines_of(scenery.walls[k]))
+            if wall is not None:
+                wall.copy_from(lines_of(scenery.walls[k]))
             mesh.point_data[scenery.field.name][:] = scenery.values(k)
             clock.SetInput(f"t = {time:.4g}")
             if k == 0:
@@ -195,9 +194,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout="constrained")
     canvas, ax, field = FigureCanvasAgg(figure), figure.add_subplot(), scenery.field
     cells = scenery.cells
-    every = np.concatenate([scenery.points(k, ghost) for k in range(len(t))
-                            for ghost in (False, True)])
-    low, high = every.min(axis=0), every.max(axis=0)
+    low, high = scenery.every.min(axis=0), scenery.every.max(axis=0)
     margin = 0.04 * np.max(high - low)
     if undeformed:
         x = scenery.points(0, True)
@@ -219,10 +216,6 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
     clock = ax.set_title("", loc="right", fontsize=8, color=INK)
     canvas.draw()
     figure.set_layout_engine("none")
-    for artist in (walls, rigid, image, clock):
-        artist.set_animated(True)
-    canvas.draw()
-    background = canvas.copy_from_bbox(figure.bbox)  # all that stays
     for k, time in enumerate(t):
         x = scenery.points(k)
         image._triangulation.x, image._triangulation.y = x[:, 0], x[:, 1]
@@ -230,9 +223,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
         rigid.set_verts(scenery.outlines(k))
         walls.set_segments(scenery.walls[k])
         clock.set_text(f"t = {time:.4g}")
-        canvas.restore_region(background)
-        for artist in (walls, rigid, image, clock):
-            ax.draw_artist(artist)
+        canvas.draw()
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 

@@ -12,14 +12,13 @@ from .matplotlib import figure_class, page, plain, save
 from .scenery import INK, MUTED
 
 if TYPE_CHECKING:
-    from ..beam.configuration import Configuration
     from ..core.types import StrPath
     from ..beam.layout import WhichBeam
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
 
 
-def plot_resultants(state: Configuration, beam: WhichBeam = None, axes: Any = None, *,
+def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *,
                     title: str | None = None, recover: bool = True,
                     filename: StrPath | None = None, dpi: float = 150) -> Any:
     """Draw normal force, shear force and bending moment along the beams.

@@ -105,7 +105,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     filename, dpi = page(ax, title, filename, dpi)
     unit = require_text("unit", unit)
     scenery = Scenery(states, field, thickness, limits, subdivide, recover)
-    drawn, bodies, factor, values = scenery.field, scenery.every, scenery.factor, scenery.found
+    drawn, bodies, factor, values = scenery.field, scenery.beams, scenery.factor, scenery.found
     ghosts = [line for b in scenery.frames[0] if undeformed
               for line in b.outline(b.reference, factor)]
     edges = [line for b in bodies for line in b.outline(b.deformed, factor)]

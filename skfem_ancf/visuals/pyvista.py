@@ -10,19 +10,18 @@ import numpy as np
 
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
                            require_like, require_options, require_path, require_text, shown)
-from ..recovery.fields import FIELDS, find_fields, values_on_grid
+from ..recovery.fields import FIELDS, find_fields
 from ..core.archive import output_file
-from ..recovery.grids import in_space, lagrange_cell, layout, subdivision
+from ..recovery.grids import grids, in_space
 from ..actions.obstacles.pictures import around, outlines
 from .matplotlib import colormap
-from .scenery import RIGID, WALL, Scenery, outline_points
+from .scenery import RIGID, WALL, Scenery
 
 if TYPE_CHECKING:
-    from ..beam.configuration import Configuration, Instants
     from ..core.types import StrPath
 
 #: VTK's numbers of the cells.
-POLYGON, QUAD, LAGRANGE = 7, 9, 70
+CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
 #: Width and height of a picture, least and largest.
 PIXELS = (100, 10000)
@@ -37,10 +36,6 @@ def _pyvista():
     except ImportError:
         raise MissingExtra("pyvista", "view") from None
     return pyvista
-
-
-def _wanted(fields):
-    return (list(FIELDS.values()) if fields is None else find_fields(fields)), fields is None
 
 
 def _normal(field, values):
@@ -80,59 +75,6 @@ def _arrays(values, wanted, lenient):
     return out
 
 
-class _Grid:
-    """The grid of one beam, which takes other states."""
-
-    def __init__(self, beam, subdivide, lagrange):
-        self.beam = beam
-        X, local = lagrange_cell(beam) if lagrange else layout(beam, *subdivide)
-        self.X, ne = X, beam.mesh.nelements
-        start = X.shape[-1] * np.arange(ne)
-        cells = (start[:, None, None] + local).reshape(-1, local.shape[1])
-        self.cells = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
-        self.types = np.full(len(cells), LAGRANGE if lagrange else QUAD, np.uint8)
-        self.elements = np.repeat(np.arange(ne), len(local))
-
-    def points(self, values, undeformed):
-        x = values.x if undeformed else values.x + values.u
-        return in_space(x)
-
-    def make(self, state, wanted, lenient, undeformed, recover):
-        values = values_on_grid(state, self.beam, self.X, recover)
-        made = _pyvista().UnstructuredGrid(self.cells, self.types,
-                                           self.points(values, undeformed))
-        for name, value in _arrays(values, wanted, lenient).items():
-            made.point_data[name] = value
-        made.cell_data["element"] = self.elements
-        return made
-
-    def update(self, made, state, wanted, lenient, undeformed, recover):
-        """Other values in the same arrays."""
-        values = values_on_grid(state, self.beam, self.X, recover)
-        made.points[:] = self.points(values, undeformed)
-        for name, value in _arrays(values, wanted, lenient).items():
-            made.point_data[name][:] = value
-        made.Modified()
-
-
-class _RigidGrid:
-    """The outline of one rigid body, which takes other states."""
-
-    def __init__(self, body):
-        self.beam, n = body, body.outline.shape[1]
-        self.cells, self.types = np.append(n, np.arange(n)), np.array([POLYGON], np.uint8)
-
-    def points(self, state, undeformed):
-        return outline_points(self.beam, np.zeros(4) if undeformed else state.u_of(self.beam))
-
-    def make(self, state, wanted, lenient, undeformed, recover):
-        return _pyvista().UnstructuredGrid(self.cells, self.types, self.points(state, undeformed))
-
-    def update(self, made, state, wanted, lenient, undeformed, recover):
-        made.points[:] = self.points(state, undeformed)
-        made.Modified()
-
-
 class Series:
     """A motion for pyvista: one mesh whose points and fields are those of any instant.
 
@@ -153,13 +95,13 @@ class Series:
         The instant that the mesh shows.
     """
 
-    def __init__(self, history: Instants, **options: Any) -> None:
-        options = require_options("to_pyvista", options, (
+    def __init__(self, history: Any, **options: Any) -> None:
+        self._options = require_options("to_pyvista", options, (
             "fields", "subdivide", "lagrange", "undeformed", "recover"))
         self._history, self.t, self.k = history, history.t, 0
         if not len(history):
             raise InputError("the history has no instants")
-        self.mesh, self._update = _make(history.state(0), **options)
+        self.mesh = to_pyvista(history.state(0), **options)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -170,43 +112,24 @@ class Series:
     def update(self, k: int) -> Any:
         """Put the mesh at instant ``k``, in the arrays that it has; returns the mesh."""
         k = require_index("k", k, len(self))
-        self._update(self._history.state(k))
+        now = to_pyvista(self._history.state(k), **self._options)
+        for block, new in zip(_blocks(self.mesh), _blocks(now)):
+            if isinstance(block, _pyvista().PolyData):  # the outline of an obstacle
+                block.copy_from(new)
+                continue
+            block.points[:] = new.points
+            for name in new.point_data:
+                block.point_data[name][:] = new.point_data[name]
+            block.Modified()
         self.k = k
         return self.mesh
 
 
-def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False, recover=True):
-    pv = _pyvista()
-    require_like("state", state, "State", "beams", "u_of")
-    wanted, lenient = _wanted(fields)
-    subdivide = subdivision(subdivide)
-    lagrange = require_flag("lagrange", lagrange)
-    undeformed = require_flag("undeformed", undeformed)
-    options = wanted, lenient, undeformed, require_flag("recover", recover)
-    grids: list[Any] = [_Grid(beam, subdivide, lagrange) for beam in state.beams]
-    grids += [_RigidGrid(body) for body in getattr(state, "bodies", ())]
-    blocks = [g.make(state, *options) for g in grids]
-    box = around(np.concatenate([np.asarray(block.points)[:, :2] for block in blocks]).T)
-    walls = [lines_of(wall) for wall in outlines(state, box)]
-
-    def update(other):
-        for g, block in zip(grids, blocks):
-            g.update(block, other, *options)
-        for wall, ends in zip(walls, outlines(other, box)):
-            wall.copy_from(lines_of(ends))
-
-    if len(blocks) == 1 and not walls:
-        return blocks[0], update
-    mesh = pv.MultiBlock()
-    for k, (g, block) in enumerate(zip(grids, blocks)):
-        kind = "body" if isinstance(g, _RigidGrid) else "beam"
-        mesh.append(block, name=f"{kind} {k}" if g.beam.name is None else g.beam.name)
-    for k, wall in enumerate(walls):
-        mesh.append(wall, name=f"obstacle {k}")
-    return mesh, update
+def _blocks(mesh):
+    return list(mesh) if isinstance(mesh, _pyvista().MultiBlock) else [mesh]
 
 
-def to_pyvista(state: Configuration, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
+def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Any:
     """The body of a state as a grid of pyvista.
 
@@ -232,7 +155,22 @@ def to_pyvista(state: Configuration, fields: Any = None, subdivide: tuple[int, i
     MissingExtra
         If pyvista is not installed.
     """
-    return _make(state, fields, subdivide, lagrange, undeformed, recover)[0]
+    pv, found = _pyvista(), grids(state, subdivide, lagrange, recover)
+    wanted = list(FIELDS.values()) if fields is None else find_fields(fields)
+    undeformed = require_flag("undeformed", undeformed)
+    mesh = pv.MultiBlock()
+    for grid in found:
+        cells = np.insert(grid.cells, 0, grid.cells.shape[1], axis=1).ravel()
+        types = np.full(len(grid.cells), CELL_TYPES[grid.kind], np.uint8)
+        block = pv.UnstructuredGrid(cells, types, grid.points(undeformed))
+        if grid.values is not None:
+            block.point_data.update(_arrays(grid.values, wanted, fields is None))
+            block.cell_data["element"] = grid.elements
+        mesh.append(block, name=grid.name)
+    box = around(np.concatenate([grid.points(undeformed)[:, :2] for grid in found]).T)
+    for k, wall in enumerate(outlines(state, box)):
+        mesh.append(lines_of(wall), name=f"obstacle {k}")
+    return mesh if len(mesh) > 1 else mesh[0]
 
 
 def has_display() -> bool:
@@ -242,8 +180,9 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def dressed(scenery: Scenery, plotter: Any, cmap: Any, undeformed: bool, unit: str | None) -> Any:
-    """Put frame 0 into a plotter, seen from the front; returns its mesh.
+def dressed(scenery: Scenery, plotter: Any, cmap: Any, undeformed: bool,
+            unit: str | None) -> tuple[Any, Any]:
+    """Put frame 0 into a plotter, seen from the front; returns the meshes of bodies and obstacles.
 
     Parameters
     ----------
@@ -256,24 +195,28 @@ def dressed(scenery: Scenery, plotter: Any, cmap: Any, undeformed: bool, unit: s
     if undeformed:
         ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
         plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
-    mesh = pv.PolyData(scenery.points(0), faces)
+    mesh, wall = pv.PolyData(scenery.points(0), faces), None
     mesh.point_data[field.name] = scenery.values(0)
     unit = scenery.unit(unit)
     plotter.add_mesh(
         mesh, scalars=field.name, clim=(scenery.low, scenery.high), lighting=False,
         cmap=scenery.colours(cmap), nan_color=RIGID,
         scalar_bar_args=dict(title=f"{field.name} ({unit})\n" if unit else f"{field.name}\n",
-                             color="black",
-                             vertical=False, title_font_size=18, label_font_size=14, n_labels=5,
-                             position_x=0.2, width=0.6, height=0.09, fmt="%.3g"))
+                             color="black", vertical=False, title_font_size=18,
+                             label_font_size=14, n_labels=5, position_x=0.2, width=0.6,
+                             height=0.09, fmt="%.3g"))
     if len(scenery.walls[0]):
-        scenery.wall = lines_of(scenery.walls[0])
-        plotter.add_mesh(scenery.wall, color=WALL, line_width=2, lighting=False)
+        wall = lines_of(scenery.walls[0])
+        plotter.add_mesh(wall, color=WALL, line_width=2, lighting=False)
     if scenery.note:
         plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
     plotter.set_background("white")
-    _look(plotter, scenery)
-    return mesh
+    plotter.enable_parallel_projection()
+    low, high = scenery.every.min(axis=0), scenery.every.max(axis=0)
+    width, height = plotter.window_size
+    low[1] -= 0.25 * max(high[1] - low[1], (high[0] - low[0]) * height / width)  # the colour bar
+    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
+    return mesh, wall
 
 
 def lines_of(walls: Any) -> Any:
@@ -285,23 +228,11 @@ def lines_of(walls: Any) -> Any:
         Their ends, shape (n, 2, 2).
     """
     ends = in_space(walls.reshape(-1, 2).T)
-    pieces = np.arange(len(ends)).reshape(-1, 2)
-    return _pyvista().PolyData(ends, lines=np.column_stack(
-        [np.full(len(pieces), 2), pieces]).ravel())
+    return _pyvista().PolyData(ends, lines=np.insert(
+        np.arange(len(ends)).reshape(-1, 2), 0, 2, axis=1).ravel())
 
 
-def _look(plotter, scenery):
-    """From the front, without perspective, at all frames."""
-    plotter.enable_parallel_projection()
-    every = np.concatenate([scenery.points(k, undeformed) for k in range(len(scenery.frames))
-                            for undeformed in (False, True)])
-    low, high = every.min(axis=0), every.max(axis=0)
-    width, height = plotter.window_size
-    low[1] -= 0.25 * max(high[1] - low[1], (high[0] - low[0]) * height / width)  # the colour bar
-    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
-
-
-def view(state: Configuration, field: Any = "eps_yy", plotter: Any = None, *,
+def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
          thickness: Any = "auto", undeformed: bool = True, cmap: Any = None, limits: Any = None,
          unit: str | None = None,
          subdivide: tuple[int, int] = (16, 8), recover: bool = True,

@@ -2,58 +2,49 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..beam import kinematics
-from ..core.errors import (InputError, require_finite_scalar, require_flag, require_positive,
-                           shown, require_unmasked)
+from ..core.errors import (InputError, require_finite_scalar, require_positive, shown,
+                           require_unmasked)
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
-from ..recovery.grids import in_space, layout, subdivision
-from ..core.linear import first_order
-from ..core.kept import cached_property
-from ..actions.obstacles.pictures import around, obstacles_of, outlines
+from ..recovery.grids import grids, in_space
+from ..actions.obstacles.pictures import around, outlines
 
 if TYPE_CHECKING:
-    from ..beam.configuration import Configuration
-    from ..beam.rigid import RigidBody
+    from ..recovery.grids import Grid
     from ..core.types import Array
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
 
-#: Colours of lines, of what is less important, of the stress-free body, of bodies and obstacles.
+#: Colours of lines, of what is less important, of the reference configuration, of bodies and
+#: obstacles.
 INK, MUTED, GHOST, RIGID, WALL = "#222222", "#666666", "#d9d9d9", "#bbbbbb", "#7a5230"
 
 
 class _Body:
-    """One beam on a grid: the deformed and the stress-free place of each point, and the field."""
+    """One beam: reference and deformed place of the points and the axis, and the field."""
 
-    def __init__(self, state, beam, field, m, n, recover):
-        X, quads = layout(beam, m, n)
-        values, rows = values_on_grid(state, beam, X, recover), X.shape[-1] // (m + 1)
-        self.rows, self.height = rows, beam.mesh.height
-        self.shape = (2, beam.mesh.nelements, m + 1, rows)
-        #: Quads as rows of points, shape (nc, 4).
-        self.cells = (np.arange(0, values.n, X.shape[-1])[:, None, None] + quads).reshape(-1, 4)
-        # the axis is at eta = 1/2, which is on the grid only if n is even
-        ends = np.array([np.linspace(0, 1, m + 1), np.full(m + 1, 0.5)])
-        flat = self.shape[:2] + (-1,)
-        x, axis = values.x.reshape(flat), beam.mesh.mapping().F(ends)
-        u = values.u.reshape(flat)
-        axis_u = first_order(kinematics.displacements(
-            beam, getattr(state, "_places_of", state.u_of)(beam), ends, None))
-        self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
-        self.values = field.of(values)
+    def __init__(self, grid, state, beam, m, field):
+        self.cells, self.height = grid.cells, beam.mesh.height
+        # the axis is at eta = 1/2, which is on the grid only if it has an odd number of rows
+        axis = values_on_grid(state, beam, np.array([np.linspace(0, 1, m + 1),
+                                                     np.full(m + 1, 0.5)]), False)
+        flat = (2, beam.mesh.nelements, m + 1)
+        x, u = (y.reshape(*flat, grid.rows) for y in (grid.x, grid.u))
+        axis_x, axis_u = (y.reshape(flat) for y in (axis.x, axis.u))
+        self.reference, self.deformed = (x, axis_x), (x + u, axis_x + axis_u)
+        self.values = field.of(grid.values)
         if field.components > 1:
             self.values = np.sqrt(np.sum(self.values**2, axis=0))
 
     def points(self, body, factor):
         """Positions (2, nelements, m + 1, rows) with the section drawn ``factor`` thicker."""
         x, axis = body
-        axis = axis[..., None]
-        return axis + factor * (x.reshape(self.shape) - axis)
+        return axis[..., None] + factor * (x - axis[..., None])
 
     def outline(self, body, factor):
         """Closed lines around each unbroken run of elements, shape (points, 2)."""
@@ -62,7 +53,7 @@ class _Body:
                           > 1e-6 * self.height)[0] + 1
         out = []
         for part in np.split(np.arange(x.shape[1]), cuts):
-            run = x[:, part].reshape(2, -1, self.rows)
+            run = x[:, part].reshape(2, -1, x.shape[-1])
             out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
                                   run[:, 0, -2:0:-1]]).T)
         return out
@@ -73,13 +64,13 @@ def _thickness(thickness, bodies):
         return require_positive("thickness", thickness)
     if not bodies:
         return 1.0
-    shapes = [(b, p) for b in bodies for p in (b.reference, b.deformed)]
-    x = np.concatenate([axis.reshape(2, -1) for _, (_, axis) in shapes], axis=1)
-    factor = round(READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies))
-    for body, (x, axis) in shapes:  # both faces keep a third of the advance of the axis
+    shapes = [shape for b in bodies for shape in (b.reference, b.deformed)]
+    every = np.concatenate([axis.reshape(2, -1) for _, axis in shapes], axis=1)
+    factor = round(READABLE * np.max(np.ptp(every, axis=1)) / max(b.height for b in bodies))
+    for x, axis in shapes:  # both faces keep a third of the advance of the axis
         step = np.diff(axis, axis=-1)
         for face in (0, -1):
-            offset = np.diff(x.reshape(body.shape)[..., face] - axis, axis=-1)
+            offset = np.diff(x[..., face] - axis, axis=-1)
             turn = -np.sum(offset * step, axis=0) / np.sum(step**2, axis=0)
             factor = min(factor, (2 / 3) // max(np.max(turn), 1e-300))
     return float(max(1, factor))
@@ -110,73 +101,75 @@ class Scenery:
         States of the same beams.
     field, thickness, limits, subdivide, recover
         Those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
+
+    Attributes
+    ----------
+    beams
+        Those of all frames.
+    rigid
+        For each frame the grids of its rigid bodies.
+    found
+        Values of all beams, shape (n,).
+    factor, low, high
+        Of the thickness; the range of the colours.
     """
 
-    def __init__(self, states: list[Configuration], field: Any, thickness: Any, limits: Any,
+    def __init__(self, states: list[Any], field: Any, thickness: Any, limits: Any,
                  subdivide: tuple[int, int], recover: bool) -> None:
         self.field: Field = find_field(field, DRAWN)
-        m, n = subdivision(subdivide)
-        recover = require_flag("recover", recover)
-        self.states, self.wall = states, None
-        self.frames = [[_Body(state, beam, self.field, m, n, recover) for beam in state.beams]
-                       for state in states]
-        self.rigid = [[(body, state.u_of(body)) for body in getattr(state, "bodies", ())]
-                      for state in states]
-        #: The beams of all frames.
-        self.every = [body for frame in self.frames for body in frame]
-        self.factor = _thickness(thickness, self.every)
-        #: Their values, shape (n,).
-        self.found = np.concatenate([np.zeros(0), *(b.values.ravel() for b in self.every)])
+        self.frames: list[list[_Body]] = []
+        self.rigid: list[list[Grid]] = []
+        for state in states:
+            found = grids(state, subdivide, recover=recover)
+            self.frames.append([_Body(grid, state, beam, subdivide[0], self.field)
+                                for grid, beam in zip(found, state.beams)])
+            self.rigid.append(found[len(state.beams):])
+        self.beams = [body for frame in self.frames for body in frame]
+        self.factor = _thickness(thickness, self.beams)
+        self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
         self.low, self.high = _limits(limits, self.found, self.field)
+        self._states = states
+
+    @cached_property
+    def every(self) -> Array:
+        """Points of all frames, deformed and not, shape (n, 3)."""
+        return np.concatenate([self.points(k, undeformed) for k in range(len(self.frames))
+                               for undeformed in (False, True)])
 
     @cached_property
     def walls(self) -> list[Any]:
         """The outlines of obstacles in each frame, shapes (n, 2, 2)."""
-        none, states = np.zeros((0, 2, 2)), self.states
-        if not obstacles_of(states[0]):
-            return [none] * len(states)
-        every = [self.points(k, ghost)[:, :2] for k in range(len(states))
-                 for ghost in (False, True)]
-        box = around(np.concatenate(every).T)
-        return [np.concatenate([none, *outlines(state, box)]) for state in states]
+        box = around(self.every[:, :2].T)
+        return [np.concatenate([np.zeros((0, 2, 2)), *outlines(state, box)])
+                for state in self._states]
 
-    def points(self, k: int, undeformed: bool = False) -> Any:
-        """Points of a frame, shape (n, 3).
+    def points(self, k: int, undeformed: bool = False) -> Array:
+        """Points of frame ``k``, shape (n, 3), deformed or not."""
+        return np.concatenate([np.zeros((0, 3)), *(
+            in_space(b.points(b.reference if undeformed else b.deformed, self.factor))
+            for b in self.frames[k]), *(g.points(undeformed) for g in self.rigid[k])])
 
-        Parameters
-        ----------
-        k
-            The frame.
-        undeformed
-            Those of the stress-free body.
-        """
-        x = np.concatenate([np.zeros((2, 0)), *(
-            b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
-            for b in self.frames[k])], axis=1)
-        return np.concatenate([in_space(x), *(
-            outline_points(body, 0.0 * u if undeformed else u) for body, u in self.rigid[k])])
-
-    def values(self, k: int) -> Any:
+    def values(self, k: int) -> Array:
         """Values of frame ``k``, shape (n,); NaN on rigid bodies."""
-        return np.concatenate([b.values.ravel() for b in self.frames[k]] + [
-            np.full(body.outline.shape[1], np.nan) for body, _ in self.rigid[k]])
+        return np.concatenate([b.values for b in self.frames[k]] + [
+            np.full(g.x.shape[1], np.nan) for g in self.rigid[k]])
 
-    def outlines(self, k: int) -> list[Any]:
+    def outlines(self, k: int) -> list[Array]:
         """Corners of the rigid bodies of frame ``k``, shapes (n, 2)."""
-        return [body.outline_at(u).T for body, u in self.rigid[k]]
+        return [(g.x + g.u).T for g in self.rigid[k]]
 
     @property
-    def cells(self) -> Any:
+    def cells(self) -> Array:
         """Quads of the beams of a frame as rows of points, shape (nc, 4)."""
         return cells_of(self.frames[0])
 
     @property
-    def faces(self) -> Any:
+    def faces(self) -> Array:
         """Quads, and outlines of rigid bodies: the number of corners and the points of each."""
         cells, at = self.cells, sum(b.values.size for b in self.frames[0])
         parts = [np.hstack([np.full((len(cells), 1), 4), cells]).ravel()]
-        for body, _ in self.rigid[0]:
-            corners = body.outline.shape[1]
+        for grid in self.rigid[0]:
+            corners = grid.x.shape[1]
             parts.append(np.append(corners, at + np.arange(corners)))
             at += corners
         return np.concatenate(parts)
@@ -201,16 +194,3 @@ def cells_of(bodies: list[Any]) -> Array:
     first = np.cumsum([0] + [b.values.size for b in bodies])
     return np.concatenate([np.zeros((0, 4), dtype=int), *(
         f + b.cells for f, b in zip(first, bodies))])
-
-
-def outline_points(body: RigidBody, u: Array) -> Array:
-    """The corners of a rigid body's outline, shape (n, 3).
-
-    Parameters
-    ----------
-    body
-        A :class:`~skfem_ancf.RigidBody`.
-    u
-        Displacement of its coordinates, shape (4,).
-    """
-    return in_space(body.outline_at(u))

@@ -10,7 +10,6 @@ import numpy as np
 from ...core.errors import InputError, require_index
 
 if TYPE_CHECKING:
-    from ...beam.configuration import Configuration
     from ...core.types import Array
 
 
@@ -56,7 +55,7 @@ class Contact:
                 f"{self.nearest:.3g}>")
 
 
-def contact_of(state: Configuration, obstacle: Any = None) -> Contact:
+def contact_of(state: Any, obstacle: Any = None) -> Contact:
     """The Contact of a state.
 
     Parameters
