@@ -82,7 +82,7 @@ TAKES = {
     "facets": {k: "the number of a facet" for k in ("0",)},
     "elements": {"0": "no refinement, or the first element", "[]": "no element",
                  "[True, False]": "a mask"},
-    "coordinates": {"[]": "no coordinate"},
+    "coordinates": {"[]": "no degree of freedom"},
     "fields": {"[]": "no field"},
     "function": {"float class": "a function of a number"},
     "drawn": {"[]": "none"},
@@ -99,7 +99,7 @@ _OPTIONAL = {"None": "the default"}
 WORDS = {
     "doflocs": "nodes", "diffs": "shift", "x": "points|nodes", "y": "points", "s": "nodes",
     "test": "function", "data": "dictionary", "thing": "Load or a Joint",
-    "k": "number of modes|index", "cmap": "colour map", "names": "coordinate",
+    "k": "number of modes|index", "cmap": "colour map", "names": "degree of freedom",
     "form": "[Ff]orm|load",
     "times_or_ix": "refinements|elements|subdomain|function", "tind": "elements|subdomain|function",
     "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet|beam|node",

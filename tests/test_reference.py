@@ -14,7 +14,7 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
            "formulations", "io", "materials", "mesh", "results", "scene", "sections", "solvers",
            "sweeps"]
 #: Returned by public methods, and machinery all the same.
-MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "System", "Spread",
+MACHINERY = {"BandMatrix", "Finder", "Inertia", "Masses", "Points", "Recovery", "System", "Spread",
              "Interpolation", "BeamLayer", "LayerPoints",
              "Law", "Amplitude", "BodyFields", "Link", "Part",
              "StabilisedMode", "Sampling", "Rule", "Point", "Critical", "Vector"}

@@ -21,7 +21,7 @@ from skfem_ancf.elements import base
 from skfem_ancf.equations.tables import _NO_JOINTS, Tables
 from skfem_ancf.core.errors import CallbackError, ModelWarning
 from skfem_ancf.mesh.location import Finder
-from skfem_ancf.beam.inertia import points_along
+from skfem_ancf.beam.masses import points_along
 from skfem_ancf.actions.joints import OnLine
 from skfem_ancf.actions.joints.base import Joint
 from skfem_ancf.beam.kernels import section
@@ -129,7 +129,7 @@ def test_equal_elements_have_the_forces_of_elements_one_by_one(monkeypatch, elem
 def test_weights_are_the_integrals_of_the_functions(element):
     beam = cantilever(element, 3, 1.7, 0.3, angle=0.4).beams[0]
     found, g = beam.weight((2.0, -3.0)), np.array([2.0, -3.0])
-    load = np.broadcast_to(beam.inertia.weights(g), (3, 2 * element.nodal_dofs, 2))
+    load = np.broadcast_to(beam.masses.weights(g), (3, 2 * element.nodal_dofs, 2))
     assert np.allclose(found, beam.kernel.scatter(load), rtol=1e-12,
                        atol=1e-13 * np.max(np.abs(found)))
     total = found.reshape(-1, element.nodal_dofs, 2)[:, 0].sum(axis=0)  # on the positions
@@ -141,7 +141,7 @@ def test_weights_are_the_integrals_of_the_functions(element):
 def test_masses_of_equal_elements_are_integrals_of_products(monkeypatch, element):
     mesh = MeshBeam.init_line(np.linspace(0.0, 2.0, 4), height=0.3)
     beam = Beam(mesh, element, StVenantKirchhoff(2e9, 0.3, 7800.0), width=0.02)
-    one, = beam.inertia.matrices(slice(None))
+    one, = beam.masses.matrices(slice(None))
     maps = counted(monkeypatch, MeshBeam, "mapping")
     found = beam.mass_elements(slice(1, 3))
     assert found.shape == (2, *one.shape) and not maps
@@ -576,7 +576,7 @@ def test_masses_of_a_tapered_cable_ask_the_map_once(monkeypatch):
                                np.linspace(0, 1, 4), lambda s: 0.12 - 0.04 * s)
     beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e7, 0.3, 7800.0), 0.01)
     asked = counted(monkeypatch, MappingBeam, "_derivatives")
-    inertia = beam.inertia
+    inertia = beam.masses
     assert len(asked) == 1
     X = np.array([points_along(beam) * [0.0], points_along(beam) * [0.5]])
     X[0] = gauss(X.shape[1])[0]

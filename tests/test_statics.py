@@ -569,8 +569,8 @@ def _scene():
 @pytest.mark.parametrize("call, error, message", [
     (lambda s: s.clamp("lefft"), NameUnknown, "boundary 'lefft'; known: .*'left', 'right'"),
     (lambda s: s.moment("end", 1.0), NameUnknown, "boundary 'end'; known"),
-    (lambda s: s.fix("left", "r_Z"), NameUnknown, r"coordinate 'r_Z'; known: 'r\^1', .*'r_Y1\^2'"),
-    (lambda s: s.fix("left", ["r", "r_Y2"]), NameUnknown, "coordinate 'r_Y2'; known"),
+    (lambda s: s.fix("left", "r_Z"), NameUnknown, r"of freedom 'r_Z'; known: 'r\^1', .*'r_Y1\^2'"),
+    (lambda s: s.fix("left", ["r", "r_Y2"]), NameUnknown, "degree of freedom 'r_Y2'; known"),
     (lambda s: s.gravity(GRAVITY, beam="arm"), NameUnknown, "beam 'arm'; known: 0"),
     (lambda s: s.solve_static(method="arc"), NameUnknown, "method 'arc'; known: 'mixed', 'newton'"),
     (lambda s: s.fix("left", "r^1", displacement=1.0), SupportError, "node 0 is fixed twice"),

@@ -22,7 +22,7 @@ from ..mesh.mesh_beam import MeshBeam, reach
 from ..mesh.places import facets_of
 from ..sections import Across, Rectangle, Section
 from . import kinematics
-from .inertia import exact_rule, inertia_of
+from .masses import exact_rule, masses_of
 from .interpolation import probe
 from .strains import BeamLayer, Interpolation, on_grid, strain_at, stress_at
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
     from ..formulations.base import Formulation, Term
-    from .inertia import Inertia
+    from .masses import Masses
     from ..core.types import Array, Place
 
 
@@ -406,24 +406,24 @@ class Beam(Immutable):
     @property
     def total_mass(self) -> float:
         """Mass of the beam."""
-        mass = float(np.sum(self.inertia.mass))
+        mass = float(np.sum(self.masses.mass))
         return mass * (self.mesh.nelements if self.across.uniform else 1)
 
     @cached_property
-    def inertia(self) -> Inertia:
-        """Local functions and masses at points, :class:`~skfem_ancf.beam.inertia.Inertia`."""
-        return inertia_of(self)
+    def masses(self) -> Masses:
+        """Local functions and masses at points, :class:`~skfem_ancf.beam.masses.Masses`."""
+        return masses_of(self)
 
     def mass_elements(self, elements: slice = slice(None)) -> Array:
         """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
         if not self.across.uniform:
-            return self.inertia.matrices(elements)
+            return self.masses.matrices(elements)
         n = len(range(*elements.indices(self.mesh.nelements)))
-        return np.repeat(self.inertia.matrices(slice(None)), n, axis=0)
+        return np.repeat(self.masses.matrices(slice(None)), n, axis=0)
 
     def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
-        load = self.inertia.weights(require_finite("g", g, (2,)))
+        load = self.masses.weights(require_finite("g", g, (2,)))
         return self.kernel.scatter(np.broadcast_to(
             load, (self.mesh.nelements,) + load.shape[1:]).copy())
 

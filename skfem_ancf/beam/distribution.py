@@ -1,4 +1,4 @@
-"""Where forces act on a beam: spread over its body and faces, or on sections and points."""
+"""Where forces act on a beam: distributed over its body and faces, or on sections and points."""
 
 from __future__ import annotations
 
@@ -112,19 +112,19 @@ def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float,
 
 @dataclass(frozen=True)
 class Spread:
-    """How a load is spread over a beam.
+    """How a load is distributed over a beam.
 
     Attributes
     ----------
     body
-        Force per volume of the stress-free body, shape (2,), or None.
+        Force per volume of the reference configuration, shape (2,), or None.
     gravity
         Force per mass, shape (2,), or None.
     faces
         For the bottom and the top the elements whose faces are loaded, two arrays (nelements,) of
         truth values, or None.
     traction
-        Force per stress-free area of the faces, (2,), or a function of the points x (2, ...).
+        Force per undeformed area of the faces, (2,), or a function of the points x (2, ...).
     pressure
         Force per deformed area, normal to the faces, or None.
     stations
@@ -147,7 +147,7 @@ class Spread:
 
     @property
     def acts_at_stations(self) -> bool:
-        """True if it is nowhere spread."""
+        """True if it is nowhere distributed."""
         return not self.sampled and all(
             x is None for x in (self.faces, self.body, self.gravity, self.eigen))
 

@@ -28,7 +28,7 @@ class BeamPoints:
     ----------
     beam, number
         The beam and its number.
-    coordinates : slice
+    slice : slice
         Its degrees of freedom in the scene.
     index
         Which of the points asked for they are, (n,), or None for all.
@@ -36,9 +36,9 @@ class BeamPoints:
         Elements (n,) and reference points (2, n).
     """
 
-    def __init__(self, beam: Any, number: int, coordinates: slice, index: Array | None,
+    def __init__(self, beam: Any, number: int, dofs: slice, index: Array | None,
                  e: Array, X: Array) -> None:
-        self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
+        self.beam, self.number, self.slice, self.index = beam, number, dofs, index
         self.n, self.e, self.X = len(e), e, X
 
     @cached_property
@@ -59,7 +59,7 @@ class BeamPoints:
     @cached_property
     def dofs(self) -> Array:
         """Degrees of freedom of the scene that move each point, (nb, 2, n)."""
-        first = self.coordinates.start + self.beam.mesh.t[0, self.e] * self.beam.nd
+        first = self.slice.start + self.beam.mesh.t[0, self.e] * self.beam.nd
         return first + np.arange(2 * self.beam.nd).reshape(-1, 2, 1)
 
     @cached_property
@@ -100,7 +100,7 @@ class BeamPoints:
 
     def _tangents(self, u):
         """Derivatives of the axis by xi before and after a displacement, (..., 2, n)."""
-        start, q0 = self.coordinates.start, self.beam.q0_local
+        start, q0 = self.slice.start, self.beam.q0_local
         before = sum(w * q0[d - start] for w, d in zip(self.slopes, self.dofs))
         return before, before + self.combine(self.slopes, u)
 
@@ -110,11 +110,11 @@ class BeamPoints:
 
     def strain(self, u: Array) -> Array:
         """The strain of the elements, see :func:`~.strains.strain_at`, for ``u`` of the scene."""
-        return strain_at(self.beam, u[self.coordinates], self.e, self.X)
+        return strain_at(self.beam, u[self.slice], self.e, self.X)
 
     def stress(self, u: Array) -> Array:
         """The stress of the elements, see :func:`~.strains.stress_at`, for ``u`` of the scene."""
-        return stress_at(self.beam, u[self.coordinates], self.e, self.X)
+        return stress_at(self.beam, u[self.slice], self.e, self.X)
 
 
 def _length(a):
@@ -165,14 +165,14 @@ class BodyPoints:
 
     off_axis = False  # its points move linearly in its degrees of freedom
 
-    def __init__(self, body: RigidBody, coordinates: slice, index: Array | None,
+    def __init__(self, body: RigidBody, dofs: slice, index: Array | None,
                  start: Array) -> None:
-        self.body, self.coordinates, self.index, self.start = body, coordinates, index, start
+        self.body, self.slice, self.index, self.start = body, dofs, index, start
         self._frame = body.local(start)
 
     def displacement(self, u: Array) -> Array:
         """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
-        x, y, c, s = np.moveaxis(u[..., self.coordinates, None], -2, 0)
+        x, y, c, s = np.moveaxis(u[..., self.slice, None], -2, 0)
         a, b = self._frame
         return np.stack([x + a * c - b * s, y + a * s + b * c], axis=-2)
 

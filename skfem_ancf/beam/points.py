@@ -1,7 +1,7 @@
-"""Material points: where many of them are in the beams, and what their coordinates weigh there.
+"""Material points: in which element of which beam they are.
 
-A point is named by its place (x, y) in the stress-free body. One is a tuple, a list or an array of
-two numbers; many are an array of shape (2, n), as scikit-fem has them, or a list of points.
+A point is named by its place (x, y) in the reference configuration. One is a tuple, a list or an
+array of two numbers; many are an array of shape (2, n), as in scikit-fem, or a list of points.
 """
 
 from __future__ import annotations
@@ -178,9 +178,9 @@ class Points:
         x = as_points(body.position if points is None else points)
         start = np.reshape(x, (2, -1))
         return Located(x.ndim == 1, start.shape[1],
-                       [BodyPoints(body, self._coordinates(body), None, start)])
+                       [BodyPoints(body, self._slice_of(body), None, start)])
 
-    def _coordinates(self, body):
+    def _slice_of(self, body):
         return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
 
     def _in_one(self, x, beam, chain, ask):
@@ -224,7 +224,7 @@ class Points:
         for body in self.bodies:
             on = body.contains(x[:, left])
             if np.any(on):
-                parts.append(BodyPoints(body, self._coordinates(body), left[on], x[:, left[on]]))
+                parts.append(BodyPoints(body, self._slice_of(body), left[on], x[:, left[on]]))
                 left = left[~on]
         if len(left):
             p = (float(c) for c in x[:, left[0]])

@@ -1,4 +1,4 @@
-"""A planar rigid body, by coordinates in which its points are linear and its mass is constant."""
+"""A planar rigid body."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
     from ..core.types import Array
 
-#: Components of the coordinates: the position of the centre of mass, and the director.
+#: Components of the degrees of freedom: the position of the centre of mass, and the director.
 NAMES = ("r^1", "r^2", "d^1", "d^2")
 
 
 class RigidBody(Immutable):
     """A rigid body in the plane. It does not change; :meth:`replace` returns a changed copy.
 
-    Its coordinates are the position r of the centre of mass and a unit vector d that turns with it.
-    The point that has the coordinates (a, b) in its own frame is at ``r + a d + b d'``, d' the
-    vector d turned by a right angle, and the kinetic energy is ``mass r.^2 / 2 + inertia d.^2 / 2``
-    with the rates r. and d.: so points are linear in the coordinates, the mass matrix is constant,
-    and ``d . d = 1`` is the only condition, held by a multiplier.
+    Its degrees of freedom are the position r of the centre of mass and a unit vector d that turns
+    with it. The point (a, b) of its own frame is at ``r + a d + b d'``, d' the vector d turned by
+    a right angle, and the kinetic energy is ``mass r.^2 / 2 + inertia d.^2 / 2`` with the rates r.
+    and d.: points are linear in them, the mass matrix is constant, and ``d . d = 1`` is the only
+    constraint, with a multiplier.
 
     A material point is named by its place (x, y) in the state of the start, as of a beam. One may
     lie outside of the outline.
@@ -125,7 +125,7 @@ class RigidBody(Immutable):
 
     @property
     def dofnames(self) -> list[str]:
-        """Names of the coordinates."""
+        """Names of the degrees of freedom."""
         return list(NAMES)
 
     @property

@@ -85,7 +85,7 @@ def fingerprint(system: System) -> dict[str, str]:
                 pack.weights, getattr(pack, "stiffness", None), getattr(pack, "moduli", None))),
             *(x for layer in beam.across.layers for x in (
                 type(layer.material).__name__, *_numbers(layer.material))),
-            *(beam.inertia[1::2] if all(layer.density is not None for layer in beam.across.layers)
+            *(beam.masses[1::2] if all(layer.density is not None for layer in beam.across.layers)
               else ())))
         parts[f"damping {who}"] = _digest(beam.damping)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))

@@ -54,7 +54,7 @@ class ElementBeamANCF(ElementBeam):
         Degree N >= 1 of the section.
     points
         Where the section slopes sit: "chebyshev" (both faces and the zeros of T_{N-2}),
-        "gauss-lobatto" or "equispaced". The space is the same, only the coordinates differ.
+        "gauss-lobatto" or "equispaced". The space is the same, only the degrees of freedom differ.
 
     Raises
     ------
@@ -88,6 +88,6 @@ class ElementBeamANCF(ElementBeam):
         super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
-        """Names of the section coordinates of a node, and what they are."""
+        """Names of the degrees of freedom of the section at a node, and what they are."""
         return ([f"r_Y{k}" for k in range(len(self.section_points))],
                 [(float(y), 0, 1) for y in self.section_points])

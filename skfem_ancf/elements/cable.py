@@ -29,7 +29,7 @@ class ElementBeamCable(ElementBeam):
     Parameters
     ----------
     degree
-        Degree of the axis along X: 3 (coordinates ``r``, ``r_X``), 5 (``r_XX`` too; the one for
+        Degree of the axis along X: 3 (``r``, ``r_X``), 5 (``r_XX`` too; the one for
         frames and loads at points), 7, ... 15 (derivatives up to the (degree - 1) / 2-th). One or
         two elements of degree 9 and more replace many where the loads are smooth.
 
@@ -69,7 +69,7 @@ class ElementBeamCable(ElementBeam):
 
     @property
     def strain_degree(self) -> int:
-        # |r_X| and the curvature are no polynomials: as many points as coordinates of both nodes
+        # |r_X| and the curvature are no polynomials: a point for each Hermite function
         return self.axis_degree
 
     @property

@@ -10,11 +10,11 @@ from .base import DEGREES, require_degree
 class ElementBeamANCFHermite(ElementBeamANCF):
     """As :class:`ElementBeamANCF`, with Hermite functions of a degree along X for axis and section.
 
-    The coordinates of a node are ``r`` and the section slopes ``r_Y0`` ..., with their derivatives
-    along the axis up to the (degree - 1) / 2-th: of degree 5 ``r``, ``r_X``, ``r_XX``, ``r_Y0``
-    ..., ``r_XY0`` ..., ``r_XXY0`` .... The position is the full product of polynomials of that
-    degree in X and of degree N in Y. One or two elements of degree 9 and more replace many cubic
-    ones where loads and section are smooth; where the shear force jumps, end the element.
+    The degrees of freedom of a node are ``r`` and the section slopes ``r_Y0`` ..., with their
+    derivatives along the axis up to the (degree - 1) / 2-th: of degree 5 ``r``, ``r_X``, ``r_XX``,
+    ``r_Y0`` ..., ``r_XY0`` ..., ``r_XXY0`` .... The position is the full product of polynomials of
+    that degree in X and of degree N in Y. One or two elements of degree 9 and more replace many
+    cubic ones where loads and section are smooth; where the shear force jumps, end the element.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from .base import ElementBeam, SectionFunctions
 class ElementBeamPatelShabana(ElementBeam):
     """Beam element with ``r``, ``r_X``, ``r_Y`` and the second derivative ``r_YY`` on the axis.
 
-    Its space is that of :class:`ElementBeamANCF` of order 2, with other coordinates.
+    Its space is that of :class:`ElementBeamANCF` of order 2, with other degrees of freedom.
 
     References
     ----------

@@ -1,7 +1,7 @@
 """The weak forms of a planar body: energy, internal force, tangent, mass, loads.
 
 Each factory returns a scikit-fem form for stock ``asm`` on a stock ``Basis`` of the position
-field, with the coordinates passed as ``r``:
+field, with the degrees of freedom passed as ``r``:
 
 >>> import numpy as np
 >>> from skfem import Basis, ElementVector, asm

@@ -334,8 +334,8 @@ def traction(t: ArrayLike | Callable[[Array], Array], width: float | Array = 1.0
     Parameters
     ----------
     t
-        Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
-        that returns (2, ...).
+        Force per undeformed area, shape (2,), or a function of the points x (2, ...) that returns
+        (2, ...).
     width
         Width of the section, positive, or widths at the points of the basis, shape (nfacets,
         npoints).
@@ -356,7 +356,7 @@ def pressure(width: float | Array = 1.0) -> BilinearForm:
     """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
 
     On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
-    -90 degrees. The matrix times the coordinates is the force.
+    -90 degrees. The matrix times the degrees of freedom is the force.
 
     Parameters
     ----------
@@ -433,7 +433,7 @@ class _Own:
                          "asm(form, basis, r=q)")
 
     def _displacement(self, basis, r=None, idx=None, **other):
-        """Coordinates' displacement, and the elements of the basis; ``idx`` is scikit-fem's."""
+        """The displacement, and the elements of the basis; ``idx`` is scikit-fem's."""
         mesh, element = self.beam.mesh, self.beam.element
         other_element = getattr(basis.elem, "elem", None)
         same = (isinstance(basis, CellBasis) and basis.N == self.beam.N
@@ -445,8 +445,8 @@ class _Own:
             raise InputError(f"this is a form of {self.beam!r}: assemble it on "
                              f"Basis(beam.mesh, ElementVector(beam.element)), not on {basis!r}")
         if other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,):
-            raise InputError(f"pass the coordinates as r=q, a vector of {basis.N} numbers, and "
-                             f"nothing else; got r of shape {np.shape(r)}"
+            raise InputError(f"pass the degrees of freedom as r=q, a vector of {basis.N} numbers, "
+                             f"and nothing else; got r of shape {np.shape(r)}"
                              + (f" and {sorted(other)}" if other else ""))
         u = np.asarray(r, dtype=np.float64) - self.beam.q0
         return u, slice(None) if basis.tind is None else basis.tind

@@ -204,7 +204,7 @@ class Values(Mapping):
     @property
     def _stress(self):
         """That of the elements."""
-        part, u = self._part, self._u[self._part.coordinates]
+        part, u = self._part, self._u[self._part.slice]
         return part.stress(self._u) - sum(load.stress_at(u, part.at, part.e, factor)[..., 0]
                                           for factor, load in self._eigen)
 
@@ -246,7 +246,7 @@ class Values(Mapping):
     def _gradient(self):
         """That of the elements."""
         part = self._part
-        H, frame = kinematics.gradients(self.beam, self._u[part.coordinates], part.at, part.e)
+        H, frame = kinematics.gradients(self.beam, self._u[part.slice], part.at, part.e)
         return (H + frame)[..., 0]
 
     @cached_property

@@ -82,7 +82,7 @@ class Sections:
         Points across each section, shape (k,) or (n, k); those of the axis by default.
     lifted
         Points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as its
-        :class:`~skfem_ancf.beam.inertia.Inertia` has them. If False, all are on the axis.
+        :class:`~skfem_ancf.beam.masses.Masses` has them. If False, all are on the axis.
     mapping
         From the reference cell to the body; by default that of the mesh.
     """

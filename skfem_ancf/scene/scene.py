@@ -23,7 +23,7 @@ from ..dynamics.checkpoint import resume
 from ..dynamics.integrate import follow, integrate
 from ..dynamics.sensors import Sensor, locate
 from ..actions.eigenstrain import EigenStrain, Temperature, products, require_alone, takes_time
-from ..beam.inertia import projected
+from ..beam.masses import projected
 from ..core.kept import cached_property
 from ..actions.obstacles import Obstacle
 from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,

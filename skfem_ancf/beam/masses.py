@@ -23,7 +23,7 @@ MORE = 4
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
-class Inertia(NamedTuple):
+class Masses(NamedTuple):
     """Masses at points of the elements, of one where all are equal.
 
     A cable may have more than the mass of its axis: its points off it move with ``v + Y v_X``, the
@@ -83,8 +83,8 @@ def points_along(beam: Any) -> int:
     return beam.element.axis_degree + 1 + more
 
 
-def inertia_of(beam: Any) -> Inertia:
-    """The Inertia of a beam, of sections of their full height between nodes too."""
+def masses_of(beam: Any) -> Masses:
+    """The Masses of a beam, of sections of their full height between nodes too."""
     if not beam.has_sections:
         return _of_cable(beam)
     across, axis = beam.across, gauss(points_along(beam))
@@ -94,11 +94,11 @@ def inertia_of(beam: Any) -> Inertia:
         X, W = product_rule(axis, rule)
         parts.append((beam.element.of_mesh(beam.mesh.mapping(), X, tind)[0],
                       across.volume(layer, X, W, tind, times="density", full=True)))
-    return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
+    return Masses(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 
 def _of_cable(beam):
-    """The Inertia of a cable; without that of turning if its section is a plain rectangle."""
+    """The Masses of a cable; without that of turning if its section is a plain rectangle."""
     across, mapping = beam.across, beam.mesh.mapping()
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
@@ -110,11 +110,11 @@ def _of_cable(beam):
     speed = np.hypot(*J[:, 0, ..., :len(xi)])
     mass, first, second = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
-        return Inertia(N, mass)
+        return Masses(N, mass)
     # the volume of a curve is that of its axis times 1 - Y / R
     middle, bottom, top = np.split(cross(J[:, 0], J[:, 1]), 3, axis=-1)
     bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])
-    return Inertia(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
+    return Masses(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
 
 def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
