@@ -1,8 +1,8 @@
 """The errors of the package: what was wrong, the value, and what to change.
 
-Every error derives from :class:`AncfError`; those about bad input are also
-``ValueError``, so existing ``except ValueError`` clauses keep working. The functions are the doors:
-what a caller gives passes one of them before anything is computed.
+Every error derives from :class:`AncfError`; those about bad input are also ``ValueError``. The
+functions ``require_...`` check arguments: they return what they are given, converted, or raise an
+:class:`InputError`. ``name`` is what messages call the argument.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import pickle
 import sys
 import warnings
 from contextlib import contextmanager
-from math import isfinite
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
@@ -31,9 +30,6 @@ _FILTERS = RLock()
 
 #: Longest text of a value in a message.
 WIDTH = 80
-
-#: Numbers of an array up to which Python looks at them one by one, as that is faster.
-FEW = 32
 
 
 class AncfError(Exception):
@@ -61,10 +57,9 @@ class NameUnknown(InputError):
 
     def __init__(self, kind: str, name: object, known: Iterable[Any]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(known)
-        near = nearest(name, self.known)
-        super().__init__(
-            f"unknown {kind} {shown(name)}; known: " + (", ".join(map(repr, self.known)) or "none")
-            + (f"; did you mean {near!r}?" if near is not None else ""))
+        super().__init__(f"unknown {kind} {shown(name)}; known: "
+                         f"{', '.join(map(repr, self.known)) or 'none'}"
+                         f"{_suggested(name, self.known)}")
 
     def __reduce__(self):
         return type(self), (self.kind, self.name, self.known)
@@ -80,9 +75,6 @@ class CallbackError(InputError):
 
 class FileError(InputError, OSError):
     """A file cannot be read or written, or holds something else."""
-
-    def __str__(self):
-        return str(self.args[0])
 
 
 class SupportError(AncfError):
@@ -203,118 +195,25 @@ def shown(value: object) -> str:
     return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
 
 
-def nearest(name: object, known: Iterable[Any]) -> str | None:
-    """The known name that is most like one, or None.
-
-    Parameters
-    ----------
-    name
-        What was given; None is returned unless it is a text.
-    known
-        The names that there are.
-
-    Examples
-    --------
-    >>> from skfem_ancf.core.errors import nearest
-    >>> nearest("Newtn", ["mixed", "newton"])
-    'newton'
-    """
-    if not isinstance(name, str):
-        return None
+def _suggested(name, known):
+    """The known name that is most like one, as the end of a message."""
     names = {k.lower(): k for k in known if isinstance(k, str)}
-    found = difflib.get_close_matches(name.lower(), names, 1, 0.5)
-    return names[found[0]] if found else None
+    found = difflib.get_close_matches(name.lower() if isinstance(name, str) else "", names, 1, 0.5)
+    return f"; did you mean {names[found[0]]!r}?" if found else ""
 
 
 # numbers
 
-def require_positive(name: str, value: object, unit: str = "") -> float:
-    """Return ``value`` as a float, or raise :class:`InputError` if it is not > 0.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given.
-    unit
-        What it is measured in, for the message; none by default.
-    """
-    value = require_finite_scalar(name, value)
-    if value <= 0.0:
-        raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {value!r}")
-    return value
-
-
-#: By how much a derivative may be off, over the larger of it and the difference.
-SLOPE = 0.01
-
-
-def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
-                  else_: str = "") -> None:
-    """Raise :class:`InputError` unless a derivative is that of a function, nearly.
-
-    Parameters
-    ----------
-    what, of
-        What messages call the derivative, and the function.
-    change
-        By how much the function changes over a small step.
-    slope
-        The derivative times that step, an array of the same shape.
-    noise
-        Round-off of the change.
-    else_
-        What the message says in the end.
-    """
-    change, slope = np.ravel(change), np.ravel(slope)
-    off = np.abs(change - slope)
-    if np.max(off, initial=0.0) > SLOPE * np.max(np.abs([change, slope])) + noise:
-        k = np.argmax(off)
-        raise InputError(f"{what} is not the derivative of {of}: over a small step it says "
-                         f"{slope[k]:.6g} where that changes by {change[k]:.6g}{else_}")
-
-
-def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
-    """A finite number that is zero or positive; raises InputError.
-
-    Parameters
-    ----------
-    name
-        What the message calls it.
-    value
-        What was given.
-    energy
-        It would feed energy in if it were negative.
-    """
-    number = require_finite_scalar(name, value)
-    if number < 0.0:
-        why = ": negative damping, mass or stiffness would feed energy in" if energy else ""
-        raise InputError(f"{name} must be zero or positive, got {number!r}{why}")
-    return number
-
-
 def require_finite_scalar(name: str, value: Any) -> float:
-    """Return ``value`` as a float, or raise :class:`InputError` if it is no finite real number.
-
-    True and False, texts and arrays of one number are none.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given.
-    """
-    if type(value) is not float:
-        if not _is_real(value):
-            raise InputError(f"{name} must be a number, got {shown(value)}")
-        try:
-            value = float(value)
-        except OverflowError:
-            raise InputError(f"{name} is too large for a float: {shown(value)}") from None
-        except (TypeError, ValueError):
-            raise InputError(f"{name} must be a number, got {shown(value)}") from None
+    """A finite real number as a float. True, False, texts and arrays of one number are none."""
+    if not _is_real(value):
+        raise InputError(f"{name} must be a number, got {shown(value)}")
+    try:
+        value = float(value)
+    except OverflowError:
+        raise InputError(f"{name} is too large for a float: {shown(value)}") from None
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a number, got {shown(value)}") from None
     if not -np.inf < value < np.inf:
         raise InputError(f"{name} must be finite, got {value!r}")
     return value
@@ -326,21 +225,26 @@ def _is_real(value):
             and getattr(dtype, "kind", "f") in "iuf" and getattr(value, "ndim", 0) == 0)
 
 
+def require_positive(name: str, value: object, unit: str = "") -> float:
+    """A positive finite number; messages name its unit, if it has one."""
+    value = require_finite_scalar(name, value)
+    if value <= 0.0:
+        raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {value!r}")
+    return value
+
+
+def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
+    """A finite number >= 0; with ``energy`` a negative one would feed energy into the motion."""
+    number = require_finite_scalar(name, value)
+    if number < 0.0:
+        why = ": negative damping, mass or stiffness would feed energy in" if energy else ""
+        raise InputError(f"{name} must be zero or positive, got {number!r}{why}")
+    return number
+
+
 def require_integer(name: str, value: object, low: int, high: int | None = None,
                     why: str = "") -> int:
-    """Return ``value`` as an int from ``low`` to ``high``, or raise :class:`InputError`.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given; True and False are no integers.
-    low, high
-        Bounds, both allowed; ``high`` is None where there is none.
-    why
-        Where the bound comes from, for the message.
-    """
+    """An integer from ``low`` to ``high``; messages say ``why`` these are the bounds."""
     if (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low
             or (high is not None and value > high)):
         wanted = f">= {low}" if high is None else f"from {low} to {high}"
@@ -350,48 +254,40 @@ def require_integer(name: str, value: object, low: int, high: int | None = None,
 
 
 def require_index(name: str, value: object, n: int) -> int:
-    """Return ``value`` as an index into ``n`` things, counted from the end if it is negative.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        An integer from ``-n`` to ``n - 1``.
-    n
-        How many things there are.
-    """
+    """The index of one of ``n`` things, counted from the end if it is negative."""
     return require_integer(name, value, -n, n - 1) % n
 
 
 def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None) -> Array:
-    """Return ``array`` as float64, or raise :class:`InputError`.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    array
-        What was given: anything that NumPy makes an array of real, finite numbers of.
-    shape
-        The shape it must have, with None for a free extent, as ``(2, None)``; None for any.
-    """
+    """An array of finite real numbers as float64; None in ``shape`` is a free extent."""
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
-    if shape is not None and array.shape != shape and (
-        array.ndim != len(shape) or any(map(_differs, shape, array.shape))
-    ):
+    if shape is not None and (array.ndim != len(shape) or any(
+            wanted not in (None, n) for wanted, n in zip(shape, array.shape))):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
-    if not (all(map(isfinite, array.ravel().tolist())) if array.size <= FEW else
-            np.isfinite(array).all()):
-        bad = array[~np.isfinite(array)][0]
-        raise InputError(f"{name} has a value that is NaN or infinite: {bad}")
+    finite = np.isfinite(array)
+    if not finite.all():
+        raise InputError(f"{name} has a value that is NaN or infinite: {array[~finite][0]}")
     return array
 
 
-def _differs(wanted, n):
-    return wanted is not None and wanted != n
+def _real_array(name, value):
+    require_unmasked(name, value)
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind == "c":
+            raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
+        # of objects: fractions, or large integers
+        if array.dtype.kind in "iuf" or array.dtype.kind == "O" and all(map(_is_real, array.flat)):
+            return array.astype(np.float64)
+    except OverflowError:
+        raise InputError(f"{name} has a value that is too large for a float: {shown(value)}"
+                         ) from None
+    except (TypeError, ValueError) as error:  # rows of different lengths, for one
+        if isinstance(error, InputError):
+            raise
+    raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
 
 
 def is_masked(value: object) -> bool:
@@ -404,145 +300,52 @@ def is_masked(value: object) -> bool:
 
 
 def require_unmasked(name: str, value: Any) -> None:
-    """Raise :class:`InputError` of an array with masked values, or what holds one.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        Anything.
-    """
+    """No array with masked values, and nothing that holds one."""
     if is_masked(value):
         raise InputError(f"{name} has masked values, whose numbers mean nothing: leave them out, "
                          "as by numpy.ma.compressed, or fill them, as by numpy.ma.filled")
 
 
-def _real_array(name, value):
-    require_unmasked(name, value)
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError, OverflowError):  # rows of different lengths, for one
-        raise InputError(f"{name} must be an array of numbers, got {shown(value)}") from None
-    if type(value) in (list, tuple) and array.dtype == np.float64:
-        return array
-    if array.dtype.kind == "c":
-        raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
-    if array.dtype.kind == "O" and all(map(_is_real, array.flat)):  # fractions, or large integers
-        try:
-            return array.astype(np.float64)
-        except OverflowError:
-            raise InputError(f"{name} has a value that is too large for a float: {shown(value)}"
-                             ) from None
-    if array.dtype.kind not in "iuf":
-        raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
-    return array.astype(np.float64)
+#: By how much a derivative may be off, over the larger of it and the difference.
+SLOPE = 0.01
+
+
+def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
+                  else_: str = "") -> None:
+    """A derivative that is, nearly, that of a function.
+
+    Parameters
+    ----------
+    what, of
+        What messages call the derivative, and the function.
+    change
+        By how much the function changes over a small step.
+    slope
+        The derivative times that step, an array of the same shape.
+    noise
+        Round-off of the change.
+    else_
+        The end of the message.
+    """
+    change, slope = np.ravel(change), np.ravel(slope)
+    off = np.abs(change - slope)
+    if np.max(off, initial=0.0) > SLOPE * np.max(np.abs([change, slope])) + noise:
+        k = np.argmax(off)
+        raise InputError(f"{what} is not the derivative of {of}: over a small step it says "
+                         f"{slope[k]:.6g} where that changes by {change[k]:.6g}{else_}")
 
 
 # names and flags
 
 def require_option(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return ``name`` if it is a text among the known, or raise :class:`NameUnknown`.
-
-    Parameters
-    ----------
-    kind
-        What is named, for the message.
-    name
-        What was given.
-    known
-        The names that there are.
-    """
+    """One of the known names of a kind, or :class:`NameUnknown`."""
     if not isinstance(name, str) or name not in known:
         raise NameUnknown(kind, name, known)
     return name
 
 
-def require_text(name: str, value: Any) -> Any:
-    """A text, or None.
-
-    Parameters
-    ----------
-    name
-        Of the argument, for the message.
-    value
-        What was given.
-    """
-    if value is not None and not (isinstance(value, str) and _is_unicode(value)):
-        raise InputError(f"{name} must be a text, got {shown(value)}")
-    return value
-
-
-def _is_unicode(text):
-    """True if a text has no lone surrogates, which no file can hold."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-def require_flag(name: str, value: object) -> bool:
-    """Return True or False, or raise :class:`InputError` if it is neither.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given.
-    """
-    if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{name} must be True or False, got {shown(value)}")
-    return bool(value)
-
-
-def require_label(name: str, value: object) -> str | None:
-    """Return a text that is not empty, or None, or raise :class:`InputError`.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given.
-    """
-    if value is not None and not (isinstance(value, str) and value and _is_unicode(value)):
-        raise InputError(f"{name} must be a text, or None for none, got {shown(value)}")
-    return value
-
-
-def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
-    """Return ``value`` if it has what is asked of a kind of object, or raise InputError.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given; a class has not what its objects have.
-    kind
-        What it should be, for the message.
-    *attributes
-        Names of the attributes that are asked for.
-    """
-    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
-        raise InputError(f"{name} must be a {kind}, got {shown(value)}")
-    return value
-
-
 def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...]:
-    """Return one name or several as a tuple, or raise :class:`NameUnknown`.
-
-    Parameters
-    ----------
-    kind
-        What is named, for the message, in the singular.
-    names
-        A text, or a tuple, list, set or array (n,) of texts.
-    known
-        The names that there are.
-    """
+    """One known name or several as a tuple; ``kind`` is in the singular."""
     if isinstance(names, str):
         names = (names,)
     if not isinstance(names, (tuple, list, set, frozenset, np.ndarray)) or (
@@ -551,49 +354,54 @@ def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...
     return tuple(require_option(kind, name, known) for name in names)
 
 
+def require_text(name: str, value: Any) -> Any:
+    """A text that a file can hold, or None."""
+    try:
+        if value is not None:
+            str.encode(value)
+    except (TypeError, UnicodeEncodeError):  # the latter of lone surrogates
+        raise InputError(f"{name} must be a text, or None for none, got {shown(value)}") from None
+    return value
+
+
+def require_label(name: str, value: object) -> str | None:
+    """As :func:`require_text`, of texts that are not empty."""
+    if isinstance(value, str) and not value:
+        raise InputError(f"{name} must be a text, or None for none, got ''")
+    return require_text(name, value)
+
+
+def require_flag(name: str, value: object) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
+    """An object, not a class, with the attributes of a ``kind``."""
+    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
+        raise InputError(f"{name} must be a {kind}, got {shown(value)}")
+    return value
+
+
 def require_options(what: str, options: dict[str, Any], known: Iterable[str],
                     hint: str = "") -> dict[str, Any]:
-    """Return the options of a call, or raise :class:`CallError` if one is not known.
-
-    Parameters
-    ----------
-    what
-        What is called, for the message.
-    options
-        Its keywords.
-    known
-        The keywords that it takes.
-    hint
-        What else there is to say.
-    """
+    """The keywords of a call, all of them known, or :class:`CallError` with a ``hint``."""
     for name in options:
         if name not in known:
-            near = nearest(name, known)
             raise CallError(f"{what} has no option {name!r}; known: "
-                            + ", ".join(map(repr, known))
-                            + (f"; did you mean {near!r}?" if near is not None else "") + hint)
+                            f"{', '.join(map(repr, known))}{_suggested(name, known)}{hint}")
     return options
 
 
 def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
-    """Return a file name as a ``pathlib.Path``, or raise :class:`InputError`.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        A text that is not empty, or a ``pathlib.Path``.
-    suffixes
-        What it may end with, as ".vtu", in capitals too; anything if none are given.
-    """
-    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value) or (
-            "\0" in str(os.fspath(value))):
-        raise InputError(f"{name} must be the path of a file, got {shown(value)}")
+    """A file name as a ``pathlib.Path``; its suffix, if it matters, in capitals too."""
     try:
         path = Path(value)
-        os.fsencode(path)
-    except (TypeError, UnicodeEncodeError):  # the latter of lone surrogates
+        if not os.fspath(value) or b"\0" in os.fsencode(path):
+            raise ValueError
+    except (TypeError, ValueError):  # among them UnicodeEncodeError, of lone surrogates
         raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError("the file name must end with "
@@ -605,17 +413,7 @@ def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
 # functions of the caller's
 
 def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
-    """Return ``value`` if it can be called, or raise :class:`InputError`.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given.
-    returns
-        What it is a function of and what it should return, as "of time that returns a number".
-    """
+    """What can be called; ``returns`` as in "of time that returns a number"."""
     if not callable(value):
         raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
     return value
@@ -630,21 +428,9 @@ def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
 
 
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
-    """Call a function of the caller's, and say what was asked if it raises.
+    """What a function of the caller's returns; if it raises, a :class:`CallbackError` says of what.
 
-    Parameters
-    ----------
-    what
-        The call for the message, as ``"amplitude(t={:g})"``; formatted with the arguments.
-    function
-        Any function.
-    *args
-        Its arguments.
-
-    Raises
-    ------
-    CallbackError
-        From what the function raised; errors of the package pass.
+    ``what`` is the call, formatted with the arguments. Errors of the package pass.
 
     Examples
     --------
@@ -664,32 +450,13 @@ def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
 
 
 def ask_number(what: str, function: Callable[..., Any], *args: Any) -> float:
-    """As :func:`ask`, for a function that returns a finite number.
-
-    Parameters
-    ----------
-    what, function, *args
-        As for :func:`ask`.
-    """
-    value = ask(what, function, *args)
-    if isinstance(value, float) and -np.inf < value < np.inf:
-        return float(value)
-    return _returned(require_finite_scalar, what, value, args)
+    """As :func:`ask`, for a function that returns a finite number."""
+    return _returned(require_finite_scalar, what, ask(what, function, *args), args)
 
 
 def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[..., Any],
               *args: Any, number: bool = False) -> Array:
-    """As :func:`ask`, for a function that returns finite numbers of a shape.
-
-    Parameters
-    ----------
-    what, function, *args
-        As for :func:`ask`.
-    shape
-        The shape that its value must have, as for :func:`require_finite`.
-    number
-        A number will do: it is the value everywhere.
-    """
+    """As :func:`ask`, for finite numbers of a shape; with ``number`` one may do for all."""
     value = ask(what, function, *args)
     if number and np.ndim(value) == 0:
         value = np.broadcast_to(value, shape)  # type: ignore[arg-type]
@@ -697,26 +464,7 @@ def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[
 
 
 def ask_field(what: str, function: Callable[[Array], Any], x: Array) -> Array:
-    """The values of a vector field at points, asked; each of the two may be a constant.
-
-    Parameters
-    ----------
-    what
-        The call for the message, as ``"t(x)"``.
-    function
-        Takes the points x (2, ...), returns two values, each a number or of the shape (...).
-    x
-        Points, shape (2, ...).
-
-    Returns
-    -------
-    ndarray
-        Shape (2, ...).
-
-    Raises
-    ------
-    CallbackError
-        If the function fails, or its values have another shape or are not finite.
+    """As :func:`ask`, for a vector field at points (2, ...): two components, which may be constant.
     """
     try:
         value = ask(what, function, x)
@@ -737,9 +485,9 @@ def ask_field(what: str, function: Callable[[Array], Any], x: Array) -> Array:
     return np.array(rows)
 
 
-def _returned(door, what, value, args, *more):
+def _returned(check, what, value, args, *more):
     try:
-        return door(what.format(*args), value, *more)
+        return check(what.format(*args), value, *more)
     except InputError as error:
         hint = "; does the function return something?" if value is None else ""
         raise CallbackError(str(error) + hint) from None
@@ -752,15 +500,7 @@ _WITHIN = str(Path(__file__).resolve().parents[1]) + os.sep, contextlib.__file__
 
 
 def warn(message: str, category: type[Warning]) -> None:
-    """Give a warning that names the line of the caller's that has led to it.
-
-    Parameters
-    ----------
-    message
-        What to say.
-    category
-        Class of the warning.
-    """
+    """Give a warning that names the line of the caller's that has led to it."""
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_WITHIN):
         frame, level = frame.f_back, level + 1

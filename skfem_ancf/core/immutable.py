@@ -50,7 +50,10 @@ class Immutable(metaclass=_Freezing):
     _frozen = False
 
     def _freeze(self):
-        vars(self).update({name: read_only(value) for name, value in vars(self).items()})
+        attributes = vars(self)
+        for name, value in attributes.items():
+            if isinstance(value, np.ndarray):
+                attributes[name] = read_only(value)
         self._frozen = True
 
     def _thawed(self):
