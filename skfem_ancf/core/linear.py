@@ -28,22 +28,12 @@ STEP = 2.0**-200
 
 def step(base: Any, value: Any) -> Any:
     """The place at which a function is evaluated: from the base in the direction of a value.
-
-    Parameters
-    ----------
-    base, value
-        Numbers, or arrays (...).
     """
     return base + 1j * (STEP * (value - base))
 
 
 def first_order(z: Any) -> Any:
     """What a function is to first order, from its value at a :func:`step`; real ones stay.
-
-    Parameters
-    ----------
-    z
-        A number, or an array (...).
 
     Examples
     --------
@@ -55,11 +45,6 @@ def first_order(z: Any) -> Any:
 
 def angle_of(x: Any, y: Any) -> Any:
     """The angle of vectors, in radians: ``arctan2(y, x)``, of a :func:`step` too.
-
-    Parameters
-    ----------
-    x, y
-        Components, arrays (...).
     """
     if not np.iscomplexobj(x):
         return np.arctan2(y, x)
@@ -69,11 +54,6 @@ def angle_of(x: Any, y: Any) -> Any:
 
 def unwrapped(angle: Array) -> Array:
     """``np.unwrap`` along the last axis, of a :func:`step` too.
-
-    Parameters
-    ----------
-    angle
-        In radians, shape (..., n).
     """
     if not np.iscomplexobj(angle):
         return np.unwrap(angle)
@@ -82,13 +62,6 @@ def unwrapped(angle: Array) -> Array:
 
 def stress_of(law: Law, strain: Array) -> Array:
     """The stress of a law, of a :func:`step` too: by its moduli, so that it need not know of it.
-
-    Parameters
-    ----------
-    law
-        With ``stress`` and ``moduli``.
-    strain
-        Shape (3, ...).
     """
     if not np.iscomplexobj(strain):
         return law.stress(strain)

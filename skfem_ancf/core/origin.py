@@ -8,11 +8,6 @@ from typing import Any
 def ours(thing: Any) -> bool:
     """True if a function, or the class of an object, is the package's own.
 
-    Parameters
-    ----------
-    thing
-        An object, or a function.
-
     Examples
     --------
     >>> from skfem import ElementLineP1

@@ -24,15 +24,6 @@ NO_BAR = nullcontext(_NoBar())
 
 def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextManager[Any]:
     """A bar with ``update(amount)``.
-
-    Parameters
-    ----------
-    show
-        True, False, or None: on a terminal, after a second, if tqdm is installed.
-    total
-        The amount at the end.
-    desc
-        What is counted.
     """
     if show is not None and not isinstance(show, bool):
         raise InputError(f"progress must be True, False or None, got {shown(show)}")
@@ -61,13 +52,6 @@ def announced_bar(total: float, desc: str) -> Iterator[Any]:
     """A bar with ``update(amount)`` for work that is always announced, on stderr.
 
     On a terminal it is a bar, if tqdm is installed; else one line for each update.
-
-    Parameters
-    ----------
-    total
-        The amount at the end.
-    desc
-        What is done; the first line.
     """
     if sys.stderr is None:  # a program without a console
         yield _NoBar()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from .errors import InputError, require_finite, require_integer, shown
-from .frozen import Content
+from .immutable import array_cache
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -62,20 +62,12 @@ def tensor(axis: Rule, section: Rule) -> Rule:
 
 
 def product_rule(axis: Rule, section: Rule) -> Rule:
-    """As :func:`tensor`, of rules that are known to be good.
-
-    Parameters
-    ----------
-    axis, section
-        As there, of arrays.
-    """
+    """As :func:`tensor`, without checks."""
     (x, wx), (y, wy) = axis, section
-    X = np.empty((2, len(x), len(y)))
-    X[0], X[1] = x[:, None], y
-    return X.reshape(2, -1), (wx[:, None] * wy).ravel()
+    return np.array(np.meshgrid(x, y, indexing="ij")).reshape(2, -1), np.outer(wx, wy).ravel()
 
 
-def _rule(name: str, rule: Any) -> Rule:
+def _rule(name, rule):
     """Points and weights of a rule, as arrays."""
     if not isinstance(rule, (tuple, list)) or len(rule) != 2:
         raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")
@@ -84,27 +76,13 @@ def _rule(name: str, rule: Any) -> Rule:
 
 
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
-    """The Lagrange polynomials of nodes, at points.
-
-    Parameters
-    ----------
-    nodes
-        Different numbers, shape (n,).
-    x
-        Points, shape (m,).
-
-    Returns
-    -------
-    ndarray
-        Shape (m, n).
-    """
+    """The Lagrange polynomials of different nodes (n,) at points (m,), shape (m, n)."""
     nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
-    return _lagrange(Content(nodes, x)).copy()
+    return _lagrange(nodes, x).copy()
 
 
-@lru_cache(64)
-def _lagrange(content: Content) -> Array:
-    nodes, x = content.arrays
+@array_cache(64)
+def _lagrange(nodes: Array, x: Array) -> Array:
     if len(np.unique(nodes)) < len(nodes):
         raise InputError(f"nodes must be different, got {shown(nodes)}")
     out = np.ones((len(x), len(nodes)))

@@ -1,7 +1,7 @@
 """The equations of a scene as tables that texts take."""
 
 from copy import copy
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from operator import is_
 from typing import Any, NamedTuple
 from weakref import ref
@@ -23,7 +23,7 @@ from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.section import SectionPack, linearised
 from ..core.origin import ours
 from ..core.callbacks import handle_of
-from ..core.sampling import Sampled
+from ..core.sampling import sample
 from ..core.source import F1, I1, by_place
 from ..actions.tables import JointTables, LoadTables
 from .user_defined import UserDefined
@@ -313,7 +313,8 @@ class Tables:
     def _amplitudes(self):
         """Functions of factors that vary, with their numbers, and the number of all factors."""
         columns = self._columns
-        return [(k, Sampled(load.amplitude, "amplitude")) for k, load in enumerate(columns)
+        return [(k, partial(sample, load.amplitude, name="amplitude"))
+                for k, load in enumerate(columns)
                 if load is not None and load.amplitude is not None], len(columns)
 
     @cached_property

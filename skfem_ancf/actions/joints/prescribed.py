@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import scipy
 from ...core.errors import (ask_array, ask_number, require_finite_scalar, require_function,
                             require_label)
 from ...beam.rigid import on_body
-from ...core.sampling import Sampled
+from ...core.sampling import sample
 from .base import Aligned, Joint, angle_to, both_of, gradients, point, rotation, section
 
 if TYPE_CHECKING:
@@ -52,7 +53,8 @@ class PrescribedPosition(Joint):
         self.name = require_label("name", name)
 
     def bind(self, layout: Layout) -> None:
-        self.r, self._motion = point(layout, self.beam, self.at), Sampled(self.motion, "r", (2,))
+        self.r = point(layout, self.beam, self.at)
+        self._motion = partial(sample, self.motion, name="r", shape=(2,))
         self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
@@ -93,7 +95,8 @@ class PrescribedAngle(Joint):
 
     def bind(self, layout: Layout) -> None:
         _, self.d = section(layout, self.beam, self.at)
-        self.start, self._angles = np.arctan2(*self.d.start[::-1]), Sampled(self.angle, "angle", ())
+        self.start = np.arctan2(*self.d.start[::-1])
+        self._angles = partial(sample, self.angle, name="angle", shape=())
         n = self.d.dofs.shape[1]
         of = self._of_normal = np.zeros((2, 1 + 2 * n))  # offset and slope, see driven
         of[:, 0], (of[0, 1:1 + n], of[1, 1 + n:]) = self.d.start, self.d.weights

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.sampling import Sampled
+from ...core.sampling import sample
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,7 +34,8 @@ class Settlements:
     def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),
                  at: Sequence[tuple[int, int]] = ()) -> None:
         self.numbers, self.functions, self.at = numbers, tuple(functions), tuple(at)
-        self._sampled = [Sampled(f, HELD[k], ()) for f, (_, k) in zip(self.functions, self.at)]
+        self._sampled = [partial(sample, f, name=HELD[k], shape=())
+                         for f, (_, k) in zip(self.functions, self.at)]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
         """The same with nodes displaced by a number or a function of time.
