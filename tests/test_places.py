@@ -58,7 +58,7 @@ def test_rows_of_an_array_are_points():
      r"selects none of the 13 facets.* \(0, -0.05\) to \(2, 0.05\)"),
     (lambda x: 3, InputError, "returns n truth values, as lambda"),
     (lambda x: x[0], InputError, "returned float64"),
-    (lambda x: x[7] > 0, InputError, "fails for points x of shape .* IndexError"),
+    (lambda x: x[7] > 0, InputError, "of x of shape .* raised IndexError"),
     ("lefft", NameUnknown, "'left', 'right'"),
     ("empty", MeshError, "'empty' is empty.*'left'"),
     (1, InputError, r"np.array\(\[1\]\)"), ([1, 2, 3], InputError, r"np.array\(\[1, 2, 3\]\)"),

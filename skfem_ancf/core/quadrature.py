@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -67,7 +67,7 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
     return np.array(np.meshgrid(x, y, indexing="ij")).reshape(2, -1), np.outer(wx, wy).ravel()
 
 
-def _rule(name, rule):
+def _rule(name: str, rule: Any) -> Rule:
     """Points and weights of a rule, as arrays."""
     if not isinstance(rule, (tuple, list)) or len(rule) != 2:
         raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")

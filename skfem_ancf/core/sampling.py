@@ -48,7 +48,7 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     require_function(name, function, "of time")
     times = require_finite("times", times, (None,))
 
-    def alone(some):
+    def alone(some: Array) -> Array:
         return np.array([ask_array(name + "(t={:g})", shape, function, t) for t in some.tolist()])
 
     n = len(times)

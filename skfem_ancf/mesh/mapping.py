@@ -321,9 +321,9 @@ class MappingBeam(Mapping):
         ndarray
             Shape (2, nelements, npoints); NaN where no such point was found.
         """
-        tind = slice(None) if tind is None else tind
-        axis, director, beside = (c[..., tind, None] for c in self._powers)
-        gap = x - self._all_coefficients[0][:, 0, tind, None]
+        some = slice(None) if tind is None else tind
+        axis, director, beside = (c[..., some, None] for c in self._powers)
+        gap = x - self._all_coefficients[0][:, 0, some, None]
         # from the axis to the point x director: zero at the section that holds the point
         beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
         beside[:director.shape[1]] += cross(gap[:, None], director)

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import copyreg
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
 from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
-from skfem.mesh import Mesh2D, MeshQuad
+from skfem.mesh import MeshQuad
 
-from ..core import archive
 from .curve import Curve, check_curvature, derivative_of
-from ..core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask,
-                           require_finite, require_finite_scalar, require_function, require_integer,
-                           require_option, require_options, require_path, require_positive, shown,
-                           require_unmasked)
+from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
+                           require_finite_scalar, require_function, require_integer, require_option,
+                           require_options, require_path, require_positive, require_unmasked, shown)
+from . import files
 from .location import Finder
-from ..core.immutable import Immutable, read_only
+from ..core.immutable import Immutable
 from .mapping import MappingBeam
 from ..core.origin import ours
+from .numbering import NumberedMesh
 from .places import is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
@@ -41,19 +39,12 @@ EPS = float(np.finfo(float).eps)
 #: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
 MAX_ELEMENTS = 2**24
 
-#: Formats of several files, of which one names the others: these are written where they stay.
-IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
-
 #: Points of a picture or a file along and across an element.
 MAX_SUBDIVISION = 1000
 
 
-# a view of an array, as which pickle takes it, has no orientation
-copyreg.pickle(OrientedBoundary, lambda f: (OrientedBoundary, (np.asarray(f), f.ori)))
-
-
 @dataclass(repr=False, eq=False)
-class MeshBeam(Immutable, Mesh2D):
+class MeshBeam(Immutable, NumberedMesh):
     """A planar beam in its stress-free state, divided into elements along its axis.
 
     A mesh does not change; its methods return other meshes.
@@ -138,10 +129,7 @@ class MeshBeam(Immutable, Mesh2D):
         Raises
         ------
         MeshError
-            If an element has no length, the nodes are not increasing, or a height of a function
-            is not positive.
-        InputError
-            If ``height`` is not positive or a value is not finite.
+            If an element has no length, the nodes are not increasing, or a height is not positive.
 
         Examples
         --------
@@ -225,10 +213,7 @@ class MeshBeam(Immutable, Mesh2D):
 
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
-        """The mesh of one chain whose values are finite: __post_init__ asks for more than is open.
-
-        Without a curve the axis is straight, and ``lengths`` are those between the nodes.
-        """
+        """The mesh of one chain; without a curve the axis is straight."""
         height, heights, taper = heights
         tangent = np.broadcast_to(tangent, p.shape)
         mesh = cls(p, t, height=height, p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
@@ -318,9 +303,8 @@ class MeshBeam(Immutable, Mesh2D):
 
         The names are those of :data:`skfem_ancf.mesh.reference_cell.SECTIONS`: "quintic", "septic",
         "of degree 9" ... "of degree 15" for directors and axis, which is cubic for the first two.
-        Elements with sections that vary linearly along X hold the stress-free state of a curved
-        beam exactly on a mesh with "linear", those with cubic sections on one with "cubic". A
-        ``Beam`` chooses for itself; it makes no difference for straight beams.
+        A ``Beam`` chooses for itself those that hold the reference configuration of a curved beam
+        exactly; it makes no difference for straight ones.
         """
         require_option("interpolation of the sections", sections, SECTIONS)
         if sections == self.sections:
@@ -356,13 +340,7 @@ class MeshBeam(Immutable, Mesh2D):
         return heights_of(height, self.parameters, self.t)
 
     def node_height(self, node: int) -> float:
-        """The height of the section of a node.
-
-        Parameters
-        ----------
-        node
-            Its number.
-        """
+        """The height of the section of a node."""
         if self.heights is None:
             return self.height
         end = int(node in self.t[1])
@@ -380,23 +358,8 @@ class MeshBeam(Immutable, Mesh2D):
         out[1:] = np.cumsum(gaps)
         return out
 
-    def __setattr__(self, name, value):
-        if name in ("_boundaries", "_subdomains") and value is not None:
-            value = {name: read_only(numbers) for name, numbers in value.items()}
-        super().__setattr__(name, value)
-
     def __getstate__(self):
         return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    @property
-    def boundaries(self) -> MappingProxyType[str, Any] | None:
-        """Numbers of facets by name, see :meth:`with_boundaries`."""
-        return None if self._boundaries is None else MappingProxyType(self._boundaries)
-
-    @property
-    def subdomains(self) -> MappingProxyType[str, Array] | None:
-        """Numbers of elements by name, see :meth:`with_subdomains`."""
-        return None if self._subdomains is None else MappingProxyType(self._subdomains)
 
     # topology
 
@@ -406,100 +369,6 @@ class MeshBeam(Immutable, Mesh2D):
 
     def _mapping(self):
         return self._own_mapping
-
-    def _init_facets(self):
-        """Sections first, one for each node, then the bottom and the top of each element."""
-        n, ne, t = self.doflocs.shape[1], self.t.shape[1], self.t
-        nodes = np.arange(n, dtype=np.int32)
-        bottom, top = n + np.arange(ne, dtype=np.int32), n + ne + np.arange(ne, dtype=np.int32)
-        self._facets = np.hstack([np.array([nodes, nodes]), t, t])
-        self._t2f = np.array([bottom, t[1], top, t[0]], dtype=np.int32)
-        f2t = np.full((2, n + 2 * ne), -1, dtype=np.int32)
-        elements = np.arange(ne, dtype=np.int32)
-        f2t[0, bottom] = f2t[0, top] = elements
-        f2t[1, t[0]] = elements
-        f2t[0, t[1]] = elements
-        starts = f2t[0] < 0
-        f2t[0, starts], f2t[1, starts] = f2t[1, starts], -1
-        self._f2t = f2t
-
-    @property
-    def f2t(self) -> Array:
-        if not hasattr(self, "_f2t"):
-            self._init_facets()
-        return self._f2t
-
-    def _build_default_tags(self):
-        ne, n = self.t.shape[1], self.doflocs.shape[1]
-        facets = np.arange(n + 2 * ne, dtype=np.int32)
-        facets.flags.writeable = False
-        # the first node is the left end, the last one the right
-        return {"left": facets[:1], "right": facets[n - 1:n], "bottom": facets[n:n + ne],
-                "top": facets[n + ne:]}
-
-    def normalize_facets(self, facets: Any) -> Array:
-        if isinstance(facets, str) and facets not in (self.boundaries or {}):
-            raise NameUnknown("boundary", facets, self.boundaries or {})
-        return super().normalize_facets(facets)
-
-    def normalize_elements(self, elements: Any) -> Array:
-        if isinstance(elements, str):
-            require_option("subdomain", elements, self.subdomains or {})
-            return np.asarray(super().normalize_elements(elements))
-        if callable(elements):
-            return self.elements_satisfying(elements)
-        given = elements
-        elements = list(elements) if isinstance(elements, (tuple, list, set)) else elements
-        if isinstance(elements, list) and any(isinstance(e, str) for e in elements):
-            return np.unique(np.concatenate([self.normalize_elements(e) for e in elements]))
-        try:
-            elements = np.atleast_1d(np.asarray(elements))
-        except (ValueError, TypeError):
-            elements = np.zeros(1, dtype=object)
-        if elements.dtype == bool and elements.shape == (self.nelements,):
-            elements = np.nonzero(elements)[0]
-        if not elements.size:
-            return np.zeros(0, dtype=np.int32)
-        if elements.dtype.kind not in "iu" or elements.ndim != 1:
-            raise MeshError("elements are given by their numbers, by the name of a subdomain, by a "
-                            f"function or a mask, got {shown(given)}")
-        bad = elements[(elements < 0) | (elements >= self.nelements)]
-        if len(bad):
-            raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got {bad[0]}")
-        return elements
-
-    def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
-                          normal: ArrayLike | None = None) -> Array:
-        """The facets for whose middle a function is true.
-
-        Parameters
-        ----------
-        test
-            Takes points x (2, n), returns n truth values.
-        boundaries_only
-            No sections between two elements.
-        normal
-            Direction, shape (2,), of the side that the facets are given; None for no side.
-
-        Returns
-        -------
-        ndarray
-            Numbers of facets, shape (k,); an ``OrientedBoundary`` with ``normal``.
-        """
-        middle = np.array([[0.5]])
-        mapping = self._mapping()
-        facets = _satisfying(test, mapping.G(middle)[:, :, 0])
-        if boundaries_only:
-            facets = np.intersect1d(facets, self.boundary_facets())
-        if normal is None:
-            return facets
-        tind, points = mapping.facet_points(middle, facets)
-        normals = mapping.normals(points, tind, facets, self.t2f)[:, :, 0]
-        return OrientedBoundary(facets, 1 * (np.asarray(normal) @ normals < 0))
-
-    def elements_satisfying(self, test: Callable[[Array], Array]) -> Array:
-        middle = self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0]
-        return _satisfying(test, middle)
 
     def params(self) -> Array:
         """Length of each element."""
@@ -551,10 +420,9 @@ class MeshBeam(Immutable, Mesh2D):
         return np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
 
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
-        """A function from points x, y to the elements that hold them.
+        """A function from points x, y to the elements that hold them; ``mapping`` is not used.
 
-        The function raises :class:`MeshError` for points outside the body. ``mapping`` is
-        scikit-fem's argument: the mesh has its own.
+        The function raises :class:`MeshError` for points outside the body.
         """
         find = Finder(self)
 
@@ -607,15 +475,8 @@ class MeshBeam(Immutable, Mesh2D):
         growth
             How fast the elements get longer, positive.
 
-        Returns
-        -------
-        MeshBeam
-            New nodes are on the curve, names are kept.
-
         Raises
         ------
-        InputError
-            If ``size`` or ``growth`` is not positive.
         MeshError
             If a section is not known, or a point is far from the beam.
 
@@ -672,14 +533,9 @@ class MeshBeam(Immutable, Mesh2D):
             Numbers of elements, shape (k,), a mask, the name of a subdomain, or a function of
             the points.
         return_mapping
-            Return the numbers of the nodes that are left, too.
+            Return a pair: the mesh, and the numbers of the nodes that are left, shape (n,).
         skip_boundaries, skip_subdomains
             Leave the names out.
-
-        Returns
-        -------
-        MeshBeam
-            With ``return_mapping`` a pair: the mesh, and nodes of shape (n,).
         """
         require_unmasked("elements", elements)
         elements = np.unique(self.normalize_elements(elements))
@@ -723,13 +579,7 @@ class MeshBeam(Immutable, Mesh2D):
                        taper=None if self.taper is None else Scaled(self.taper, scale))
 
     def translated(self, diffs: ArrayLike) -> MeshBeam:
-        """The mesh moved by a vector.
-
-        Parameters
-        ----------
-        diffs
-            The vector, shape (2,).
-        """
+        """The mesh moved by a vector, shape (2,)."""
         return self._moved(np.eye(2), require_finite("the shift", diffs, (2,)))
 
     def rotated(self, angle: float, about: ArrayLike = (0.0, 0.0)) -> MeshBeam:
@@ -741,10 +591,6 @@ class MeshBeam(Immutable, Mesh2D):
             In radians, counterclockwise, at most 2 pi in size.
         about
             The point, shape (2,).
-
-        Returns
-        -------
-        MeshBeam
         """
         angle, about = _radians(angle), require_finite("about", about, (2,))
         c, s = np.cos(angle), np.sin(angle)
@@ -752,12 +598,7 @@ class MeshBeam(Immutable, Mesh2D):
         return self._moved(Q, about - Q @ about)
 
     def scaled(self, factors: ArrayLike) -> MeshBeam:
-        """The mesh, with its height, scaled.
-
-        Parameters
-        ----------
-        factors
-            One positive number, or several that are equal, shape (n,).
+        """The mesh, with its height, scaled by a positive number, or several that are equal (n,).
         """
         f = np.unique(require_finite("factors", factors))
         if len(f) != 1 or f[0] <= 0:
@@ -765,40 +606,10 @@ class MeshBeam(Immutable, Mesh2D):
                             f"{factors!r}; sections would not stay normal otherwise")
         return self._moved(np.eye(2), np.zeros(2), f[0])
 
-    def _refuse(self, what: str) -> NoReturn:
-        raise MeshError(
-            f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
-            "beams into one Scene and join them, or build the mesh with init_line or init_curve")
-
-    def mirrored(self, normal: Any, point: Any = None) -> MeshBeam:
-        self._refuse("mirrored")
-
-    def morphed(self, *args: Any) -> MeshBeam:
-        self._refuse("morphed")
-
-    def smoothed(self, fixed_nodes: Any = None) -> MeshBeam:
-        self._refuse("smoothed")
-
-    def __add__(self, other):
-        self._refuse("joined with +")
-
-    def __matmul__(self, other):
-        self._refuse("joined with @")
-
     # pictures and files
 
     def to_meshquad(self, nx: int = 8, ny: int = 4) -> MeshQuad:
-        """Quads of the stress-free body.
-
-        Parameters
-        ----------
-        nx, ny
-            Quads along and across each element.
-
-        Returns
-        -------
-        skfem.MeshQuad
-        """
+        """A ``skfem.MeshQuad`` of the stress-free body, of nx by ny quads for each element."""
         nx, ny = (require_integer(name, n, 1, MAX_SUBDIVISION) for name, n in (("nx", nx),
                                                                              ("ny", ny)))
         quad = MeshQuad.init_tensor(np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1))
@@ -811,15 +622,7 @@ class MeshBeam(Immutable, Mesh2D):
         return MeshQuad(self._mapping().F(quad.p).reshape(2, -1)[:, kept], t.reshape(4, -1))
 
     def draw(self, visuals: str = "matplotlib", **kwargs: Any) -> Any:
-        """Draw the outline of the elements.
-
-        Parameters
-        ----------
-        visuals
-            Name of the module of ``skfem.visuals``.
-        **kwargs
-            Those of :meth:`skfem.Mesh.draw`.
-        """
+        """Draw the outline of the elements, as :meth:`skfem.Mesh.draw`."""
         return self._outline().draw(visuals, **kwargs)
 
     def _repr_svg_(self):
@@ -838,21 +641,7 @@ class MeshBeam(Immutable, Mesh2D):
     def save_npz(self, filename: StrPath) -> None:
         """Save all but the functions ``curve`` and ``taper``; read it with :meth:`load_npz`."""
         path = require_path("filename", filename)
-        if path.suffix != ".npz":
-            path = path.with_name(f"{path.name}.npz")
-        tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
-        tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
-                 if getattr(v, "ori", None) is not None}
-        tags |= {f"s_{k}": v for k, v in (self.subdomains or {}).items()}
-        s = {name: getattr(self, name) for name in ("s", "p_XY", "heights")
-             if getattr(self, name) is not None}
-        try:
-            archive.write(path, {
-                "doflocs": self.doflocs, "t": self.t, "height": self.height, "p_X": self.p_X,
-                "p_Y": self.p_Y, "lengths": self.lengths, "sections": self.sections,
-                "kind": self.kind, **s, **tags})
-        except OSError as error:
-            raise FileError(f"cannot write {str(path)!r}: {error}") from error
+        files.save_npz(self, path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz"))
 
     @classmethod
     def load_npz(cls, filename: StrPath) -> MeshBeam:
@@ -865,35 +654,8 @@ class MeshBeam(Immutable, Mesh2D):
         MeshError
             If it holds no beam.
         """
-        path = require_path("filename", filename)
-        return _read(path, lambda: cls._load_npz(path))
-
-    @classmethod
-    def _load_npz(cls, filename):
-        data = archive.read(filename)
-        missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths", "sections"} - data.keys()
-        if missing:
-            raise MeshError(f"{str(filename)!r} holds no beam: {sorted(missing)} are missing")
-        tags = {k[2:]: v for k, v in data.items() if k.startswith("b_")}
-        tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data else v
-                for k, v in tags.items()}
-        parts = {k[2:]: v for k, v in data.items() if k.startswith("s_")}
-        of = cls._of_kind(str(data["kind"]) if "kind" in data else cls.kind)
-        return of(data["doflocs"], data["t"], tags or None, parts or None,
-                  height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
-                  lengths=data["lengths"], sections=str(data["sections"]),
-                  **{name: data[name] for name in ("s", "p_XY", "heights") if name in data})
-
-    @classmethod
-    def _of_kind(cls, kind):
-        """The class of a mesh in a file: this one, or the one of the package that it was saved of.
-        """
-        known = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if ours(of)}
-        if kind == cls.kind:
-            return cls
-        if kind not in known:
-            raise MeshError(f"a mesh of the kind {kind!r} is not known, only {sorted(known)}")
-        return known[kind]
+        kinds = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if ours(of)}
+        return files.load_npz(cls, require_path("filename", filename), kinds | {cls.kind: cls})
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
@@ -908,58 +670,22 @@ class MeshBeam(Immutable, Mesh2D):
         point_data, cell_data, **kwargs
             For a viewer: as for ``skfem.MeshQuad.save``.
         """
-        import meshio
-
         path = require_path("filename", filename)
         if path.suffix == ".npz":
             require_options(f"save({path.name!r})", kwargs, ("filename",))
             self.save_npz(path)
-            return
-        try:
-            if not path.suffix:
-                raise FileError(f"the file name {str(path)!r} does not say the format: end it with "
-                                ".npz, .vtu or what else meshio writes")
-            if path.suffix in IN_PARTS:
-                self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
-                return
-            with archive.replacing(path) as new:
-                self.to_meshquad().save(new, point_data, cell_data, **kwargs)
-        except FileError:
-            raise
-        except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:
-            raise FileError(f"cannot write {str(path)!r}: {error}") from error
+        else:
+            files.save_quads(self, path, point_data, cell_data, **kwargs)
 
     @classmethod
     def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
-        """Load a mesh saved as ``.npz``.
-
-        Parameters
-        ----------
-        filename
-            Of a file that :meth:`save` wrote.
-        out, **kwargs
-            Not used: they are there as for ``skfem.Mesh.load``.
-        """
+        """Load a mesh saved as ``.npz``; ``out`` is there as in scikit-fem and not used."""
         path = require_path("filename", filename)
         require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":
             return cls.load_npz(path)
         raise MeshError(f"cannot read a beam from {path.name!r}: only .npz files keep the axis, "
                         "the tangents and the height; save the mesh as one of them")
-
-
-def _read(path, read):
-    """What a function reads from a file, or an error that says what is wrong with it."""
-    try:
-        return read()
-    except MeshError as error:
-        name = repr(str(path))
-        raise MeshError(str(error) if name in str(error) else f"{name}: {error}") from error
-    except OSError as error:
-        raise FileError(f"cannot read {str(path)!r}: {error}") from error
-    except Exception as error:  # whatever is in the file
-        raise MeshError(f"{str(path)!r} holds no beam, or is damaged: {type(error).__name__}: "
-                        f"{error}") from error
 
 
 def reach(meshes: Sequence[MeshBeam]) -> float:
@@ -969,19 +695,10 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     curled may be drawn straight, and not more than all lines together, as some may lie far apart.
     What is of forces and strains goes by lengths: there all lines add up.
 
-    Parameters
-    ----------
-    meshes
-        Those of the beams.
-
     Examples
     --------
-    >>> from skfem_ancf import Frame, StVenantKirchhoff
     >>> from skfem_ancf.mesh.mesh_beam import reach
-    >>> points, lines = [(0, 0), (3, 0), (3, 4), (0, 4)], [(0, 1), (1, 2), (2, 3), (3, 0)]
-    >>> steel = StVenantKirchhoff(E=2e11, nu=0.3)
-    >>> frame = Frame.from_lines(points, lines, height=0.1, width=0.1, material=steel)
-    >>> reach([beam.mesh for beam in frame.beams])
+    >>> reach([MeshBeam.init_line([0, 3], 0.1), MeshBeam.init_line([0, 4], 0.1, (3, 0), np.pi / 2)])
     5.0
     """
     total = float(sum([np.add.reduce(mesh.lengths) for mesh in meshes]))
@@ -997,16 +714,6 @@ def _chain(n):
     """The nodes of the elements of one chain of n nodes, (2, n - 1)."""
     nodes = np.arange(n, dtype=np.int32)
     return np.array([nodes[:-1], nodes[1:]])
-
-
-def _satisfying(test, x):
-    """The numbers of the points x (2, n) for which a function is true."""
-    require_function("the function of the points", test, "that returns True or False for each")
-    found = ask("the function of the points", test, x)
-    if np.shape(found) != x.shape[1:] or np.asarray(found).dtype != bool:
-        raise CallbackError("the function of the points x, shape (2, n), must return n times True "
-                            f"or False, got {shown(found)}")
-    return np.nonzero(found)[0].astype(np.int32)
 
 
 def _radians(angle):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..core.errors import (AncfError, InputError, MeshError, NameUnknown, is_masked, require_finite,
-                           shown)
+from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, ask, is_masked,
+                           require_finite, shown)
 from .location import Finder
 
 if TYPE_CHECKING:
@@ -57,30 +57,15 @@ def is_place(place: object) -> bool:
 
 
 def as_point(point: Any, mesh: Chain | None = None) -> Array:
-    """A material point as an array (2,); raises MeshError for anything else.
+    """A material point as an array (2,): two coordinates, or with a mesh the name of a section.
 
-    Parameters
-    ----------
-    point
-        Its place (x, y) in the stress-free body: a tuple, a list or an array (2,); or the name of
-        a boundary that is one section, as "right", for the axis there.
-    mesh
-        Of the body, without which no boundary can be named; or None.
+    Raises MeshError for anything else.
     """
-    if type(point) is tuple and len(point) == 2 and (
-            isinstance(point[0], float) and isinstance(point[1], float)
-            and abs(point[0]) + abs(point[1]) < np.inf):
-        return np.array(point, float)
-    if isinstance(point, (list, tuple)):
-        flat = len(point) == 2 and not any(
-            isinstance(x, (list, tuple)) or np.ndim(x) for x in point)
-    else:
-        flat = isinstance(point, np.ndarray) and point.shape == (2,)
-    if flat and not any(
-            isinstance(x, (str, bytes, bool, np.bool_)) for x in point):
-        return require_finite("a material point", point, (2,))
     if isinstance(point, str) and mesh is not None and point in (mesh.boundaries or {}):
         return mesh.p[:, node_of(mesh, point)]
+    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and not any(
+            isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x) for x in point):
+        return require_finite("a material point", point, (2,))
     raise MeshError("a material point has two coordinates (x, y), its place in the stress-free "
                     f"body, or is the name of an end, as 'right', got {shown(point)}")
 
@@ -95,7 +80,7 @@ def on_other_mesh(place: object) -> bool:
 
 
 def facets_of(mesh: Chain, place: Place) -> Array:
-    """The facets that a place means.
+    """Numbers of the facets that a place means, shape (n,), n >= 1.
 
     This is the one rule for every method that takes a place:
 
@@ -107,6 +92,8 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     * an array of integers holds numbers of facets,
     * another tuple, list or set holds places: all of them; an array (n, 2) holds n points.
 
+    A scikit-fem ``OrientedBoundary`` stays one.
+
     Parameters
     ----------
     mesh
@@ -114,19 +101,10 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     place
         As above.
 
-    Returns
-    -------
-    ndarray
-        Numbers of facets, shape (n,), n >= 1; a scikit-fem ``OrientedBoundary`` stays one.
-
     Raises
     ------
-    NameUnknown
-        If a name is not known.
-    MeshError
-        If there is no facet at the place; the message says what is near.
-    InputError
-        If it is no place.
+    NameUnknown, MeshError, InputError
+        If a name is not known, there is no facet at the place, or it is no place.
 
     Examples
     --------
@@ -145,7 +123,13 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     if isinstance(place, np.ndarray):
         return _numbered(mesh, place)
     if callable(place):
-        return _satisfying(mesh, place)
+        x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
+        found = satisfying(place, x)
+        if not len(found):
+            raise MeshError(f"the function {place!r} selects none of the {x.shape[1]} facets, "
+                            f"whose middles lie from {_pair(x.min(axis=1))} to "
+                            f"{_pair(x.max(axis=1))}; boundaries with names are {_names(mesh)}")
+        return found
     if isinstance(place, (tuple, list, set, frozenset)) and len(place) and not all(
             isinstance(p, numbers.Number) for p in place):
         return np.unique(np.concatenate([np.asarray(facets_of(mesh, p)) for p in place]))
@@ -159,20 +143,7 @@ def facets_of(mesh: Chain, place: Place) -> Array:
 
 
 def node_of(mesh: Chain, place: Place) -> int:
-    """The node of a place that is one section.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    place
-        As of :func:`facets_of`.
-
-    Raises
-    ------
-    MeshError
-        If it is none, or more than one.
-    """
+    """The node of a place that is one section; raises MeshError of others."""
     facets = np.asarray(facets_of(mesh, place))
     if len(facets) != 1 or facets[0] >= mesh.p.shape[1]:
         raise MeshError(f"boundary {place!r} is not one section of the beam; sections are "
@@ -181,20 +152,10 @@ def node_of(mesh: Chain, place: Place) -> int:
 
 
 def section_at(mesh: Chain, point: ArrayLike) -> int:
-    """The node on whose section a point of the stress-free body lies.
+    """The node on whose section a point (2,) of the stress-free body lies.
 
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    point
-        Its place in the stress-free body, shape (2,); off the section by at most 1e-6 of
-        the shorter element next to it.
-
-    Raises
-    ------
-    MeshError
-        If there is none or more than one.
+    It may be off by 1e-6 of the shorter element next to it. Raises MeshError if there is none, or
+    more than one.
     """
     x = as_point(point, mesh)
     d = x[:, None] - mesh.p
@@ -255,23 +216,13 @@ def _numbered(mesh: Chain, facets: Array) -> Array:
     return facets
 
 
-def _satisfying(mesh: Chain, test: Callable[[Array], Any]) -> Array:
-    x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
-    try:
-        found = test(x)
-        chosen = np.asarray(found)
-    except AncfError:
-        raise
-    except Exception as error:  # the function is the user's: it may raise anything
-        raise InputError(f"the function {test!r} that names a place fails for points x of shape "
-                         f"{x.shape}: {type(error).__name__}: {error}") from error
+def satisfying(test: Callable[[Array], Any], x: Array) -> Array:
+    """Numbers of the points x (2, n) for which a function returns True."""
+    found = ask(f"the function that names a place, of x of shape {x.shape},", test, x)
+    chosen = np.asarray(found)
     if is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool:
-        raise InputError(f"a function that names a place takes points x of shape (2, n) and "
-                         f"returns n truth values, as lambda x: x[0] > 1; for n = {x.shape[1]} it "
-                         f"returned {chosen.dtype} of shape {chosen.shape}")
-    if not np.any(chosen):
-        low, high = x.min(axis=1), x.max(axis=1)
-        raise MeshError(f"the function {test!r} selects none of the {len(chosen)} facets, whose "
-                        f"middles lie from {_pair(low)} to {_pair(high)}; boundaries with names "
-                        f"are {_names(mesh)}")
+        raise CallbackError(
+            "a function that names a place takes points x of shape (2, n) and returns n truth "
+            f"values, as lambda x: x[0] > 1; for n = {x.shape[1]} it returned {chosen.dtype} of "
+            f"shape {chosen.shape}")
     return np.nonzero(chosen)[0].astype(np.int32)
