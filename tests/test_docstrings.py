@@ -151,7 +151,8 @@ def test_shapes_of_arrays_are_said(function, owner):
         found.update(described(text))
     for p in arguments(function, owner):
         if str(p.annotation).split(" |")[0] in ARRAYS and found.get(p.name):
-            assert re.search(r"\([^()]*(,|\.\.\.)[^()]*\)", found[p.name]), (
+            text = f"{function.__doc__} {found[p.name]}"
+            assert re.search(r"\([^()]*(,|\.\.\.)[^()]*\)", text), (
                 f"{function.__qualname__} does not say the shape of {p.name!r}")
 
 

@@ -609,7 +609,13 @@ class MeshBeam(Immutable, NumberedMesh):
     # pictures and files
 
     def to_meshquad(self, nx: int = 8, ny: int = 4) -> MeshQuad:
-        """A ``skfem.MeshQuad`` of the stress-free body, of nx by ny quads for each element."""
+        """A ``skfem.MeshQuad`` of the stress-free body.
+
+        Parameters
+        ----------
+        nx, ny
+            Quads along and across each element.
+        """
         nx, ny = (require_integer(name, n, 1, MAX_SUBDIVISION) for name, n in (("nx", nx),
                                                                              ("ny", ny)))
         quad = MeshQuad.init_tensor(np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1))
@@ -622,7 +628,15 @@ class MeshBeam(Immutable, NumberedMesh):
         return MeshQuad(self._mapping().F(quad.p).reshape(2, -1)[:, kept], t.reshape(4, -1))
 
     def draw(self, visuals: str = "matplotlib", **kwargs: Any) -> Any:
-        """Draw the outline of the elements, as :meth:`skfem.Mesh.draw`."""
+        """Draw the outline of the elements.
+
+        Parameters
+        ----------
+        visuals
+            Name of the module of ``skfem.visuals``.
+        **kwargs
+            Those of :meth:`skfem.Mesh.draw`.
+        """
         return self._outline().draw(visuals, **kwargs)
 
     def _repr_svg_(self):
@@ -679,7 +693,15 @@ class MeshBeam(Immutable, NumberedMesh):
 
     @classmethod
     def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
-        """Load a mesh saved as ``.npz``; ``out`` is there as in scikit-fem and not used."""
+        """Load a mesh saved as ``.npz``.
+
+        Parameters
+        ----------
+        filename
+            Of a file that :meth:`save` wrote.
+        out, **kwargs
+            Not used: they are there as for ``skfem.Mesh.load``.
+        """
         path = require_path("filename", filename)
         require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":
