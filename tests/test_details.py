@@ -18,7 +18,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
                         SupportError, forms)
 from skfem_ancf.equations.border import mean_stiffness
 from skfem_ancf.dynamics import steps
-from skfem_ancf.dynamics.integrate import Integrator
+from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.io import PvdWriter
 from skfem_ancf.actions.joints import Joint, PrescribedAngle, Weld
 from skfem_ancf.core.quadrature import gauss, tensor

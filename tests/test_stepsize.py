@@ -14,8 +14,7 @@ from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlp
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
 from skfem_ancf.dynamics.energy_momentum import PARTS
-from skfem_ancf.dynamics.integrator import Integrator, StepFailed
-from skfem_ancf.dynamics.run import Run, interpolate
+from skfem_ancf.dynamics.run import Run, StepFailed, integrator_of, interpolate
 from skfem_ancf.core.errors import InputError
 from skfem_ancf.equations.momentum import momentum
 
@@ -162,12 +161,12 @@ def test_what_is_damped_away_is_not_added_up():
     """By a resistance alpha times the mass: 1 / (1 + alpha T / 2) is left in the mean of T."""
     scene = swinging().damping(mass=40.0)
     s = scene.system
-    integrator = Integrator(s, Radau())
+    integrator = integrator_of(s, Radau())
     y = integrator.start(np.zeros(s.N), np.zeros(s.N), 0.0, 0.01)
     integrator.step(y, 0.01)
     du = np.random.default_rng(2).normal(size=s.N) * s.constraints.free
     assert_allclose(integrator.scheme.lasting(integrator, du, 0.5), du / 11.0, rtol=1e-9)
-    free = Integrator(swinging().system, Radau())
+    free = integrator_of(swinging().system, Radau())
     assert free.scheme.lasting(free, du, 0.5) is du
 
 

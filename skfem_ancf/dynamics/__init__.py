@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..core.errors import require_option
-from .base import Motion, Scheme, Steps
+from .base import Motion, Scheme
 from .choice import choose_scheme
 from .energy_momentum import EnergyMomentum, EnergyMomentum4
 from .gauss import Gauss
@@ -31,5 +31,4 @@ def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
 
 
 __all__ = ["HHT", "SCHEMES", "EnergyMomentum", "EnergyMomentum4", "Gauss", "GeneralizedAlpha",
-           "Motion", "Newmark", "Radau", "Scheme", "Steps", "choose_scheme",
-           "get_scheme"]
+           "Motion", "Newmark", "Radau", "Scheme", "choose_scheme", "get_scheme"]

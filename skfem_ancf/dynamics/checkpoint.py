@@ -1,164 +1,116 @@
-"""Files from which a motion goes on: what they hold, how they are written and checked."""
+"""Files from which a motion goes on: arrays by name, how they are written and checked."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import logging
 import time
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..actions.forces.system import Forces
 from ..core import archive
-from ..core.archive import find_h5py
-from ..core.archive import write as _write
+from ..core.archive import find_h5py, write
 from ..core.errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
                            require_path, shown, warn)
-from ..actions.forces.system import Forces
-from .base import Motion, recalled
-from .gauss import Gauss
-from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
-from .run import MAX_STEPS, Run, Task, task_of
+from .base import Motion, stored
+from .run import Run, task_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from ..results.state import State
-    from ..equations.system import System
     from ..core.types import Array, StrPath
+    from ..equations.system import System
+    from ..results.state import State
     from .base import Scheme
     from .sensors import Sensor
 
-logger = logging.getLogger(__name__)
-
-FORMAT = 8
+FORMAT = "skfem-ancf checkpoint 9"
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Points of the surface, about, at which distances of obstacles are.
 PLACES = 32
 #: Seconds between two files by default, and the part of the time that writing may take.
 SECONDS, SHARE = 60.0, 0.05
-_MAGIC = "skfem-ancf checkpoint"
 
 
 # the scene
 
 
-def _digest(*items):
-    h = hashlib.sha256()
-    for item in items:
-        if isinstance(item, np.ndarray):
-            h.update(f"{item.dtype.str}{item.shape}".encode())
-            h.update(np.ascontiguousarray(item).tobytes())
-        else:
-            h.update(repr(item).encode())
-    return h.hexdigest()
+def description(system: System, t_start: float, t_end: float) -> dict[str, Array]:
+    """What a scene is, arrays (...) by the names of its parts.
 
-
-def _numbers(thing):
-    """The attributes of an object that are numbers, text or arrays, in a fixed order."""
-    return [(k, v) for k, v in sorted(vars(thing).items())
-            if not k.startswith("_")
-            and isinstance(v, (bool, int, float, str, tuple, np.ndarray, type(None)))]
-
-
-def fingerprint(system: System) -> dict[str, str]:
-    """What a scene is, part by part, as text; functions of time are not in it.
-
-    Returns
-    -------
-    dict
-        From the name of a part to its hash.
-    """
-    parts, probe = {}, np.random.default_rng(0).standard_normal(system.N)
-    for k, beam in enumerate(system.beams):
-        mesh, who = beam.mesh, f"of beam {beam.name or k}"
-        parts[f"mesh {who}"] = _digest(mesh.p, mesh.t, mesh.height, mesh.lengths, mesh.sections,
-                                       beam.q0, *([] if mesh.heights is None else [mesh.heights]))
-        parts[f"element {who}"] = _digest(type(beam.element).__name__, beam.element.order,
-                                          beam.element.axis_degree, beam.nd)
-        parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))
-        parts[f"width {who}"] = (_digest(beam.width) if beam.across.plain else _digest(
-            *(x for pack in beam.kernel.packs for x in (
-                pack.weights, getattr(pack, "stiffness", None), getattr(pack, "moduli", None))),
-            *(x for layer in beam.across.layers for x in (
-                type(layer.material).__name__, *_numbers(layer.material))),
-            *(beam.masses[1::2] if all(layer.density is not None for layer in beam.across.layers)
-              else ())))
-        parts[f"damping {who}"] = _digest(beam.damping)
-        parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
-    for k, body in enumerate(system.bodies):
-        parts[f"rigid body {body.name or k}"] = _digest(body.mass, body.inertia, body.q0)
-    held = system.constraints
-    parts["supports"] = _digest(held.fixed, held.values(1.0, 0.0)[:0], held.given)
-    damping = system.damping
-    parts["damping"] = _digest(damping.mass, damping.stiffness, damping.modal)
-    for k, load in enumerate(system.loads):
-        size = load.beam.size if load.beam in system.bodies else load.beam.mesh.height
-        u = 1e-3 * size * probe[system.of(load)]
-        parts[f"load {k}"] = _digest(type(load).__name__, system.members.index(load.beam),
-                                     load.amplitude is None, load.force(0.0 * u), load.force(u))
-    for k, joint in enumerate(system.constraints.all_joints):
-        J = [] if joint.moving else [a for u in (0.0 * probe, probe)
-                                     for a in joint.entries(u, 0.0)]
-        J += [] if joint.moving else [joint.value(0.0 * probe, 0.0)]
-        parts[f"joint {k}"] = _digest(type(joint).__name__, joint.equations, joint.moving, *J)
-    for k, element in enumerate(system.forces.elements):
-        alone = Forces([element.unheld()], system.N, system.bandwidth)
-        tables = alone.tables(lambda i, j: i, False, 0)
-        values = [alone.stiffness(tables, 0.0, 1e-3 * probe, probe, c) for c in (0.0, 1.0)]
-        for place in alone.own:
-            x, v = _moved(place)
-            values += [np.array(place.force(x - v, 0.0 * v, 0.0)), np.array(place.force(x, v, 0.0))]
-        for mass in alone.masses:
-            values += mass.mass_entries()
-        values += alone.contacts.tables[1:3] if element.groups else []
-        parts[f"force element {k}"] = _digest(type(element).__name__, tables.numbers, tables.start,
-                                              tables.of, tables.weight, *values)
-    return parts
-
-
-def _moved(element):
-    """Points of a force element a little beside their start, and how far: (n, 2) twice."""
-    x = np.array([one.start for one in element.links])
-    v = 1e-3 * np.linalg.norm(x, axis=-1, keepdims=True) * np.random.default_rng(0).standard_normal(
-        x.shape)
-    return x + v, v
-
-
-def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
-    """Functions of time of a scene at a few times, by name: dict of arrays (n, k).
-
-    A function has no hash; these values tell most that differ.
+    Forces of each part at a displacement and a velocity that are as good as random, and functions
+    of time at a few times: that tells most scenes that differ.
 
     Parameters
     ----------
     system
-        The :class:`~skfem_ancf.equations.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     t_start, t_end
         Times of start and end of the motion.
     """
-    times, found = np.linspace(t_start, t_end, TIMES), {}
+    times, rng = np.linspace(t_start, t_end, TIMES), np.random.default_rng(0)
+    u, v = 1e-3 * rng.standard_normal((2, system.N)) * np.concatenate(
+        [member.sizes for member in system.members])
+    force, inertia = system.internal_force(u, t_start), system.mass.multiply(u)
+    found = {"supports": np.append(system.constraints.fixed, system.constraints.values_at(times)),
+             "damping": system.damping_force(u, v, t_start) if system.damped else np.zeros(1)}
+    for k, member in enumerate(system.members):
+        part = system.of(member)
+        found |= {f"mesh of member {k}": member.q0, f"stiffness of member {k}": force[part],
+                  f"mass of member {k}": inertia[part]}
     for k, load in enumerate(system.loads):
+        found[f"load {k}"] = np.append(load.force(u[system.of(load)]), system.of(load).start)
         if load.amplitude is not None:
-            found[f"amplitude of load {k}"] = np.array([[load.factor(t)] for t in times])
+            found[f"amplitude of load {k}"] = np.array([load.factor(t) for t in times])
     for k, joint in enumerate(system.constraints.all_joints):
-        if joint.moving:
-            found[f"motion of joint {k}"] = np.asarray(joint.offset(times, system.N), dtype=float)
-    for k, one in enumerate(system.forces.contacts.obstacles):
-        if one.moves:
-            found[f"motion of obstacle {k}"] = np.array([one.pose(t)[:6] for t in times])
-        x = np.concatenate([group.starts[:2] for group in one.groups], axis=1)
-        x = x[:, ::max(1, x.shape[1] // PLACES)]
-        found[f"shape of obstacle {k}"] = np.array([one.shape.distance(x, t) for t in times])
+        moments = times if joint.moving else times[:1]
+        found[f"joint {k}"] = np.array([joint.value(u, t) for t in moments])
     for k, element in enumerate(system.forces.elements):
-        if element in system.forces.own:
-            x = np.array([one.start for one in element.links])
-            found[f"force of element {k}"] = np.array([
-                np.ravel(element.unheld().force(x, 0.0 * x, t)) for t in times], dtype=float)
+        found[f"force element {k}"] = np.concatenate(
+            [np.ravel(x) for x in _of_element(system, element.unheld(), u, v, times)])
+    for k, obstacle in enumerate(system.forces.contacts.obstacles):
+        x = np.concatenate([group.starts[:2] for group in obstacle.groups], axis=1)
+        x = x[:, ::max(1, x.shape[1] // PLACES)]
+        found[f"obstacle {k}"] = np.array([obstacle.shape.distance(x, t) for t in times])
+        if obstacle.moves:
+            found[f"motion of obstacle {k}"] = np.array([obstacle.pose(t)[:6] for t in times])
     return found
+
+
+def _of_element(system, element, u, v, times):
+    """Numbers of a force element."""
+    alone = Forces([element], system.N, system.bandwidth)
+    tables = alone.tables(lambda i, j: i, False, 0)
+    yield from (tables.numbers, tables.start, tables.of, tables.weight)
+    yield from (alone.stiffness(tables, 0.0, u, v, c) for c in (0.0, 1.0))
+    for own in alone.own:
+        x = np.array([one.start for one in own.links])
+        moved = 1e-3 * np.linalg.norm(x, axis=-1, keepdims=True) * np.random.default_rng(
+            0).standard_normal(x.shape)
+        yield own.force(x + moved, moved, times[0])
+        yield from (own.force(x, 0.0 * x, t) for t in times)
+    yield from (x for mass in alone.masses for x in mass.mass_entries())
+    if element.groups:
+        yield from alone.contacts.tables[1:3]
+
+
+def differences(now: dict[str, Array], then: dict[str, Array]) -> list[str]:
+    """Names of the parts by which two scenes differ, arrays (...) of :func:`description`.
+
+    Parameters
+    ----------
+    now, then
+        Of the scenes.
+    """
+    def same(x, y):
+        return y is not None and x.shape == y.shape and y.dtype.kind in "biuf" and np.allclose(
+            x, y, rtol=0, atol=1e-12 * np.abs(x).max(initial=0.0), equal_nan=True)
+
+    return [*(name for name, x in now.items() if not same(x, then.get(name))),
+            *(name for name in then if name not in now)]
 
 
 def same_problem(system: System, start: State, t: float) -> bool:
@@ -166,84 +118,64 @@ def same_problem(system: System, start: State, t: float) -> bool:
 
     Parameters
     ----------
-    system
-        The :class:`~skfem_ancf.equations.system.System`.
+    system, t
+        The :class:`~skfem_ancf.equations.system.System`, and the time.
     start
         An instant of a motion.
-    t
-        The time.
     """
     other, u = start.system, start.u
     if other is system and t == start.t:
         return True
-    if len(u) != system.N or fingerprint(other) != fingerprint(system):
+    then: Any = start.t
+    if len(u) != system.N or differences(description(system, t, t), description(other, then, then)):
         return False
-    now, then = np.array([t]), np.array([start.t])
-    pairs = [(system.external_force(u, t), other.external_force(u, start.t)),
-             (system.constraints.values_at(now), other.constraints.values_at(then)),
-             (system.constraints.constraint(u, t), other.constraints.constraint(u, start.t))]
-    if system.forces.own:  # which may depend on time
-        pairs.append((system.internal_force(u, t), other.internal_force(u, start.t)))
+    pairs = [(system.external_force(u, t), other.external_force(u, then)),
+             (system.constraints.constraint(u, t), other.constraints.constraint(u, then))]
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
-# schemes as text
+# schemes
 
 
 def _scheme_text(scheme):
-    from . import SCHEMES
-
-    values = vars(scheme)
-    known = type(scheme) in SCHEMES.values() and all(
-        isinstance(v, (int, float)) for v in values.values())
-    return {"name": scheme.name or type(scheme).__name__, "values": values if known else None}
+    """The class and the numbers of a scheme."""
+    return json.dumps([scheme.name or type(scheme).__name__, vars(scheme)], default=repr)
 
 
 def _scheme_of(text, given):
+    """The scheme of a file: one of the package, or what the caller gives."""
     from . import SCHEMES, get_scheme
 
+    name, values = json.loads(text)
     if given is not None and given != "auto":  # what that was is in the file
         scheme = get_scheme(given)
         if _scheme_text(scheme) != text:
-            raise CheckpointError(f"the file is of a run by {text}, not by {scheme!r}")
+            raise CheckpointError(f"the file is of a run by {name!r} of {values}, not by "
+                                  f"{scheme!r}")
         return scheme
-    if text["values"] is None or text["name"] not in SCHEMES:
-        raise CheckpointError(f"the run was made by a scheme of your own, {text['name']!r}: give "
-                              "it, resume(path, scheme=...)")
-    try:
-        scheme = _MADE.get(text["name"], lambda values: SCHEMES[text["name"]]())(text["values"])
-        known = vars(scheme)
-        same = known.keys() == text["values"].keys() and all(
-            abs(known[name] - value) <= 1e-12 for name, value in text["values"].items())
-    except (KeyError, InputError):
-        same = False
-    if not same:
-        raise CheckpointError(f"there is no scheme {text}")
-    known.update({name: type(known[name])(value) for name, value in text["values"].items()})
+    if name not in SCHEMES:
+        raise CheckpointError(f"the run was made by a scheme of your own, {name!r}: give it, "
+                              "resume(path, scheme=...)")
+    scheme = SCHEMES[name].__new__(SCHEMES[name])
+    for attribute, value in values.items():
+        setattr(scheme, attribute, value)
     return scheme
-
-
-#: How a scheme with parameters is made of its numbers.
-_MADE: dict[str, Callable[[dict[str, Any]], Scheme]] = {
-    "generalized-alpha": lambda values: GeneralizedAlpha(
-        min(1.0, values["alpha_f"] / (1.0 - values["alpha_f"]))),
-    "hht": lambda values: HHT(values["alpha_f"]),
-    "newmark": lambda values: Newmark(values["beta"], values["gamma"]),
-    "gauss": lambda values: Gauss(values["number"]),
-}
 
 
 # files
 
 
 def _checksum(arrays):
-    return np.frombuffer(bytes.fromhex(_digest(*(
-        part for name in sorted(arrays) for part in (name, arrays[name])))), dtype=np.uint8)
+    h = hashlib.sha256()
+    for name in sorted(arrays):
+        x = np.ascontiguousarray(arrays[name])
+        h.update(f"{name} {x.dtype.str} {x.shape} ".encode() + x.tobytes())
+    return np.frombuffer(h.digest(), dtype=np.uint8)
 
 
-def read(path: StrPath) -> tuple[dict[str, Array], dict[str, Any]]:
-    """The arrays of a checkpoint by name, and its text; raises CheckpointError."""
-    path = require_path("checkpoint", _path(path))
+def read(name: StrPath) -> dict[str, Array]:
+    """The arrays of a checkpoint by name; raises CheckpointError."""
+    path = _path(name)
     if not path.exists():
         raise CheckpointError(f"there is no file {str(path)!r}")
     try:
@@ -251,56 +183,18 @@ def read(path: StrPath) -> tuple[dict[str, Array], dict[str, Any]]:
     except (OSError, archive.Unreadable) as error:
         raise CheckpointError(f"{str(path)!r} cannot be read, it is no checkpoint or damaged: "
                               f"{error}") from None
+    written = arrays.pop("format", None)
+    if written is None or written.shape or written.dtype.kind != "S":
+        raise CheckpointError(
+            f"{str(path)!r} is a checkpoint of an earlier version: that version goes on with it"
+            if "text" in arrays else f"{str(path)!r} is no checkpoint of a motion")
+    if written.item().decode(errors="replace") != FORMAT:
+        raise CheckpointError(f"{str(path)!r} has the format {shown(written.item().decode())}, "
+                              f"this version reads {FORMAT!r}")
     checksum = arrays.pop("checksum", None)
-    try:
-        text = json.loads(bytes(arrays.pop("text")).decode(), parse_constant=float)
-        is_one = isinstance(text, dict) and text.get("what") == _MAGIC
-    except (KeyError, ValueError, TypeError, RecursionError):
-        is_one = False
-    if not is_one:
-        raise CheckpointError(f"{str(path)!r} is no checkpoint of a motion")
-    if text.get("format") != FORMAT:
-        raise CheckpointError(f"{str(path)!r} has the format {shown(text.get('format'))}, this "
-                              f"version reads {FORMAT}")
-    found = _checksum({**arrays, "text": _bytes(text)})
-    if checksum is None or not np.array_equal(checksum, found):
+    if checksum is None or not np.array_equal(checksum, _checksum(arrays)):
         raise CheckpointError(f"{str(path)!r} is damaged: its checksum is not that of its content")
-    wrong = _wrong(text)
-    if wrong:
-        raise CheckpointError(f"{str(path)!r} does not say what a run needs: {wrong}")
-    return arrays, text
-
-
-def _is_number(x):
-    return type(x) in (int, float) and abs(x) < np.inf
-
-
-def _wrong(text):
-    """What of the text of a file is of another kind than it is written, or empty."""
-    task, scheme = text.get("task"), text.get("scheme")
-    if not isinstance(task, dict) or not isinstance(scheme, dict):
-        return "task, scheme"
-    scene, values, every = text.get("scene"), scheme.get("values"), text.get("every")
-    right = {
-        "every": every is None or type(every) is int and 1 <= every <= MAX_STEPS,
-        "scheme": (scheme.keys() == {"name", "values"} and type(scheme["name"]) is str
-                   and (values is None or isinstance(values, dict)
-                        and all(map(_is_number, values.values())))),
-        "scene": isinstance(scene, dict) and all(type(x) is str for x in scene.values()),
-        "task": (task.keys() == _TASK and isinstance(task["breakpoints"], list)
-                 and all(map(_is_number, task["breakpoints"]))
-                 and all(_is_number(task[name]) for name in ("t_start", "t_end", "rtol"))
-                 and all(task[name] is None or _is_number(task[name]) for name in ("dt", "tol"))),
-        "t": _is_number(text.get("t")), "done": type(text.get("done")) is bool}
-    return ", ".join(name for name, there in right.items() if not there)
-
-
-#: What of a Task is in the text.
-_TASK = {field.name for field in fields(Task)} - {"t_eval"}
-
-
-def _bytes(text):
-    return np.frombuffer(json.dumps(text, sort_keys=True).encode(), dtype=np.uint8)
+    return arrays
 
 
 def _path(path):
@@ -310,6 +204,15 @@ def _path(path):
     if path.suffix == ".h5":
         find_h5py()
     return path
+
+
+def _under(arrays, folder):
+    """Arrays whose names begin with that of a folder, without it."""
+    return {name[len(folder):]: x for name, x in arrays.items() if name.startswith(folder)}
+
+
+def _named(folder, arrays):
+    return {f"{folder}{name}": np.asarray(x) for name, x in arrays.items() if x is not None}
 
 
 class Checkpoint:
@@ -327,16 +230,13 @@ class Checkpoint:
 
     def __init__(self, path: StrPath, every: int | None, run: Run) -> None:
         self.path, self.run = _path(path), run
-        self.every: int | None = None if every is None else require_integer("every", every, 1)
-        run.longest = self.every
+        run.longest = self.every = None if every is None else require_integer("every", every, 1)
         self._steps, self._clock, self._took = run.steps, time.monotonic(), 0.0
-        task, system = run.task, run.system
-        self._functions = functions(system, task.t_start, task.t_end)
-        self._text = {
-            "what": _MAGIC, "format": FORMAT, "every": self.every,
-            "scheme": _scheme_text(run.scheme), "scene": fingerprint(system),
-            "functions": sorted(self._functions),
-            "task": {k: v for k, v in vars(task).items() if k != "t_eval"}}
+        task, scheme = run.task, run.scheme
+        self._fixed = {
+            **_named("task.", vars(task)), **_named("scene.", description(
+                run.system, task.t_start, task.t_end)),
+            "every": np.array(self.every or 0), "scheme": np.bytes_(_scheme_text(scheme).encode())}
 
     def begin(self) -> None:
         """Write the start, so that what is wrong is said before the run."""
@@ -354,73 +254,41 @@ class Checkpoint:
     def _spare(self):
         """Raise CheckpointError if the file that is there is worth keeping."""
         try:
-            _, text = read(self.path)
+            arrays = read(self.path)
         except CheckpointError as error:
             raise CheckpointError(f"{error}; it is not overwritten: choose another name") from None
-        if not text["done"]:
+        if not arrays["done"]:
             raise CheckpointError(
-                f"{str(self.path)!r} holds a run up to t = {text['t']:.6g} of "
-                f"{text['task']['t_end']:.6g}: scene.resume({str(self.path)!r}) goes on with it; "
+                f"{str(self.path)!r} holds a run up to t = {arrays['now.t']:.6g} of "
+                f"{arrays['task.t_end']:.6g}: scene.resume({str(self.path)!r}) goes on with it; "
                 "delete the file to begin again")
 
     def _write(self):
-        run, y = self.run, self.run.y
-        arrays = {f"run.{k}": np.asarray(v) for k, v in run.remember().items()}
-        arrays.update({f"history.{k}": v for k, v in run.history.columns().items()})
-        for name in run.history.COLUMNS:
-            arrays[f"now.{name}"] = np.asarray(getattr(y, name), dtype=float)
-        for k, memory in enumerate([y.memory, *run.history.memories]):
-            arrays.update({f"memory.{k}.{name}": np.asarray(v)
-                           for name, v in (memory or {}).items()})
-        for name, values in self._functions.items():
-            arrays[f"function.{name}"] = values
-        if run.recorder.sensors:
-            arrays.update({f"sensor.{k}": v for k, v in run.recorder.remember().items()})
-        if run.task.t_eval is not None:
-            arrays["t_eval"] = run.task.t_eval
-        arrays["text"] = _bytes({**self._text, "t": float(y.t), "done": bool(run.done)})
-        _write(self.path, {**arrays, "checksum": _checksum(arrays)})
+        run, now = self.run, dict(vars(self.run.y))
+        memory = now.pop("memory")
+        arrays = {**self._fixed, **_named("run.", run.arrays()), **_named("now.", now),
+                  **_named("history.", run.columns()), **_named("memory.", memory or {}),
+                  **_named("sensor.", run.recorder.arrays()), "done": np.array(run.done)}
+        write(self.path, {**arrays, "format": np.bytes_(FORMAT.encode()),
+                          "checksum": _checksum(arrays)})
         self._steps, self._clock = run.steps, time.monotonic()
 
     def update(self) -> None:
         """Write if it is time to, or the end; warns with CheckpointWarning where it fails."""
-        run = self.run
-        waited = time.monotonic() - self._clock
+        run, begun = self.run, time.monotonic()
         if self.every is not None:
             due = run.steps - self._steps >= self.every
         else:
-            due = waited > max(SECONDS, self._took / SHARE)
+            due = begun - self._clock > max(SECONDS, self._took / SHARE)
         if not (due or run.done):
             return
-        before = time.monotonic()
         try:
             self._write()
         except OSError as error:
             self._steps, self._clock = run.steps, time.monotonic()
             warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
-                          f"{run.y.t:.6g}, the last good one stays: {error}", CheckpointWarning)
-        self._took = time.monotonic() - before
-
-
-# going on
-
-
-def _compare(system, text, arrays, path):
-    """Raise CheckpointError if the scene is another than that of the file."""
-    now, then = fingerprint(system), text["scene"]
-    other = [part for part in sorted(set(now) | set(then)) if now.get(part) != then.get(part)]
-    if not other:
-        task = text["task"]
-        for name, values in functions(system, task["t_start"], task["t_end"]).items():
-            known = arrays.get(f"function.{name}")
-            size = np.abs(values).max(initial=0.0)
-            if known is None or known.shape != values.shape or known.dtype.kind not in "biuf" or (
-                    not np.allclose(
-                        values, known, rtol=0, atol=1e-12 * size, equal_nan=True)):
-                other.append(name)
-    if other:
-        raise CheckpointError(f"{str(path)!r} is of another scene, it differs in: "
-                              + ", ".join(other))
+                 f"{run.y.t:.6g}, the last good one stays: {error}", CheckpointWarning)
+        self._took = time.monotonic() - begun
 
 
 def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
@@ -443,51 +311,26 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
     CheckpointError
         If the file cannot be read, is damaged, or of another scene.
     """
-    arrays, text = read(path)
+    arrays = read(path)
     try:
-        said = text["task"]
-        task = task_of(**{**said, "dt": "auto" if said["dt"] is None else said["dt"]},
-                       t_eval=arrays.get("t_eval"))
-    except InputError as error:
-        raise CheckpointError(f"{str(path)!r} does not hold what a run needs: {error}") from None
-    _compare(system, text, arrays, path)
-    made = _scheme_of(text["scheme"], scheme)
-    try:
+        said = {"dt": "auto", "tol": None, "t_eval": None, **_under(arrays, "task.")}
+        task = task_of(**{name: x.item() if getattr(x, "shape", None) == () else x
+                          for name, x in said.items()})
+        other = differences(description(system, task.t_start, task.t_end),
+                            _under(arrays, "scene."))
+        if other:
+            raise CheckpointError("it is of another scene, it differs in: " + ", ".join(other))
+        made = _scheme_of(arrays["scheme"].item().decode(), scheme)
         run = Run(system, made, task, sensors)
-        run.recorder.recall({k[7:]: v for k, v in arrays.items() if k.startswith("sensor.")}
-                            if sensors or "sensor.t" in arrays else {"t": np.zeros(0)})
-        _restore(run, arrays, text)
-    except (InputError, KeyError, ValueError, TypeError, IndexError) as error:
-        raise CheckpointError(f"{str(path)!r} does not hold what a run needs: "
-                              f"{type(error).__name__}: {error}") from None
-    except CheckpointError as error:
-        raise CheckpointError(f"{str(path)!r} does not hold what a run needs: {error}") from None
-    return run, Checkpoint(path, text["every"], run)
-
-
-def _restore(run, arrays, text):
-    columns = {}
-    n = len(np.atleast_1d(arrays.get("history.t", ())))
-    for name, x in run.history.columns().items():
-        columns[name] = recalled(arrays, f"history.{name}", (n, *x.shape[1:]))
-        recalled(arrays, f"now.{name}", x.shape[1:])
-    memories = [{} for _ in range(n + 1)]
-    for name, value in arrays.items():
-        if name.startswith("memory."):
-            _, k, key = name.split(".", 2)
-            memories[range(n + 1)[int(k)]][key] = value
-    contacts = run.system.forces.contacts
-    for memory in memories:
-        if "contacts" in memory:
-            recalled(memory, "contacts", (contacts.tables.memory.size,))
-    now, *stored = [memory or None for memory in memories]
-    run.history.restore(columns, stored)
-    t, *rest, before, dissipated, turns = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
-    times = columns["t"]
-    if (np.diff(times) <= 0.0).any() or n and not run.task.t_start <= times[0] <= times[-1] <= t:
-        raise CheckpointError("the times of its instants do not increase up to its own")
-    if float(t) != text["t"]:
-        raise CheckpointError(f"its times are {float(t)} and {text['t']}")
-    run.recall(Motion(float(t), *rest, float(before), now, float(dissipated), turns),
-               {k[4:]: v for k, v in arrays.items() if k.startswith("run.")})
-    run.recorder.require_alike(run.y)
+        run.recorder.load(_under(arrays, "sensor."))
+        columns, now = _under(arrays, "history."), _under(arrays, "now.")
+        numbers = {name: float(now[name]) for name in ("t", "before", "dissipated")}
+        y = Motion(**{**now, **numbers}, memory=_under(arrays, "memory.") or None)
+        for name in ("u", "v", "acceleration", "algorithmic"):
+            stored(now, name, np.zeros(system.N))
+        run.load(y, _under(arrays, "run."), columns)
+    except (InputError, CheckpointError, KeyError, ValueError, TypeError) as error:
+        text = str(error) if isinstance(error, CheckpointError) else repr(error)
+        raise CheckpointError(f"{str(path)!r} cannot be gone on with: {text}") from None
+    every = int(arrays["every"])
+    return run, Checkpoint(path, every or None, run)

@@ -1,156 +1,207 @@
-"""Functions of time, asked for many steps at once."""
+"""Functions of time: amplitudes of loads, motions of supports and joints, sampled step by step.
+
+Their rates are those of a polynomial through samples within one step. No value from outside of the
+step is used: neither do rates at the end of a motion differ from those of a motion that goes on,
+nor does a kink at the end of a step spoil those of the next.
+"""
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
-from ..core.frozen import read_only
-from .rates import (END, MIDDLE, PARTS, RATE, JointMotion, JointMotions, of_step, steps_of,
-                    times_beside)
-from .steps import Course
+from ..core.sampling import sample
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..core.types import Array
     from ..equations.system import System
 
+#: Samples of a step from which rates are made.
+SAMPLES = np.linspace(0.0, 1.0, 5)
+#: Intervals of a whole motion at whose ends functions of time are sampled ahead.
+AHEAD = 4096
+#: Part of a function's range by which it may leave a parabola within one step.
+HIDDEN = 0.1
 
-class Courses:
-    """Gives the :class:`~skfem_ancf.dynamics.steps.Course` of a block of steps.
 
-    Parameters
-    ----------
-    conserving
-        The equation of motion holds in the middle of a step, not at its end.
+class Given(NamedTuple):
+    """What is given at p instants of n steps; arrays of one row where nothing varies.
 
     Attributes
     ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
+    times
+        Shape (n, p).
+    factors
+        Of the loads, shape (n, p, l) or (1, 1, l).
+    supports
+        Displacement of the degrees of freedom that are fixed, zero elsewhere, and its two rates,
+        shape (n, p, 3, N) or (1, 1, 3, N).
+    c, g
+        What the joints' equations have of time, and what their derivatives have, with both rates,
+        shapes (n, p, 3, m) and (n, p, 3, k), or (1, 1, ...).
     """
 
-    system: System
+    times: Array
+    factors: Array
+    supports: Array
+    c: Array
+    g: Array
 
-    def __init__(self, conserving: bool) -> None:
-        self._conserving = conserving
-        self._asked: Any = None, None
-        self._beside: Any = None, None
+    def rows(self, part: slice) -> Given:
+        """The same of some of the steps."""
+        return Given(*(x if len(x) == 1 else x[part] for x in self))
 
-    def of(self, start: float, dt: float, first: int, n: int, block: tuple[int, int],
-           limit: float) -> Course:
-        """For some steps.
+
+def rate_weights(at: Array, samples: Array) -> Array:
+    """What makes first and second derivatives at p places of values at k others, (2, p, k).
+
+    Parameters
+    ----------
+    at, samples
+        The places, in [0, 1], shapes (p,) and (k,).
+    """
+    k = len(samples)
+    fit = np.linalg.inv(chebvander(2.0 * samples - 1.0, k - 1))
+    return np.array([2.0**order * chebval(2.0 * at - 1.0, chebder(np.eye(k), order)).T @ fit
+                     for order in (1, 2)])
+
+
+def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
+          limit: float) -> Array:
+    """First and second rate at one time, of a function of times (n,) that returns (n, k): (2, k).
+
+    Parameters
+    ----------
+    function
+        The function.
+    t, dt, ahead
+        The start of a step of this size, or its end.
+    limit
+        Time beyond which the function is not asked.
+    """
+    values = function(np.minimum((t if ahead else t - dt) + dt * SAMPLES, limit))
+    first, second = rate_weights(np.array([0.0 if ahead else 1.0]), SAMPLES)[:, 0]
+    return np.array([first / dt @ values, second / dt**2 @ values])
+
+
+class Course:
+    """Samples the functions of time of a system in steps of one size.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    at
+        Instants of a step at which values and rates are wanted, as parts of it, shape (p,).
+    samples
+        Those of which the rates are made, shape (k,).
+    """
+
+    def __init__(self, system: System, at: Array, samples: Array) -> None:
+        self._system, self._at, self._samples = system, np.array(at), np.array(samples)
+        self._rates = rate_weights(self._at, self._samples)
+        self._block: tuple[tuple[float, ...], Given] | None = None
+
+    def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
+           block: tuple[int, int] | None = None) -> Given:
+        """What is given in some steps.
 
         Parameters
         ----------
-        start, first
-            The first step begins at ``start + first dt``.
-        dt, n
-            Size and number of the steps.
-        block
-            Numbers of steps between which functions are asked at once, so that what they return
-            does not depend on ``first`` and ``n``.
+        start, dt, steps
+            The steps of the numbers ``range(*steps)``, of which 0 begins at ``start``.
         limit
             Time beyond which no function is asked.
-
-        Returns
-        -------
-        Course
+        block
+            Numbers of steps in which functions are asked at once, so that what they return does
+            not depend on ``steps``; these by default.
         """
-        key = start, dt, *block, limit
-        if self._asked[0] != key:
-            self._asked = key, self._ask(*key)
-        whole: Course = self._asked[1]
-        if block[1] - block[0] == n:
-            return whole
-        part = slice(first - block[0], first - block[0] + n)
-        joints = whole.joints
-        return whole._replace(
-            times=whole.times[part], factors=_rows(whole.factors, part),
-            supports=_rows(whole.supports, part),
-            joints=JointMotions(_rows(joints.c, part), _rows(joints.g, part), joints.drives))
+        first, last = block = block or steps
+        key = start, dt, first, last, limit
+        if self._block is None or self._block[0] != key:
+            self._block = key, self._sampled(*key)
+        return self._block[1].rows(slice(steps[0] - first, steps[1] - first))
 
-    def _ask(self, start, dt, first, last, limit):
-        # what is given to functions of others and to texts is theirs
-        times, instants = (x.copy() for x in _times(start, dt, first, last, limit,
-                                                    self._conserving))
-        joints = self._ask_joints(times)
-        if joints is not None:
-            self._beside = (start + dt * first, dt, True, limit), joints[:PARTS + 1]
-            joints = steps_of(joints)
-        return Course(float(dt), instants, self.system.machine.tables.factors(instants[:, 1]),
-                      self._supports(times, dt), self._joints(joints, dt))
+    def _sampled(self, start, dt, first, last, limit):
+        s, tables, n = self._system, self._system.machine.tables, last - first
+        begin = np.arange(first, last)[:, None]
 
-    def _supports(self, times, dt):
-        s = self.system
-        if not s.constraints.moves:
-            return np.zeros((1, 3, s.N))
-        found = of_step(dt)[END:] @ steps_of(s.constraints.values_at(times))
-        out = np.zeros((len(found), 3, s.N))
-        out[:, :, s.constraints.fixed] = found
-        return out
+        def at(parts):
+            return np.minimum(start + dt * (begin + parts), limit)
 
-    def asked(self, t: float, dt: float, ahead: bool, limit: float) -> Any:
-        """Functions of joints within one step, shape (PARTS + 1, k); None where all are steady.
+        times = at(self._at)
+        instants = np.concatenate([times.ravel(), at(self._samples).ravel()])
 
-        Parameters
-        ----------
-        t, dt, ahead, limit
-            As of :func:`~skfem_ancf.dynamics.rates.times_beside`.
-        """
-        beside = t, dt, ahead, limit
-        if self._beside[0] != beside:
-            self._beside = beside, self._ask_joints(times_beside(*beside))
-        return self._beside[1]
+        def moving(function: Callable[[Array], Array]) -> Array:
+            """Values at the instants and both rates, shape (n, p, 3, k)."""
+            found = function(instants)
+            samples = found[times.size:].reshape(n, len(self._samples), -1)
+            values = found[:times.size].reshape(*times.shape, -1)
+            return np.stack([values, *(rates / dt**k @ samples for k, rates in enumerate(
+                self._rates, 1))], axis=2)
 
-    def joints(self, t: float, dt: float, ahead: bool, limit: float) -> JointMotion:
-        """What of joints depends on time, at one time.
-
-        Parameters
-        ----------
-        t, dt, ahead, limit
-            As of :meth:`asked`.
-        """
-        asked = self.asked(t, dt, ahead, limit)
-        found = self._joints(asked if asked is None else asked[None, ::-1], -dt if ahead else dt)
-        return JointMotion(found.c[0], found.g[0], found.drives)
-
-    def _ask_joints(self, times):
-        """c and g at the times, as of ``Tables.driven``; None where they are no tables, or steady.
-        """
-        tables = self.system.machine.tables
-        if not tables.motion_varies or tables.plain.joints.own:
-            return None
-        return tables.driven(times)
-
-    def _joints(self, asked, dt):
-        """Of what :meth:`_ask_joints` gave in each step, in the order of time."""
-        tables = self.system.machine.tables
+        supports = np.zeros((*times.shape, 3, s.N) if s.constraints.moves else (1, 1, 3, s.N))
+        if s.constraints.moves:
+            supports[..., s.constraints.fixed] = moving(s.constraints.values_at)
         c, g = tables.still
-        if asked is not None:
-            found, m = _weights(dt, self._conserving) @ asked, c.shape[2]
-            c = found[:, :3, :m].copy()
+        c, g = c[:, None], g[:, None, 1:]
+        if tables.motion_varies and not tables.plain.joints.own:
+            found = moving(tables.driven)
+            c = found[..., :s.constraints.m]
             if tables.turns:
-                g = found[:, 3:, m:].copy()
-        return JointMotions(c, g, int(tables.motion_varies))
+                g = found[..., s.constraints.m:]
+        factors = tables.factors(times.ravel())
+        factors = factors.reshape(n, len(self._at), -1) if len(factors) > 1 else factors[None]
+        return Given(times, factors, supports, c, g)
 
 
-@lru_cache(16)
-def _times(start, dt, first, last, limit, conserving):
-    """Times in the steps of a block, and two of each step: its end, and when forces act."""
-    times = start + dt * (first + np.arange(PARTS * (last - first) + 1) / PARTS)
-    times = np.minimum(times, limit)
-    return read_only(times), read_only(np.array([
-        times[PARTS::PARTS], times[PARTS // 2 if conserving else PARTS::PARTS]]).T)
+class Lookahead:
+    """Functions of time of a whole motion, so that no step passes over an event.
 
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    t_start, t_end
+        Times of start and end.
+    """
 
-@lru_cache(16)
-def _weights(dt, conserving):
-    """Rows of :func:`~skfem_ancf.dynamics.rates.of_step` for c of joints, and behind them for g."""
-    acting = MIDDLE if conserving else END
-    return of_step(dt)[[END, RATE, RATE + 1, END, acting, RATE, RATE + 1]]
+    def __init__(self, system: System, t_start: float, t_end: float) -> None:
+        self._times = np.linspace(t_start, t_end, AHEAD + 1)
+        columns = [sample(load.amplitude, self._times).reshape(-1, 1) for load in system.loads
+                   if load.amplitude is not None]
+        columns += [joint.moved(self._times, system.N) for joint in system.constraints.all_joints
+                    if joint.moving]
+        values = np.hstack([np.zeros((AHEAD + 1, 0)), *columns])
+        values = values[:, np.all(np.isfinite(values), axis=0)]
+        size = np.ptp(values, axis=0)
+        varies = size > 1e-12 * np.abs(values).max(axis=0, initial=0.0)
+        self._values = values[:, varies] / size[varies]
 
+    def cut(self, t: float, dt: float) -> float:
+        """A step size, at most dt, in which no function of time does what is not seen.
 
-def _rows(x, part):
-    """A part of the rows of an array, or its only one."""
-    return x if len(x) == 1 else x[part]
+        It is not seen if it is no parabola within the step: a blow that begins and ends there.
+
+        Parameters
+        ----------
+        t, dt
+            Start of the step, and its largest size.
+        """
+        while self._values.shape[1]:
+            i, j = np.searchsorted(self._times, (t, t + dt))
+            if j - i < 3:
+                break
+            at = np.array([np.interp((t, t + 0.5 * dt, t + dt), self._times, column)
+                           for column in self._values.T]).T
+            x = ((self._times[i:j] - t) / dt)[:, None]
+            parabola = (at[0] * (1 - x) * (1 - 2 * x) + at[1] * 4 * x * (1 - x)
+                        + at[2] * x * (2 * x - 1))
+            if np.all(np.abs(self._values[i:j] - parabola) <= HIDDEN):
+                break
+            dt *= 0.5
+        return dt

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import InputError
-from .base import Motion, Scheme, contacts_of
+from .base import Motion, Scheme
 from .differences import derivative, grown
 
 if TYPE_CHECKING:
@@ -94,7 +94,8 @@ class EnergyMomentum4(EnergyMomentum):
         begin, lost = y.t, y.dissipated
         for part in PARTS:
             y = integrator.take(y, part * dt)
-        new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False, memory=contacts_of(y))
+        new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False,
+                               contacts=y.contacts)
         new.dissipated = lost
         return new
 

@@ -2,44 +2,59 @@
 
 from __future__ import annotations
 
-from itertools import chain
-from operator import attrgetter
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError, require_finite, require_index, require_path, shown
 from ..actions.forces.turns import Turns
-from ..core.kept import cached_property
 from ..beam.points import require_body
+from ..core.errors import InputError, require_finite, require_index, require_path, shown
 from ..equations.momentum import angular_momentum, momentum
 from ..recovery.resultants import over_time
 from ..results.points import MaterialPoints
 from ..results.state import Reaction, State
-from .base import Motion, contacts_of
+from .base import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import ArrayLike
 
     from ..actions.joints.base import Joint
-    from ..recovery.resultants import Resultants
-    from ..equations.system import System
-    from ..core.types import Array, Place, StrPath
     from ..beam.layout import WhichBeam, WhichMember
-    from .base import Scheme, Steps
-
-    Columns = tuple[Array, ...]
+    from ..core.types import Array, Place, StrPath
+    from ..equations.system import System
+    from ..recovery.resultants import Resultants
+    from .base import Scheme
+    from .sensors import Readings
 
 #: What is stored of a Motion.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
-           "dissipated", "turns")
-_COLUMNS_OF = attrgetter(*COLUMNS)
-#: Attributes of a motion that has ended that are made when one of them is asked for.
-_LATE = {"t", "u", "v", "acceleration", "multipliers", "dissipated", "_others", "_memories"}
+           "dissipated", "contacts", "turns")
 #: Instants of a picture where none are named.
 STROBES = 8
+
+
+def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> State:
+    """A Motion as a State.
+
+    Parameters
+    ----------
+    system, scheme
+        What is integrated, and how.
+    y
+        The Motion.
+    arrays
+        What the run goes on with from there, or None.
+    """
+    inertia = system.mass.multiply(y.acceleration)
+    if system.damped:
+        with system.forces.contacts.lent(y.contacts):
+            inertia = inertia + system.damping_force(y.u, y.v, y.t)
+    return State(system, y.u, load=1.0, converged=True, t=y.t, message=f"t = {y.t:g}",
+                 multipliers=y.multipliers, inertia=inertia, acceleration=y.acceleration, motion=y,
+                 origin=(scheme, arrays), memory=y.contacts)
 
 
 class History(MaterialPoints):
@@ -49,8 +64,12 @@ class History(MaterialPoints):
     ----------
     system, scheme
         What was integrated, and how.
-    run
-        The :class:`~skfem_ancf.dynamics.run.Run` that stores its instants here.
+    columns
+        Arrays (nt, ...) by the names of what is stored of a Motion.
+    last
+        The last instant, or None; and what the run goes on with from there, or None.
+    sensors, counts
+        As below; the latter by name.
 
     Attributes
     ----------
@@ -84,112 +103,22 @@ class History(MaterialPoints):
         NaN where these steps have failed. None without a check.
     """
 
-    COLUMNS = COLUMNS
-    t: Array
-    u: Array
-    v: Array
-    acceleration: Array
-    multipliers: Array
-    dissipated: Array
-    _others: tuple[Array, ...]
-    _memories: list[Sequence[Any]]
+    event: float | None
+    error: float | None
+    steps: int
+    substeps: int
+    rejected: int
+    iterations: int
+    factorizations: int
 
-    def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
-        self.system, self.scheme, self._run = system, scheme, run
-        self.error: float | None = None
-        self._rows: list[Motion] = []  # behind those of the blocks
-        self._blocks: list[tuple[Columns, Sequence[Any]]] = []
-        self._kept: Any = None
-        self._turns = Turns(system)
-
-    def append(self, y: Motion) -> None:
-        """Store an instant."""
-        self._rows.append(y)
-
-    def extend(self, taken: Steps) -> None:
-        """Store the instants after some steps."""
-        if self._rows:
-            self._blocks, self._rows = self._stored(), []
-        self._blocks.append((taken.columns(), taken.memories))
-
-    def _stored(self):
-        """All of it in blocks: columns in their order, and memories."""
-        if not self._rows:
-            return self._blocks
-        columns = tuple(map(np.array, zip(*map(_COLUMNS_OF, self._rows))))
-        return [*self._blocks, (columns, [y.memory for y in self._rows])]
-
-    def _remembered(self):
-        """The memories of all of it, in the same blocks."""
-        return [*(memories for _, memories in self._blocks), [y.memory for y in self._rows]]
-
-    def _end(self):
-        """The time of the last instant that is stored; -inf before the first."""
-        if self._rows:
-            return self._rows[-1].t
-        if not self._blocks:
-            return -np.inf
-        (times, *_), _ = self._blocks[-1]
-        return times[-1]
-
-    def end(self, y: Motion) -> None:
-        """Store the last instant, if it is not stored."""
-        if self._end() < y.t:
-            self._rows.append(y)
-
-    def columns(self) -> dict[str, Array]:
-        """What was stored, as arrays by their names in :attr:`COLUMNS`."""
-        stored = self._stored()
-        if not stored:
-            N, m = self.system.N, self.system.constraints.m
-            sizes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,),
-                     "turns": (self._turns.number,)}
-            return {name: np.zeros((0, *sizes.get(name, (N,)))) for name in self.COLUMNS}
-        columns = zip(*(columns for columns, _ in stored))
-        return dict(zip(self.COLUMNS, map(np.concatenate, columns)))
-
-    def restore(self, columns: dict[str, Array], memories: Sequence[Any]) -> None:
-        """Fill an empty History with what :meth:`columns` gave.
-
-        Parameters
-        ----------
-        columns
-            Arrays by their names in :attr:`COLUMNS`.
-        memories
-            What the scheme kept at each instant, :attr:`memories`.
-        """
-        self._blocks.append((tuple(columns[name] for name in self.COLUMNS), memories))
-
-    @property
-    def memories(self) -> list[Any]:
-        """What the scheme itself kept at each instant."""
-        return list(chain.from_iterable(self._remembered()))
-
-    def close(self) -> History:
-        """Nothing more comes: what was stored are arrays from now on."""
-        run = self._run
-        self.event, self.sensors = run.event, run.recorder.readings()
-        if run.y is not None and self._end() == run.y.t:
-            self._kept = run.remember()  # of the last instant: the factors too
-        self.steps, self.rejected = run.steps, run.rejected
-        self.iterations = run.integrator.iterations
-        self.factorizations = run.integrator.factorizations
-        self.substeps = run.integrator.substeps
-        self._run = None
-        return self
-
-    def __getattr__(self, name):
-        """Arrays are made of what was stored where one of them is asked for."""
-        made = vars(self)
-        if name not in _LATE or made.get("_run", self) is not None:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        columns, memories = self.columns(), self._remembered()
-        if name not in made:  # another thread may have made them
-            made["_others"] = tuple([columns.pop(x) for x in ("algorithmic", "force", "before",
-                                                                  "turns")])
-            made.update(columns, _memories=memories)
-            self._blocks, self._rows = [], []
-        return made[name]
+    def __init__(self, system: System, scheme: Scheme, columns: dict[str, Array],
+                 last: tuple[Motion | None, Any], sensors: Readings, **counts: Any) -> None:
+        self.system, self.scheme, self.sensors = system, scheme, sensors
+        self._columns, self._last, self.error = columns, last, None
+        self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
+        self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
+        self.dissipated = columns["dissipated"]
+        vars(self).update(counts)
 
     def __len__(self):
         return len(self.t)
@@ -208,36 +137,14 @@ class History(MaterialPoints):
         <skfem_ancf.Scene.integrate>` from it (``start=``) continues the motion.
         """
         k = require_index("k", k, len(self))
-        algorithmic, force, before, turns = (x[k] for x in self._others)
-        motion = Motion(float(self.t[k]), self.u[k], self.v[k], self.acceleration[k], algorithmic,
-                        self.multipliers[k], force, float(before), self._memory(k),
-                        float(self.dissipated[k]), turns)
-        return self.instant(motion, self._kept if k == len(self) - 1 else None)
-
-    def _memory(self, k):
-        for memories in self._memories:
-            if k < len(memories):
-                return memories[k]
-            k -= len(memories)
-
-    def instant(self, motion: Motion, kept: Any = None) -> State:
-        """A Motion of this system as a State.
-
-        Parameters
-        ----------
-        motion
-            The :class:`~skfem_ancf.dynamics.base.Motion`.
-        kept
-            What its run kept there, or None.
-        """
-        inertia, memory = self.system.mass.multiply(motion.acceleration), contacts_of(motion)
-        if self.system.damped:
-            with self.system.forces.contacts.lent(memory):
-                inertia = inertia + self.system.damping_force(motion.u, motion.v, motion.t)
-        return State(self.system, motion.u, load=1.0, converged=True, t=motion.t,
-                     message=f"t = {motion.t:g}", multipliers=motion.multipliers,
-                     inertia=inertia, acceleration=motion.acceleration, motion=motion,
-                     origin=(self.scheme, kept), memory=memory)
+        last, arrays = self._last
+        if last is not None and k == len(self) - 1 and last.t == self.t[k]:
+            return state_of(self.system, self.scheme, last, arrays)
+        row = {name: x[k] for name, x in self._columns.items()}
+        row |= {name: float(row[name]) for name in ("t", "before", "dissipated")}
+        if not row["contacts"].size:
+            row["contacts"] = None
+        return state_of(self.system, self.scheme, Motion(**row))
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
         """States one after the other.
@@ -251,8 +158,11 @@ class History(MaterialPoints):
         -------
         iterator of State
         """
+        if instants is not None and (isinstance(instants, (str, bytes, dict, set))
+                                     or not hasattr(instants, "__iter__")):
+            raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
         return map(self.state, range(len(self)) if instants is None else [
-            require_index("instants", k, len(self)) for k in _numbers(instants)])
+            require_index("instants", k, len(self)) for k in instants])
 
     def __iter__(self):
         return self.states()
@@ -260,90 +170,67 @@ class History(MaterialPoints):
     # at material points
 
     def angle(self, body: WhichMember) -> Array:
-        """The angle of a rigid body at all instants, in radians, shape (nt,); turns are counted.
-
-        Parameters
-        ----------
-        body
-            The RigidBody, its name or its number.
-        """
+        """The angle of a rigid body (or its name or number), turns counted, shape (nt,)."""
         found = require_body(self.system, body)
-        k = self._turns.moments + self.system.bodies.index(found)
-        return found.angle + self._others[-1][:, k]
+        k = Turns(self.system).moments + self.system.bodies.index(found)
+        return found.angle + self._columns["turns"][:, k]
+
+    def _read(self, read, point, beam, line):
+        """``read(state, points)`` of all instants."""
+        at = self.system.points.find(point, beam, line, ask=True)
+        return [read(state, at) for state in self]
 
     def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
         """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n).
 
-        Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
-
         Parameters
         ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam
-            The beam, its name or its number; found if it is not given.
-        recover, line
-            As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
+        point, beam, recover, line
+            One point, shape (2,), or many, as for :meth:`State.strain
+            <skfem_ancf.results.State.strain>`.
         """
-        at = self.system.points.find(point, beam, line, ask=True)
-        return np.array([state.strain(at, recover=recover) for state in self])
+        return np.array(self._read(lambda state, at: state.strain(at, recover=recover), point,
+                                   beam, line))
 
     def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
         """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n).
 
-        Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
-
         Parameters
         ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam
-            The beam, its name or its number; found if it is not given.
-        recover, line
-            As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
+        point, beam, recover, line
+            One point, shape (2,), or many, as for :meth:`State.strain
+            <skfem_ancf.results.State.strain>`.
         """
-        at = self.system.points.find(point, beam, line, ask=True)
-        return np.array([state.stress(at, recover=recover) for state in self])
+        return np.array(self._read(lambda state, at: state.stress(at, recover=recover), point,
+                                   beam, line))
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
-        """Any field at all instants.
+        """Any field at all instants, shape (nt, ...).
 
         Parameters
         ----------
-        field, beam, recover, line
-            Those of :meth:`State.field <skfem_ancf.results.State.field>`.
-        point
-            One point, shape (2,), or many, shape (2, n) or a list.
-
-        Returns
-        -------
-        ndarray
-            Shape (nt, ...).
+        field, point, beam, recover, line
+            As for :meth:`State.field <skfem_ancf.results.State.field>`; one point, shape (2,), or
+            many.
         """
-        at = self.system.points.find(point, beam, line, ask=True)
-        return np.array([state.field(field, at, recover=recover) for state in self])
+        return np.array(self._read(lambda state, at: state.field(field, at, recover=recover), point,
+                                   beam, line))
 
     def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                    line: int | None = None) -> Resultants:
-        """Section forces and strains of the axis at all instants.
+        """Section forces and strains of the axis at all instants: arrays (nt,) or (nt, n).
 
         Parameters
         ----------
-        at
-            Points through which the sections go: one, shape (2,), or many, shape (2, n) or a list.
-        beam, recover, line
-            Those of :meth:`State.resultants <skfem_ancf.results.State.resultants>`.
-
-        Returns
-        -------
-        Resultants
-            Its arrays begin with the axis of the instants, (nt,) or (nt, n).
+        at, beam, recover, line
+            As for :meth:`State.resultants <skfem_ancf.results.State.resultants>`; one point, shape
+            (2,), or many.
         """
-        found = self.system.points.find(at, beam, line, ask=True)
-        return over_time([state.resultants(found, recover=recover) for state in self])
+        return over_time(self._read(lambda state, found: state.resultants(found, recover=recover),
+                                    at, beam, line))
 
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam at all instants, shape (nt, m)."""
@@ -352,15 +239,12 @@ class History(MaterialPoints):
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
         """What the supports at a boundary do to the beam at all instants.
 
+        Its force has the shape (nt, 2), the moment and each degree of freedom (nt,).
+
         Parameters
         ----------
         boundary, beam
-            Those of :meth:`State.reactions <skfem_ancf.results.State.reactions>`.
-
-        Returns
-        -------
-        Reaction
-            Of arrays: the force has the shape (nt, 2), the moment and each coordinate (nt,).
+            As for :meth:`State.reactions <skfem_ancf.results.State.reactions>`.
 
         Examples
         --------
@@ -383,11 +267,11 @@ class History(MaterialPoints):
     @cached_property
     def strain_energy(self) -> Array:
         """Strain energy, with the potential of force elements, shape (nt,)."""
-        system, contacts = self.system, self.system.forces.contacts
+        system, memories = self.system, self._columns["contacts"]
         out = np.zeros(len(self)) + system.energy_of_beams(self.u)
         if system.forces.elements:
-            for k, memory in enumerate(chain.from_iterable(self._memories)):
-                with contacts.lent((memory or {}).get("contacts")):
+            for k, memory in enumerate(memories):
+                with system.forces.contacts.lent(memory if memory.size else None):
                     out[k] += system.energy_of_forces(self.u[k], self.t[k])
         return out
 
@@ -403,7 +287,7 @@ class History(MaterialPoints):
         That of moments counts whole turns, which are followed from step to step.
         """
         return np.array([self.system.load_potential(u, t, turned) for u, t, turned in zip(
-            self.u, self.t, self._others[-1])])
+            self.u, self.t, self._columns["turns"])])
 
     @property
     def total_energy(self) -> Array:
@@ -430,16 +314,9 @@ class History(MaterialPoints):
     def to_pyvista(self, **options: Any) -> Any:
         """One mesh of pyvista that takes every instant, in place.
 
-        Parameters
-        ----------
-        **options
-            Those of :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
-
-        Returns
-        -------
-        Series
-            Its ``mesh`` is at the first instant, ``update(k)`` puts it at another, see
-            :class:`skfem_ancf.visuals.pyvista.Series`.
+        A :class:`skfem_ancf.visuals.pyvista.Series`: its ``mesh`` is at the first instant,
+        ``update(k)`` puts it at another. Options are those of
+        :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
         """
         from ..visuals.pyvista import Series
 
@@ -523,9 +400,3 @@ class History(MaterialPoints):
         with kind(path, **options) as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
             writer.extend(self, lambda: bar.update(1))
-
-
-def _numbers(instants):
-    if isinstance(instants, (str, bytes, dict, set)) or not hasattr(instants, "__iter__"):
-        raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
-    return instants

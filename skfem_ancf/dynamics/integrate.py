@@ -7,26 +7,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..beam.kinematics import folded
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
                            require_finite_scalar, require_flag, require_function,
                            require_positive, shown, warn)
 from ..core.progress import progress_bar
-from ..equations.stability import position_weights
 from ..core.switch import expecting
-from ..beam.kinematics import folded
+from ..equations.stability import position_weights
+from .base import in_steps, same_scheme
 from .checkpoint import Checkpoint, same_problem
-from .base import contacts_of, in_steps, same_scheme
-from .integrator import Integrator, StepFailed
-from .run import MAX_STEPS, Run, task_of
+from .run import MAX_STEPS, Run, StepFailed, task_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
-    from ..results.state import State
-    from ..equations.system import System
     from ..core.types import Array, StrPath
+    from ..equations.system import System
+    from ..results.state import State
     from .base import Scheme
     from .history import History
     from .sensors import Sensor
@@ -48,33 +47,30 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
     Parameters
     ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
+    system, scheme
+        A :class:`~skfem_ancf.equations.system.System` and a
+        :class:`~skfem_ancf.dynamics.Scheme`.
     t_end
         Time at the end.
     dt
         Step size, or "auto": chosen by an estimate of the error of each step, see ``rtol``.
-        Functions of time are asked ahead at 4097 times between start and end, so that no step
-        passes over an event that lasts longer than from one of these to the next; name shorter
-        ones by ``breakpoints``.
-    scheme
-        A :class:`~skfem_ancf.dynamics.Scheme`.
+        Functions of time are sampled ahead at 4097 times, so that no step passes over an event
+        that lasts longer than from one of these to the next; name shorter ones by
+        ``breakpoints``.
     u, v
         Displacement and velocity at the start, shape (N,); zero by default.
     t_start
         Time at the start; by default that of ``start``, or 0.
     t_eval
         Times to store, shape (n,); every step by default. An instant within a step is the end of
-        a shorter step of the scheme from the same start, which is not gone on from: the steps of
-        the motion do not depend on ``t_eval``, and what the scheme conserves is conserved at these
-        instants too.
+        a shorter step from the same start: the steps of the motion do not depend on ``t_eval``,
+        and what the scheme conserves is conserved at these instants too.
     tol
         Tolerance of the iteration in a step; the scheme's own by default.
     rtol
-        Tolerance of the automatic step size, a local one: what a step adds to the error of the
-        displacement of a point is at most about its part of ``rtol`` times the size of the scene,
-        in proportion to the size of the step. The error of the motion is of that order, and
-        more where small errors grow on their way: ``check`` measures it.
+        Tolerance of the automatic step size: what a step adds to the error of the displacement of
+        a point is at most about ``rtol`` times the size of the scene, in proportion to the size of
+        the step. The error of the motion is more where small errors grow: ``check`` measures it.
     progress
         Show a progress bar: True, False, or None for "if it takes long".
     start
@@ -92,9 +88,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         twentieth of the time.
     until
         A function of the State at an instant that returns a number: the motion ends where it
-        changes its sign, at an instant within a step that is found as those of ``t_eval``.
-        ``history.event`` is its time, None if there was none up to ``t_end``. It is asked after
-        each step, so that two changes within one are not seen. Not with ``checkpoint``.
+        changes its sign, at an instant within a step; ``history.event`` is its time. It is asked
+        after each step: two changes within one are not seen. Not with ``checkpoint``.
     check
         Integrate once more in steps half as long, with ``dt="auto"`` about half as long:
         ``history.error`` is the largest difference at the stored instants. That takes three times
@@ -121,37 +116,31 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     motion = None if start is None else start._motion
     if t_start is None:
         t_start = 0.0 if motion is None else motion.t
-    if not isinstance(breakpoints, tuple):
-        breakpoints = np.atleast_1d(breakpoints)
     task = task_of(t_start, t_end, dt, t_eval, tol, rtol, [
-        *breakpoints, *_samples(system, t_start, t_end)])
+        *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
     if not (in_steps(scheme) and system.mass_solver.by_nodes):
         _require_room(system)
     if not system.constraints.passing:
         system.constraints.require_independent_joints()
     system.constraints.require_motion()
     if until is not None:
-        if checkpoint is not None:
-            raise InputError("a checkpoint cannot keep the function until(state): leave out "
-                             "checkpoint=, or integrate in parts, start=history.state(-1)")
         require_function("until", until, "of a State that returns a number")
-    if require_flag("check", check) and checkpoint is not None:
-        raise InputError("a checkpoint cannot keep the second motion of check=True: leave out one")
-    if u is None and start is not None:
-        u = start.u
-    velocity = v if motion is None else motion.v
+    if checkpoint is not None and (until is not None or require_flag("check", check)):
+        raise InputError("a checkpoint cannot keep the function of until=, nor the second motion "
+                         "of check=True: leave out checkpoint=, or integrate in parts, "
+                         "start=history.state(-1)")
 
     def begun(task, sensors=(), until=None):
         """A Run at its start."""
-        run = Run(system, scheme, task, sensors)
-        run.until = until
+        run = Run(system, scheme, task, sensors, until)
         if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
             run.go_on(motion, start._origin[1])
-        else:
-            run.begin(np.zeros(system.N) if u is None else u,
-                      np.zeros(system.N) if velocity is None else velocity,
-                      system.forces.contacts.of_state(start),
-                      None if motion is None else motion.turns)
+            return run
+        rest = np.zeros(system.N)
+        displacement = u if u is not None else rest if start is None else start.u
+        velocity = v if motion is None else motion.v
+        run.begin(displacement, rest if velocity is None else velocity,
+                  system.forces.contacts.of_state(start), None if motion is None else motion.turns)
         return run
 
     run, file = begun(task, sensors, until), None
@@ -159,7 +148,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         file = Checkpoint(checkpoint, every, run)
         file.begin()
     history = follow(run, file, progress)
-    if check:
+    if require_flag("check", check):
         history.error = _difference(history, begun, task, progress)
     return history
 
@@ -171,7 +160,7 @@ def _difference(history, begun, task, progress):
                    dt=None if task.dt is None else 0.5 * task.dt,
                    rtol=task.rtol * 0.5**scheme.order)  # an error per unit of time
     try:
-        other = _go(begun(fine), None, progress).history
+        other, _ = _go(begun(fine), None, progress)
     except ConvergenceError:
         return np.nan
     except Interrupted as stopped:
@@ -201,16 +190,15 @@ def _require_room(system):
     if size > LARGEST:
         raise InputError(
             f"a motion keeps the derivatives of {system.constraints.m} equations of joints by "
-            f"{system.N} coordinates as dense matrices, {size:.3g} GB: a Frame of lines eliminates "
-            "its nodes in 'energy-momentum' and 'generalized-alpha', if it is held at nodes, "
-            "without other joints, springs between points far apart and modal damping; else take "
-            "fewer or longer beams, or the frequencies and shapes of scene.modes(k)")
+            f"{system.N} degrees of freedom as dense matrices, {size:.3g} GB: a Frame of lines "
+            "eliminates its nodes in 'energy-momentum' and 'generalized-alpha', if it is held at "
+            "nodes, without other joints, springs between points far apart and modal damping; else "
+            "take fewer or longer beams, or the frequencies and shapes of scene.modes(k)")
 
 
 def _goes_on(system, scheme, start, t):
     """True if an instant is one of the same motion: same scheme, same scene."""
-    made_by, _ = start._origin
-    return (not system.forces.sampled and same_scheme(made_by, scheme)
+    return (not system.forces.sampled and same_scheme(start._origin[0], scheme)
             and same_problem(system, start, t))
 
 
@@ -219,10 +207,8 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
 
     Parameters
     ----------
-    run
-        A :class:`~skfem_ancf.dynamics.run.Run` that has begun.
-    file
-        Its Checkpoint, or None.
+    run, file
+        A :class:`~skfem_ancf.dynamics.run.Run` that has begun, and its Checkpoint, or None.
     progress
         Show a progress bar: True, False, or None for "if it takes long".
 
@@ -230,13 +216,24 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     -------
     History
     """
-    return _ended(_go(run, file, progress))
+    history, inverted = _go(run, file, progress)
+    contacts = run.system.forces.contacts
+    texts = [] if inverted is None else [
+        f"the body is turned inside out, at t = {inverted:.6g} or before: it is compressed or bent "
+        "beyond what it can bear, and what follows means nothing. Use NeoHookean, more elements, "
+        "a smaller load or shorter steps"]
+    texts += filter(None, [_jump_of_a_turn(history), contacts.sweep.deep()])
+    with contacts.lent(run.y.contacts):
+        texts += contacts.sunk(run.y.u, run.y.t)
+    for text in texts:
+        warn(text, ModelWarning)
+    return history
 
 
 def _go(run, file, progress):
-    """Take the steps of a Run, and write its file: what has looked at the body."""
-    history, task, body = run.history, run.task, _Body(run)
-    run.system.forces.contacts.sweep.begin()
+    """Take the steps of a Run; its History, and when its body is turned inside out, or None."""
+    system, task, inverted, looked = run.system, run.task, None, run.steps
+    system.forces.contacts.sweep.begin()
     try:
         with expecting(run.iterations), progress_bar(progress, total=task.span,
                                                      desc="time") as bar:
@@ -245,36 +242,24 @@ def _go(run, file, progress):
                 before = run.y.t
                 run.advance()
                 bar.update(run.y.t - before)
-                body.look()
+                if inverted is None and (run.steps >= looked or run.done):
+                    looked, u = run.steps + LOOKED, run.y.u
+                    if system.inverted(u) or any(folded(beam, u[system.of(beam)])
+                                                 for beam in system.beams):
+                        inverted = run.y.t
                 if file is not None:
                     file.update()
     except StepFailed as failure:
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
                                f"{failure}; try a smaller dt{_of_samples(run)}",
-                               history.close()) from None
+                               run.history()) from None
     except AncfError as error:  # of a function of the caller's: what is done is kept
-        vars(error)["state"] = history.close()
+        vars(error)["state"] = run.history()
         raise
     except KeyboardInterrupt:
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "
-                          "state is the History up to there", history.close()) from None
-    history.close()
-    run.give_back()
-    return body
-
-
-def _ended(body):
-    """The History of a Run that is done, and what there is to warn of."""
-    body.warn()
-    run, history = body.run, body.history
-    _warn_of_turns(history)
-    deep = run.system.forces.contacts.sweep.deep()
-    if deep:
-        warn(deep, ModelWarning)
-    with run.system.forces.contacts.lent(contacts_of(run.y)):
-        for text in run.system.forces.contacts.sunk(run.y.u, run.y.t):
-            warn(text, ModelWarning)
-    return history
+                          "state is the History up to there", run.history()) from None
+    return run.history(), inverted
 
 
 def _of_samples(run):
@@ -287,39 +272,14 @@ def _of_samples(run):
             "more often, add damping, or take scheme='energy-momentum'")
 
 
-class _Body:
-    """Sees now and then whether a body has been turned inside out."""
-
-    def __init__(self, run):
-        self.run, self.history, self.next, self.t = run, run.history, 0, None
-
-    def look(self):
-        run = self.run
-        if self.t is None and (run.steps >= self.next or run.done):
-            self.next = run.steps + LOOKED
-            if run.system.inverted(run.y.u) or any(
-                    folded(beam, run.y.u[run.system.of(beam)]) for beam in run.system.beams):
-                self.t = run.y.t
-
-    def warn(self):
-        if self.t is not None:
-            warn(f"the body is turned inside out, at t = {self.t:.6g} or before: it is "
-                          "compressed or bent beyond what it can bear, and what follows means "
-                          "nothing. Use NeoHookean, more elements, a smaller load or shorter steps",
-                          ModelWarning)
-
-
-def _warn_of_turns(history):
-    """Give a ModelWarning where a torsional spring has passed the angle up to which it is one."""
+def _jump_of_a_turn(history):
+    """Where a torsional spring has passed the angle up to which it is one, in words; or nothing."""
     forces = history.system.forces
     turns = forces.turns(history.u) if forces.elements else ()
     if not len(turns):
-        return
+        return ""
     jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]
-    if len(jumps):
-        warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "
-                      "than half a turn: its angle is taken in (-pi, pi], so that its moment "
-                      "jumps there and the energy is not kept", ModelWarning)
-
-
-__all__ = ["Integrator", "integrate"]
+    return "" if not len(jumps) else (
+        f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more than half a "
+        "turn: its angle is taken in (-pi, pi], so that its moment jumps there and the energy is "
+        "not kept")

@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 import logging
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import suppress
+from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..equations.condensation import Condensed, CondensedMass
-from ..core.errors import (AncfError, CheckpointError, InputError, SupportError, require_positive,
-                           shown)
-from ..core.kept import cached_property, twin_of
-from ..core.linalg import halves
 from ..core.callbacks import handle_of
-from .base import (Memories, Motion, Steps, contacts_of, in_steps, interpolate, kept, recalled,
-                   same_scheme)
-from .course import Courses
-from .rates import rates
+from ..core.errors import CheckpointError, InputError, SupportError, require_positive, shown
+from ..core.linalg import halves
+from ..equations.condensation import Condensed, CondensedMass
+from .base import Motion, in_steps, interpolate, stored
+from .course import SAMPLES, Course, Given
 from .dampers import Dampers, Rows, solve_rows
 from .energy_momentum import EnergyMomentum
 from .joined import Joined
+from .rates import JointMotion, JointMotions
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
-                    SYMMETRIC, TURNED, Matrices, Rule, factors, mass_factor, room_for_steps, steps)
+                    Matrices, Rule, factors, mass_factor, room_for_steps, steps)
+from .steps import Course as StepCourse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..equations.system import System
     from ..core.types import Array
+    from ..equations.system import System
     from .base import Scheme
 
 logger = logging.getLogger(__name__)
@@ -38,11 +38,6 @@ DEPTH = 6  # how often a step is halved
 LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
 #: Steps of a block at most, and numbers that they may store.
 BLOCK, STORED = 256, 2_000_000
-#: Coordinates up to which work arrays are kept for the next motion: there making them takes longer
-#: than some steps.
-LENT = 1000
-#: Of texts that ask no function in Python: what runs them sees to warnings.
-_NOTHING: AbstractContextManager[None] = nullcontext()
 
 
 class StepFailed(Exception):
@@ -50,7 +45,7 @@ class StepFailed(Exception):
 
 
 class Integrator:
-    """Advances the motion of a system.
+    """Advances the motion of a system by one-step schemes.
 
     The factors of the iteration matrix are kept from step to step as long as the iteration
     contracts.
@@ -66,23 +61,27 @@ class Integrator:
 
     Attributes
     ----------
+    m
+        Number of equations of joints.
+    dt
+        Size of the last step.
     substeps
         Parts of steps that were cut.
     limit
         Time beyond which no function of time is asked.
     longest
         Steps of a block at most.
-    kept : dict of ndarray
-        What a scheme with steps of its own keeps for the next, as factors: :meth:`forget` clears
-        it.
-    room, asked
-        Its work arrays, and functions of time asked for a block of steps.
-    machine
-        What runs texts: that of the system, or one with other tables.
     """
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         scheme.require(system)
+        self.system, self.scheme, self.limit = system, scheme, np.inf
+        self.m = system.constraints.m
+        self.tol = scheme.tol if tol is None else require_positive("tol", tol)
+        if self.tol >= 1.0:
+            raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
+                             f"1e-6 is coarse already; got {shown(tol)}")
+        memory = system.forces.contacts.tables.memory.size
         if not scheme.conserving:
             alpha_m, alpha_f, beta, _ = scheme.parameters
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
@@ -93,70 +92,16 @@ class Integrator:
             self._nodes = Condensed(system, A), CondensedMass(system)
         turned = scheme.conserving and self._nodes is None
         U = halves(system.N if turned else 0, system.bandwidth)
-        self.matrices = Matrices(M, system.mass_solver.factors.band, A.band, U, *_damping(system))
+        self._matrices = Matrices(M, system.mass_solver.factors.band, A.band, U, *_damping(system))
+        handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
+        self._rule = Rule._make([
+            int(scheme.conserving), *map(float, scheme.parameters), self.tol,
+            8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles])
         self._state = np.zeros(STATE)
-        self.room: Any = None
-        self.asked: Any = None
-        self._begun: Any = (None,)
-        self.machine = system.machine
-        self._ruled: Any = None
-        self._begin(system, scheme, tol)
-        numbers = 4 * system.N + system.forces.contacts.tables.memory.size
-        self.longest = max(1, min(STORED // numbers, BLOCK))
+        self.dt, self.substeps, self._lost = np.nan, 0, ""
+        self.longest = max(1, min(STORED // (4 * system.N + memory), BLOCK))
 
-    @cached_property
-    def _work(self):
-        """Work arrays of the steps of :mod:`~skfem_ancf.dynamics.steps`."""
-        s, m = self.system, self.system.constraints.m
-        return room_for_steps(s.N, m, s.machine.tables.stresses.size, 0 if self._nodes else m)
-
-    def _begin(self, system, scheme, tol):
-        """As if nothing had been integrated yet."""
-        self.system, self.scheme, self.limit = system, scheme, np.inf
-        self.tol = scheme.tol if tol is None else require_positive("tol", tol)
-        if self.tol >= 1.0:
-            raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
-                             f"1e-6 is coarse already; got {shown(tol)}")
-        ruled = scheme.conserving, scheme.parameters, self.tol
-        if self._ruled != ruled:
-            handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
-            self._ruled, self.rule = ruled, Rule(
-                int(scheme.conserving), *map(float, scheme.parameters), self.tol,
-                8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles)
-        self._state.fill(0.0)
-        self._dt, self.substeps, self._lost = np.nan, 0, ""
-        self.kept: dict[str, Array] = {}
-        motion_varies = system.machine.tables.motion_varies
-        if system.varies or motion_varies or self.asked is None:
-            self._courses, self.asked = Courses(scheme.conserving), (None,)
-        self._courses.system = system
-
-    @classmethod
-    def lent(cls, system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
-        """One with the work arrays of a motion that has ended, if there is one.
-
-        Parameters
-        ----------
-        system, scheme, tol
-            As of the class.
-        """
-        free = system.integrators
-        try:
-            integrator = free.pop()
-        except IndexError:
-            return cls(system, scheme, tol)
-        if same_scheme(integrator.scheme, scheme):
-            integrator._begin(system, scheme, tol)
-            return integrator
-        return cls(system, scheme, tol)
-
-    def give_back(self) -> None:
-        """Its motion has ended: its work arrays are for another one, where they are small."""
-        free = self.system.integrators
-        if self._nodes is None and self.system.N <= LENT and len(free) < 2:
-            # without a circle both go when nobody asks for them any more
-            del self.system, self._courses.system
-            free.append(self)
+    # what it has found
 
     @property
     def iterations(self) -> int:
@@ -168,6 +113,21 @@ class Integrator:
         """Tangents factorised."""
         return int(self._state[FACTORIZED])
 
+    @property
+    def energy(self) -> float:
+        """The largest energy seen."""
+        return self._state[ENERGY]
+
+    @property
+    def failure(self) -> str:
+        """Why the last step has failed."""
+        return self._lost or FAILURES[int(self._state[FAILURE])]
+
+    @property
+    def ready(self) -> bool:
+        """True if there are factors of an iteration matrix."""
+        return self._state[READY] != 0.0
+
     def count(self, other: Integrator) -> None:
         """Add the counts of another, which begins from zero."""
         self._state[[COUNT, FACTORIZED]] += other._state[[COUNT, FACTORIZED]]
@@ -178,36 +138,19 @@ class Integrator:
         """Count from zero."""
         self._state[[COUNT, FACTORIZED]], self.substeps = 0.0, 0
 
+    def expect(self, energy: float) -> None:
+        """The iteration's tolerance is relative to the largest energy of the motion."""
+        self._state[ENERGY] = max(self._state[ENERGY], energy)
+
     # the start
 
-    def support_rates(self, t: float, dt: float, ahead: bool = True) -> Any:
-        """Velocity and acceleration of the fixed coordinates, shape (nfixed,) each.
-
-        Parameters
-        ----------
-        t, dt, ahead
-            As for :meth:`start`.
-        """
-        s = self.system
-        if not s.constraints.moves:
-            return np.zeros((2, len(s.constraints.fixed)))
-        return rates(s.constraints.values_at, t, dt, ahead, self.limit)
-
-    def ask(self, start: float, dt: float, n: int) -> None:
-        """Ask the functions of joints for the first steps: the start has its rates from there.
-
-        Parameters
-        ----------
-        start, dt, n
-            Where the steps begin, their size, and how many there will be.
-        """
-        if self.scheme.text == "steps" and self.system.constraints.drives:
-            block = 0, min(n, self.longest)
-            with suppress(AncfError):  # what fails is said where the motion comes to it
-                self._courses.of(start, dt, 0, block[1], block, self.limit)
+    @cached_property
+    def _instants(self):
+        """Samples functions of time at the start of a step, and at its end."""
+        return [Course(self.system, np.array([x]), SAMPLES) for x in (0.0, 1.0)]
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
-              memory: Array | None = None) -> Motion:
+              contacts: Array | None = None) -> Motion:
         """The Motion at the start, with consistent velocity, acceleration and multipliers.
 
         Where motions are given as functions of time, their rates are those in a step dt ahead.
@@ -220,71 +163,49 @@ class Integrator:
             Time, and the step in which functions of time are asked.
         ahead
             The step begins there; False where it ends.
-        memory
+        contacts
             What points remember of obstacles there, shape (k,); None: nothing.
         """
-        s = self.system
-        instant = t, dt, ahead, self.limit
-        asked = self._courses.asked(*instant) if s.constraints.m else None
-        # it is that of the motion before from the same place with the same motion of joints
-        steady = not (s.varies or s.forces.elements or s.machine.tables.asks)
-        key = (u.tobytes(), v.tobytes(), *(() if asked is None else (
-            dt, ahead, asked.tobytes()))) if steady else None
-        if key is None or self._begun[0] != key:
-            self._begun = key, *self._start(u, v, instant, memory)
-        _, y, (strain, kinetic, power, change) = self._begun
-        y = twin_of(y)
-        y.t = t
-        # from rest there is no energy yet
-        self.expect(max(strain, kinetic, kinetic + dt * power + dt**2 * change))
-        return y
-
-    def _start(self, u, v, instant, memory):
-        """The same, with the strain energy, the kinetic one and half its two derivatives."""
-        s, contacts, (t, dt, ahead, _) = self.system, self.system.forces.contacts, instant
-        y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
-                   np.zeros(s.constraints.m))
-        fixed = s.constraints.fixed
-        if s.constraints.moves:
-            y.u[fixed] = s.constraints.values(1.0, t)
-            y.v[fixed], y.acceleration[fixed] = self.support_rates(t, dt, ahead)
-        else:
-            y.u[fixed] = y.v[fixed] = 0.0
+        s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
+        given = self._instants[not ahead].of(t if ahead else t - dt, dt, (0, 1), self.limit)
+        held, v_held, a_held = given.supports[0, 0]
+        y = Motion(t, np.where(free, u, held), np.where(free, v, v_held), a_held.copy(),
+                   np.zeros(s.N), np.zeros(m), np.zeros(m))
         self._require_held(y.u - u, t)
-        rate, J = y.multipliers, None
-        joined = None
-        if s.constraints.m:
-            joined = Joined(s, self._courses.joints(*instant), y.u, instant)
-        if joined is not None:
+        joined, rate = None, y.multipliers
+        if m:
+            joints = JointMotion(given.c[0, 0], np.vstack([given.g[0, 0, :1], given.g[0, 0]]),
+                                 int(s.machine.tables.motion_varies))
+            joined = Joined(s, joints, y.u, (t, dt, ahead, self.limit))
             gap = np.abs(joined.gap())
             if np.any(gap > 1e-8 * s.machine.tables.plain.joints.sizes):
                 raise SupportError(f"the joints are open by {gap.max():.3g} at the start: begin "
                                    "with beams that fit, or from a static solution (start=)")
-            J = joined.J
-        solve = s.mass_solver(y.u, t, J)
-        jump = y.v - v  # of fixed coordinates: their impulses move the free ones
+        solve = s.mass_solver(y.u, t, None if joined is None else joined.J)
+        jump = y.v - v  # of fixed degrees of freedom: their impulses move the free ones
         if joined is not None or jump.any():
-            closing = rate if joined is None else -joined.rate(y.v)
-            y.v = y.v + solve(-s.mass.multiply(jump), closing)[0]
+            y.v = y.v + solve(-M.multiply(jump), rate if joined is None else -joined.rate(y.v))[0]
         if joined is not None:
             rate = -joined.bend(y.v, y.acceleration)
-        with contacts.lent(memory):
-            if memory is not None and not contacts.lasting:
-                y.memory = {"contacts": memory}  # how stiff obstacles are
-            elif contacts.lasting:
-                now = contacts.begin(y.u, t) if memory is None else memory
-                y.memory = {"contacts": contacts.tables.memory.copy() if now is None else now}
-            force = s.external_force(y.u, t) - s.internal_force(y.u, t)
-            if s.constraints.moves:
-                force -= s.mass.multiply(y.acceleration)
-            if s.damped:
-                force = force - s.damping_force(y.u, y.v, t)
-        acceleration, y.multipliers = solve(force, rate)
+        force, y.contacts = self._forces(y, contacts)
+        acceleration, y.multipliers = solve(force - M.multiply(y.acceleration), rate)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        inertia = s.mass.multiply(y.acceleration)
-        return y, (s.strain_energy(y.u, t), 0.5 * float(y.v @ s.mass.multiply(y.v)),
-                   float(y.v @ inertia), 0.5 * float(y.acceleration @ inertia))
+        inertia, kinetic = M.multiply(y.acceleration), 0.5 * float(y.v @ M.multiply(y.v))
+        change = dt * float(y.v @ inertia) + 0.5 * dt**2 * float(y.acceleration @ inertia)
+        # from rest there is no energy yet
+        self.expect(max(s.strain_energy(y.u, t), kinetic, kinetic + change))
+        return y
+
+    def _forces(self, y, memory):
+        """What accelerates, without inertia, and what points remember of obstacles."""
+        s, contacts = self.system, self.system.forces.contacts
+        with contacts.lent(memory):
+            if contacts.lasting:
+                now = contacts.begin(y.u, y.t) if memory is None else memory
+                memory = contacts.tables.memory.copy() if now is None else now
+            force = s.external_force(y.u, y.t) - s.internal_force(y.u, y.t)
+            return force - s.damping_force(y.u, y.v, y.t) if s.damped else force, memory
 
     def _require_held(self, jump, t):
         """Raise SupportError where supports would move a body at once, in the mean of its mass."""
@@ -299,19 +220,22 @@ class Integrator:
                 "begin with a state that they hold, as a static solution (start=), and move them "
                 "by continuous functions of time")
 
-    def expect(self, energy: float) -> None:
-        """The iteration's tolerance is relative to the largest energy of the motion."""
-        self._state[ENERGY] = max(self._state[ENERGY], energy)
-
-    @property
-    def energy(self) -> float:
-        """The largest energy seen."""
-        return self._state[ENERGY]
-
     # steps
 
+    @cached_property
+    def _course(self):
+        """Samples functions of time where the equation of motion holds, and at a step's end."""
+        return Course(self.system, np.array([0.5 if self.scheme.conserving else 1.0, 1.0]), SAMPLES)
+
+    @cached_property
+    def _work(self):
+        """Work arrays."""
+        s = self.system
+        return room_for_steps(s.N, self.m, s.machine.tables.stresses.size,
+                              0 if self._nodes else self.m)
+
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
-            block: tuple[int, int] | None = None) -> Steps:
+            block: tuple[int, int] | None = None) -> list[Motion]:
         """Up to ``n`` steps from the Motion ``y``; fewer where one fails.
 
         Parameters
@@ -329,78 +253,53 @@ class Integrator:
         Those that were done.
         """
         s, contacts = self.system, self.system.forces.contacts
-        begun, block = y.t if start is None else start, block or (first, first + n)
-        course = self._courses.of(begun, dt, first, n, block, self.limit)
+        begun = y.t if start is None else start
+        given = self._course.of(begun, dt, (first, first + n), self.limit, block)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
-        rows, works = np.empty((n, 4, s.N)), np.empty(n)
-        multiplier_rows = np.empty((n, 2, s.constraints.m))
+        rows, multipliers, works = np.empty((n, 4, s.N)), np.empty((n, 2, self.m)), np.empty(n)
         memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        with contacts.lent(contacts_of(y)):
-            done = self.call(steps, y, dt, self.rule, course, self._state, work, memories, rows,
-                             multiplier_rows, works)
+        done = self._call(steps, y, dt, rows, self._rule, _step_course(given, dt, s), self._state,
+                          work, memories, rows, multipliers, works)
+        return [replace(y, t=begun + dt * (first + k + 1), u=rows[k, 0], v=rows[k, 1],
+                        acceleration=rows[k, 2], algorithmic=rows[k, 3],
+                        multipliers=multipliers[k, 0], force=multipliers[k, 1], before=dt,
+                        dissipated=float(works[k]), memory=None,
+                        contacts=memories[k] if contacts.lasting else y.contacts)
+                for k in range(done)]
 
-        memory = Memories(y, done, memories if contacts.lasting else None)
-        return Steps(begun, dt, first, rows, multiplier_rows, works, memory)
-
-    def call(self, text: Callable, y: Motion, dt: float, *args: Any) -> int:
-        """Take steps by a text of equations, matrices and others.
-
-        Parameters
-        ----------
-        text, *args
-            What it is, and all but its first two arguments, of which ``state`` is
-            :attr:`state` and the third from the end takes the displacements, shape (n, k, N).
-        y, dt
-            Where the motion is, and the size of the steps.
-
-        Returns
-        -------
-        int
-            The number of steps done.
-        """
-        s, before, rows = self.system, self._state.copy(), args[-3]
-        if dt != self._dt:
-            self._dt, self._state[READY] = dt, 0.0
-        state = self._state
-        state[BEFORE], state[FAILURE], state[DISSIPATED] = y.before, 0.0, y.dissipated
-        function = self.machine.of(text)
-        asks = self.machine.tables.asks
+    def _call(self, function: Callable, y: Motion, dt: float, rows: Array, *args: Any) -> int:
+        """Take steps by a function of equations, matrices and others; how many were done."""
+        s, before = self.system, self._state.copy()
+        if dt != self.dt:
+            self.dt, self._state[READY] = dt, 0.0
+        self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
         try:
-            with np.errstate(all="ignore") if asks else _NOTHING:
-                done = function(self.matrices, *args)
+            with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
+                done = self._machine.of(function)(self._matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
             raise
         done, self._lost = s.constraints.first_lost(rows[:done, 0])
         if done and s.forces.contacts.sweeps:
-            done, self._lost = self._swept(y, dt, rows[:done], self._lost)
+            u, v = (np.concatenate([[x], rows[:done, k]]) for k, x in enumerate((y.u, y.v)))
+            done, passed = s.forces.contacts.sweep.first(u, v, y.t + dt * np.arange(len(u)))
+            if passed:
+                self._lost = f"no step that touches {passed}, it jumps over it"
         if done < len(rows):
             self._state[READY] = 0.0
         return done
 
-    def _swept(self, y, dt, rows, lost):
-        """How many steps of ``rows`` pass through no obstacle, and why there are no more."""
-        u, v = (np.concatenate([[x], rows[:, k]]) for k, x in enumerate((y.u, y.v)))
-        done, text = self.system.forces.contacts.sweep.first(
-            u, v, y.t + dt * np.arange(len(u)))
-        return done, f"no step that touches {text}, it jumps over it" if text else lost
-
     @property
-    def state(self) -> Array:
-        """What texts keep from step to step, as of :func:`~skfem_ancf.dynamics.steps.steps`."""
-        return self._state
-
-    @property
-    def failure(self) -> str:
-        """Why the last step has failed."""
-        return self._lost or FAILURES[int(self._state[FAILURE])]
+    def _machine(self):
+        """What runs functions of the equations, compiled or not."""
+        return self.system.machine
 
     def take(self, y: Motion, dt: float) -> Motion:
-        """One step from the Motion ``y``; raises StepFailed.
+        """One step of dt from the Motion ``y``; raises StepFailed.
 
         Parameters
         ----------
@@ -411,6 +310,29 @@ class Integrator:
         if not taken:
             raise StepFailed(self.failure)
         return taken[0]
+
+    def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
+        """One step of the scheme; raises StepFailed.
+
+        Parameters
+        ----------
+        y, dt
+            Where the motion is, and the size of the step.
+        again
+            By new factors where those of other steps fail.
+        """
+        while True:
+            fresh = not self.ready or dt != self.dt
+            try:
+                new = self.scheme.step(self, y, dt)
+            except (StepFailed, np.linalg.LinAlgError) as failure:
+                self.forget()
+                if fresh or not again:
+                    raise StepFailed(str(failure)) from None
+                continue
+            if new.contacts is None:  # a user-defined scheme may not hand it on
+                new.contacts = y.contacts
+            return new
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:
         """One step, in two halves where it does not converge; raises StepFailed.
@@ -446,12 +368,11 @@ class Integrator:
         y, dt
             Where the motion is, and the size of a step that has failed.
         """
-        if not self.system.constraints.m or self.system.forces.contacts.obstacles:
+        if not self.m or self.system.forces.contacts.obstacles:
             return None
-        other = self if in_steps(self.scheme) else Integrator.lent(self.system, EnergyMomentum(),
-                                                                   None)
-        begin = y
-        if other is not self:
+        other, begin = self, y
+        if not in_steps(self.scheme):
+            other = Integrator(self.system, EnergyMomentum())
             other.expect(self.energy)
             other.limit = self.limit
             begin = other.start(y.u, y.v, y.t, dt)
@@ -461,106 +382,75 @@ class Integrator:
                 return other.attempt(begin, factor * dt)
         return None
 
-    def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
-        """One step; raises StepFailed.
-
-        Parameters
-        ----------
-        y, dt
-            As of :meth:`step`.
-        again
-            By new factors where those of other steps fail.
-        """
-        while True:
-            fresh = not self.ready or dt != self._dt
-            try:
-                new = self.scheme.step(self, y, dt)
-            except (StepFailed, np.linalg.LinAlgError) as failure:
-                self.forget()
-                if fresh or not again:
-                    raise StepFailed(str(failure)) from None
-                continue
-            if contacts_of(new) is None:  # a scheme of one's own may not hand it on
-                new.memory = kept(y, None, **(new.memory or {}))
-            return new
-
     # factors
-
-    @property
-    def dt(self) -> float:
-        """Size of the last step."""
-        return self._dt
-
-    @property
-    def ready(self) -> bool:
-        """True if there are factors of an iteration matrix."""
-        return self._state[READY] != 0.0
 
     def solve(self, b: Array) -> Array:
         """The inverse of the last iteration matrix times b (N,)."""
         if self._nodes:
-            return self._nodes[0].solve(b, np.zeros(self.system.constraints.m))[0]
+            return self._nodes[0].solve(b, np.zeros(self.m))[0]
         x = b.copy()
-        solve_rows(factors(self.matrices, self._state), self.matrices.rows, x)
+        solve_rows(factors(self._matrices, self._state), self._matrices.rows, x)
         return x
 
-    def mass_factor(self) -> float:
-        """Factor of the mass in the last iteration matrix."""
-        return mass_factor(self.rule, self._dt)
+    def filtered(self, du: Array) -> Array:
+        """What of a change (N,) the last step resolves: its inertia over the iteration matrix."""
+        if not self.ready:
+            return du
+        s = self.system
+        inertia = mass_factor(self._rule, self.dt) * s.mass.multiply(du)
+        return self.solve(inertia * s.constraints.free)
 
     def forget(self) -> None:
         """Make new factors in the next step."""
         self._state[READY] = 0.0
-        self.kept.clear()
 
-    # what a motion goes on with
+    # checkpoints
 
-    def remember(self) -> dict[str, Any]:
-        """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
-        memory = {name: array.copy() for name, array in self._factors().items()}
-        memory.update(state=self._state.copy(), dt=self._dt, substeps=self.substeps)
+    def arrays(self) -> dict[str, Any]:
+        """Arrays by name from which :meth:`load` goes on as if there had been no break."""
+        found = {"state": self._state, "dt": self.dt, "substeps": self.substeps}
+        if self._nodes:
+            (at, multipliers), mass = self._nodes[0].at, self._nodes[1].at
+            found |= {"at": at, "multipliers at": multipliers}
+            found |= {} if mass is None else {"mass at": mass}
+        elif self.ready:
+            found |= self._factors()
+        return {name: np.array(array) for name, array in found.items()}
+
+    def load(self, arrays: dict[str, Any]) -> None:
+        """Go on with what :meth:`arrays` gave."""
+        for name in ("state", "dt", "substeps"):
+            stored(arrays, name, self.arrays()[name])
+        self._state[:], self.dt = arrays["state"], float(arrays["dt"])
+        self.substeps = int(arrays["substeps"])
         if self._nodes:
             steps, mass = self._nodes
-            memory.update({"at": steps.at[0], "multipliers at": steps.at[1],
-                           "mass at": np.zeros(0) if mass.at is None else mass.at})
-        memory.update({f"kept {name}": array.copy() for name, array in self.kept.items()})
-        return memory
+            if self.ready:
+                steps.factorize(arrays["at"], arrays["multipliers at"])
+            if "mass at" in arrays:
+                mass.factorize(arrays["mass at"])
+        elif self.ready:
+            for name, array in self._factors().items():
+                array[...] = stored(arrays, name, array)
+                if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < len(
+                        array):
+                    raise CheckpointError("the exchanges of rows are none")
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Go on with what :meth:`remember` gave."""
-        self._state[:] = recalled(memory, "state", (STATE,))
-        if not (np.isfinite(self._state).all() and self._state[READY] in (0.0, SYMMETRIC, TURNED)
-                and self._state[FAILURE] in range(len(FAILURES))):
-            raise CheckpointError(f"the state of the steps is {self._state}")
-        self._dt = float(recalled(memory, "dt", (), finite=False))
-        self.substeps = int(recalled(memory, "substeps", (), "i"))
-        self.kept = {name[5:]: np.array(array) for name, array in memory.items()
-                     if name.startswith("kept ")}
-        for name, array in self._factors().items():
-            array[...] = recalled(memory, name, array.shape, array.dtype.kind, finite=False)
-            if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < array.size:
-                raise CheckpointError("the exchanges of rows are none")
-        if self._nodes:
-            self._recall_nodes(memory)
-
-    def _recall_nodes(self, memory):
-        steps, mass = self._nodes
-        s = self.system
-        if self.ready:
-            steps.factorize(recalled(memory, "at", (s.N,)),
-                            recalled(memory, "multipliers at", (s.constraints.m,)))
-        if np.shape(memory.get("mass at")) != (0,):
-            mass.factorize(recalled(memory, "mass at", (s.N,)))
-
-    def _factors(self):
-        """The arrays of the factors of steps, by name; none where there are no such factors."""
-        if not self.ready or self.scheme.text != "steps":
-            return {}
-        A, rows = factors(self.matrices, self._state), self.matrices.rows
+    def _factors(self) -> dict[str, Array]:
+        """The arrays of the factors of steps, by name."""
+        A, rows, work = factors(self._matrices, self._state), self._matrices.rows, self._work
         beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
-        return {"A": A.flat, "pivots": A.pivots, "origin": self._work.x.origin,
-                "ahead": self._work.x.ahead, "carried": self._work.stresses[3],
-                "rates": self._work.stresses[5], **beside}
+        return {"A": A.flat, "pivots": A.pivots, "origin": work.x.origin, "ahead": work.x.ahead,
+                "carried": work.stresses[3], "rates": work.stresses[5], **beside}
+
+
+def _step_course(given: Given, dt: float, system: System) -> StepCourse:
+    """Functions of time as steps take them: where the equation of motion holds, and at the end."""
+    g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
+    joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
+                          int(system.machine.tables.motion_varies))
+    return StepCourse(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
+                      given.supports[:, -1].copy(), joints)
 
 
 def _damping(system):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.kept import cached_property
 from ..actions.tables import constraint, joint_directions
-from .rates import JointMotion, acceleration_of_joints, drive_rate, rates
+from .course import rates
+from .rates import JointMotion, acceleration_of_joints, drive_rate
 
 if TYPE_CHECKING:
     from ..equations.system import System
@@ -27,7 +28,7 @@ class Joined:
     u
         Displacement, shape (N,).
     instant
-        t, dt, ahead and limit of :func:`~skfem_ancf.dynamics.rates.times_beside`.
+        t, dt, ahead and limit of :func:`~skfem_ancf.dynamics.course.rates`.
     """
 
     def __init__(self, system: System, motion: JointMotion, u: Array,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.frozen import read_only
+from ..core.immutable import read_only
 from .collocation import Collocation
 
 if TYPE_CHECKING:

@@ -1,113 +1,19 @@
-"""Rates of motions that are given as functions of time, by differences within one step.
-
-No value from outside of a step is used: neither do the rates at the end of a motion differ from
-those of a motion that goes on, nor does a kink at the end of a step spoil those of the next.
-"""
+"""Rates of joints that are given as functions of time, by differences within one step."""
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core.frozen import read_only
 from ..core.callbacks import own_joints
 from ..core.source import F2, F3, lanes, source
 from ..actions.tables import add_products, add_triples
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
 
 #: Intervals into which a step is divided.
 PARTS = 4
 _FIRST = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
 _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
-#: What makes of values in a step, in the order of time, that in its middle, that at its end, and
-#: both rates there, times the intervals and their square.
-_OF_STEP = np.array([[0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0], _FIRST[::-1],
-                     _SECOND[::-1]])
-#: Rows of it.
-MIDDLE, END, RATE = range(3)
-
-
-def times_beside(t: float, dt: float, ahead: bool, limit: float) -> Array:
-    """Times within one step, first that of its end, shape (PARTS + 1,).
-
-    Parameters
-    ----------
-    t, dt
-        End and size of the step.
-    ahead
-        The rates at its start are looked for: t is its start, and the first of the times.
-    limit
-        Time beyond which no function is asked.
-    """
-    h = dt / PARTS if ahead else -dt / PARTS
-    return np.minimum(t + h * np.arange(PARTS + 1), limit)
-
-
-def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool = False,
-          limit: float = np.inf) -> Array:
-    """First and second derivative at one time, of a function of an array of times.
-
-    Parameters
-    ----------
-    function
-        Takes times (n,), returns (n, k).
-    t, dt, ahead, limit
-        As of :func:`times_beside`.
-
-    Returns
-    -------
-    ndarray
-        Shape (2, k).
-    """
-    times = times_beside(t, dt, ahead, limit)
-    return of_step(-dt if ahead else dt)[RATE:] @ function(times)[::-1]
-
-
-@lru_cache(16)
-def of_step(dt: float) -> Array:
-    """What makes of values in a step that in its middle, that at its end and both rates there.
-
-    Parameters
-    ----------
-    dt
-        Size of the step.
-
-    Returns
-    -------
-    ndarray
-        Shape (4, PARTS + 1), for values in the order of time.
-    """
-    h = dt / PARTS
-    return read_only(_OF_STEP / np.array([[1.0], [1.0], [h], [h * h]]))
-
-
-def steps_of(values: Array) -> Array:
-    """The values in each step: the last one is the first of the next step.
-
-    Parameters
-    ----------
-    values
-        Of a function at ``PARTS`` times in each step, and at the end; shape (PARTS n + 1, k).
-
-    Returns
-    -------
-    ndarray
-        Shape (n, PARTS + 1, k).
-    """
-    f = np.ascontiguousarray(values, dtype=float)
-    along, across = f.strides
-    return np.ndarray((len(f) // PARTS, PARTS + 1, f.shape[1]), float, f, 0,
-                      (PARTS * along, along, across))
-
-
-# of joints
-
 
 class JointMotion(NamedTuple):
     """What of joints depends on time, at one instant.

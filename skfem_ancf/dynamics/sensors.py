@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown)
 from ..recovery.fields import FIELDS, find_field
-from ..core.frozen import Frozen
+from ..core.immutable import Immutable
 from ..actions.joints.base import Joint
-from .base import recalled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from ..beam.interpolation import Located
     from ..results.state import State
@@ -29,7 +27,7 @@ MOVING = ("position", "displacement", "velocity", "acceleration")
 SECTION = ("N", "Q", "M", "force", "curvature", "shear", "angle")
 
 
-class Sensor(Frozen):
+class Sensor(Immutable):
     """What is written down at every step.
 
     Parameters
@@ -146,7 +144,7 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     return found
 
 
-class Readings(Mapping):
+class Readings(dict[str, "Array"]):
     """What sensors have read: a mapping from their names to arrays (nt, ...).
 
     Parameters
@@ -158,21 +156,14 @@ class Readings(Mapping):
     """
 
     def __init__(self, t: Array, values: dict[str, Array]) -> None:
-        self.t, self._values = t, values
+        super().__init__(values)
+        self.t = t
 
-    def __getitem__(self, name: str) -> Array:
-        if name not in self._values:
-            raise NameUnknown("sensor", name, self._values)
-        return self._values[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
+    def __missing__(self, name: str) -> Array:
+        raise NameUnknown("sensor", name, self)
 
     def __repr__(self) -> str:
-        return f"<Readings of {list(self._values)} at {len(self.t)} times>"
+        return f"<Readings of {list(self)} at {len(self.t)} times>"
 
 
 class Recorder:
@@ -185,64 +176,47 @@ class Recorder:
     system
         What is integrated.
     state_of
-        Makes States of Motions, one after the other.
+        Makes a State of a Motion.
     """
 
     def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
                  state_of: Callable[[Motion], State]) -> None:
-        self.sensors, self._system, self._state_of = list(sensors), system, state_of
+        self.sensors, self._state_of = list(sensors), state_of
         self._located: list[Any] = [locate(sensor, system) for _, sensor in self.sensors]
         self._t: list[Array] = []
         self._read: list[list[Array]] = [[] for _ in self.sensors]
 
     def record(self, steps: Sequence[Motion]) -> None:
         """Read at the ends of steps."""
-        if not self.sensors or not steps:
+        if not self.sensors:
             return
-        others: dict[int, list[Any]] = {k: [] for k, (_, sensor) in enumerate(self.sensors)
-                                        if not sensor.moving}
-        if others:
-            for state in map(self._state_of, steps):
-                for k, values in others.items():
-                    values.append(self.sensors[k][1].read(self._located[k], state))
+        others = [(sensor, at) for (_, sensor), at in zip(self.sensors, self._located)
+                  if not sensor.moving]
+        rows = [[sensor.read(at, state) for sensor, at in others]
+                for state in map(self._state_of, steps)] if others else []
+        columns = iter(zip(*rows))
+        found = [sensor.read_steps(at, steps) if sensor.moving else np.array(next(columns))
+                 for (_, sensor), at in zip(self.sensors, self._located)]
         self._t.append(np.array([y.t for y in steps]))
-        for k, ((_, sensor), at) in enumerate(zip(self.sensors, self._located)):
-            self._read[k].append(np.array(others[k]) if k in others else
-                                 sensor.read_steps(at, steps))
+        for read, one in zip(self._read, found):
+            read.append(one)
 
     def readings(self) -> Readings:
         """What was read so far."""
-        if not self.sensors:
-            return Readings(np.zeros(0), {})
         return Readings(np.concatenate([np.zeros(0), *self._t]), {
             name: np.concatenate(read) if read else np.zeros(0)
             for (name, _), read in zip(self.sensors, self._read)})
 
-    # files
+    # checkpoints
 
-    def remember(self) -> dict[str, Array]:
+    def arrays(self) -> dict[str, Array]:
         """The same as arrays by name, for a checkpoint."""
         found = self.readings()
         return {"t": found.t, **{str(k): values for k, values in enumerate(found.values())}}
 
-    def recall(self, arrays: dict[str, Array]) -> None:
-        """Go on after what :meth:`remember` gave; raises CheckpointError for other sensors."""
+    def load(self, arrays: dict[str, Array]) -> None:
+        """Go on after what :meth:`arrays` gave; raises CheckpointError for other sensors."""
         if len(arrays) != len(self.sensors) + 1:
-            raise CheckpointError(f"the run had {max(len(arrays) - 1, 0)} sensors, the scene has "
+            raise CheckpointError(f"the run had {len(arrays) - 1} sensors, the scene has "
                                   f"{len(self.sensors)}: {[name for name, _ in self.sensors]}")
-        self._t = [recalled(arrays, "t", (len(np.atleast_1d(arrays["t"])),))]
-        self._read = [[arrays[str(k)]] for k in range(len(self.sensors))]
-
-    def require_alike(self, y: Motion) -> None:
-        """Raise CheckpointError if what was recalled is not of the shape of what is read.
-
-        Parameters
-        ----------
-        y
-            An instant.
-        """
-        now = Recorder(self.sensors, self._system, self._state_of)
-        now.record([y])
-        for found, (one,) in zip(self._read, now._read):
-            recalled({"sensor": found[0]}, "sensor", (len(self._t[0]), *one.shape[1:]),
-                     one.dtype.kind, finite=False)
+        self._t, self._read = [arrays["t"]], [[arrays[str(k)]] for k in range(len(self.sensors))]

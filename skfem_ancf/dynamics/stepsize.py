@@ -7,18 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.sampling import sample
-from .base import recalled
+from .base import stored
+from .course import Lookahead
 
 if TYPE_CHECKING:
+    from ..core.types import Array
     from ..equations.system import System
     from .base import Motion, Scheme
     from .integrator import Integrator
 
-#: Intervals of the whole motion at whose ends functions of time are asked ahead.
-SAMPLES = 4096
-#: Part of a function's range by which it may leave a parabola within one step.
-HIDDEN = 0.1
 #: The largest error of a point's displacement, over the root of the mean square that is added up:
 #: a tip moves twice as far as the mean, and errors grow on their way.
 LARGEST = 3.0
@@ -76,49 +73,7 @@ class StepSize:
         self.span, self._averaged = t_end - t_start, scheme.order <= 2
         self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
-        self.times = np.linspace(t_start, t_end, SAMPLES + 1)
-        self._values = self._sample()
-
-    def _sample(self):
-        """Functions of time at :attr:`times`, of range 1, shape (SAMPLES + 1, k)."""
-        s, columns = self.system, [np.zeros((len(self.times), 0))]
-        for load in s.loads:
-            if load.amplitude is not None:
-                columns.append(sample(load.amplitude, self.times).reshape(-1, 1))
-        for joint in s.constraints.all_joints:
-            if joint.moving:
-                columns.append(joint.moved(self.times, s.N))
-        values = np.hstack(columns)
-        values = values[:, np.all(np.isfinite(values), axis=0)]
-        size = np.ptp(values, axis=0)
-        varies = size > 1e-12 * np.abs(values).max(axis=0, initial=0.0)
-        return values[:, varies] / size[varies]
-
-    def cut(self, t: float, dt: float) -> float:
-        """The step size from t, at most dt, in which no function of time does what is not seen.
-
-        It is not seen if it is no parabola within the step: a blow that begins and ends there.
-
-        Parameters
-        ----------
-        t
-            Time at the start of the step.
-        dt
-            Its size at most.
-        """
-        values = self._values
-        while values.shape[1]:
-            i, j = np.searchsorted(self.times, (t, t + dt))
-            if j - i < 3:
-                return dt
-            at = np.array([np.interp((t, t + 0.5 * dt, t + dt), self.times, c) for c in values.T]).T
-            x = ((self.times[i:j] - t) / dt)[:, None]
-            parabola = (at[0] * (1 - x) * (1 - 2 * x) + at[1] * 4 * x * (1 - x)
-                        + at[2] * x * (2 * x - 1))
-            if np.all(np.abs(values[i:j] - parabola) <= HIDDEN):
-                return dt
-            dt *= 0.5
-        return dt
+        self.cut = Lookahead(system, t_start, t_end).cut
 
     def _size(self, de):
         return (np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / self._mass)
@@ -190,10 +145,10 @@ class StepSize:
             new = dt
         return (max(size, new) if dt < 0.99 * size and factor >= 1.0 else new), True
 
-    def remember(self) -> dict[str, Any]:
-        """What :meth:`recall` takes to go on as if there had been no break."""
+    def arrays(self) -> dict[str, Array]:
+        """Arrays by name from which :meth:`load` goes on as if there had been no break."""
         return {"averages": self._averages}
 
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Go on with what :meth:`remember` gave."""
-        self._averages = recalled(memory, "averages", self._averages.shape)
+    def load(self, arrays: dict[str, Any]) -> None:
+        """Go on with what :meth:`arrays` gave."""
+        self._averages = stored(arrays, "averages", self._averages)

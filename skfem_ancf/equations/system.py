@@ -150,11 +150,6 @@ class System:
         """What solves with the mass matrix, supports and joints."""
         return MassSolver(self)
 
-    @cached_property
-    def integrators(self) -> list[Any]:
-        """Those of motions that have ended, whose work arrays the next one takes."""
-        return []
-
     # loads
 
     def external_force(self, u: Array, t: float | None = None) -> Array:
