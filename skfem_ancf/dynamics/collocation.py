@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 NEAR = 3e-3
 
 
-class Tableau:
+class _Tableau:
     """The numbers of a method of collocation.
 
     Parameters
@@ -64,7 +64,7 @@ class Tableau:
 
 @lru_cache(16)
 def _tableau(points):
-    return Tableau(np.array(points))
+    return _Tableau(np.array(points))
 
 
 class Collocation(Scheme):
@@ -101,7 +101,7 @@ class Collocation(Scheme):
         raise NotImplementedError
 
     @property
-    def table(self) -> Tableau:
+    def table(self) -> _Tableau:
         """The numbers of the method."""
         return _tableau(tuple(self.points.tolist()))
 
