@@ -760,13 +760,13 @@ call("state.plot", lambda **k: state().plot(**k), drawing, {"limits": {"[True, F
      filename="file?", dpi="positive")
 call("history.plot", lambda **k: history().plot(**k), dict(field="S_xx", times=[0.0, 0.02]),
      field="name")
-film = dict(filename="f.gif", field="S_xx", frames=2, fps=5.0, backend="matplotlib", thickness=1.0,
+film = dict(filename="f.gif", field="S_xx", frames=2, fps=5.0, thickness=1.0,
             undeformed=True, cmap="viridis", limits=(-1.0, 1.0), unit="Pa", subdivide=(1, 1),
             recover=False, size=(320, 240))
 call("history.animate", lambda **k: history().animate(**k), film,
      {"limits": {"[True, False]": ""}, "frames": {"10**30": "all", "10**400": "all"}},
      filename="file",
-     field="name", frames="count?", fps="positive?", backend="name?", thickness="positive",
+     field="name", frames="count?", fps="positive?", thickness="positive",
      undeformed="flag", cmap="name?", limits="other?", unit="title?", subdivide="other",
      recover="flag", size="other")
 call("state.view", lambda **k: state().view(**k).close(),

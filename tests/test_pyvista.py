@@ -148,12 +148,10 @@ def test_no_display_is_no_warning(state, monkeypatch, capfd):
     assert "WARN" not in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("backend", ["pyvista", "matplotlib"])
-def test_film(history, tmp_path, backend):
+def test_film(history, tmp_path):
     from PIL import Image
 
-    path = history.animate(tmp_path / "new" / "film.gif", frames=5, backend=backend,
-                           size=(320, 240))
+    path = history.animate(tmp_path / "new" / "film.gif", frames=5, size=(320, 240))
     images = []
     with Image.open(path) as film:
         assert film.n_frames == 5 and film.size == (320, 240)
@@ -167,12 +165,10 @@ def test_film(history, tmp_path, backend):
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning",  # pipes of imageio's reader
                             "ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("backend", ["pyvista", "matplotlib"])
-def test_film_as_mp4(history, tmp_path, backend):
+def test_film_as_mp4(history, tmp_path):
     imageio = pytest.importorskip("imageio.v2", reason="imageio is not there: pip install imageio")
     pytest.importorskip("imageio_ffmpeg", reason="no ffmpeg: pip install imageio-ffmpeg")
-    path = history.animate(tmp_path / "film.mp4", "von_mises", frames=4, size=(322, 241), fps=10,
-                           backend=backend)
+    path = history.animate(tmp_path / "film.mp4", "von_mises", frames=4, size=(322, 241), fps=10)
     with imageio.get_reader(path) as film:
         images = [np.asarray(image).astype(int) for image in film]
         assert film.get_meta_data()["fps"] == 10
@@ -185,7 +181,7 @@ def test_film_as_mp4(history, tmp_path, backend):
 def test_an_mp4_names_the_extra_that_is_missing(history, tmp_path, monkeypatch, missing):
     monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(MissingExtra, match=r'pip install "skfem-ancf\[view\]"'):
-        history.animate(tmp_path / "new" / "film.mp4", backend="matplotlib")
+        history.animate(tmp_path / "new" / "film.mp4")
     assert not (tmp_path / "new").exists()
 
 
@@ -194,7 +190,6 @@ def test_an_mp4_names_the_extra_that_is_missing(history, tmp_path, monkeypatch, 
     (dict(field="eps_y"), NameUnknown, "did you mean 'eps_yy'"),
     (dict(frames=0), InputError, "frames must be"),
     (dict(fps=0), InputError, "fps must be positive"),
-    (dict(backend="vtk"), NameUnknown, "backend"),
     (dict(size=3), InputError, "size must be"),
     (dict(cmap="rainbo"), NameUnknown, "colour map"),
 ])

@@ -9,16 +9,16 @@ import numpy as np
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text)
 from ..core.archive import output_file
-from ..actions.obstacles.pictures import AROUND, around, outlines
-from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery, cells_of
+from ..actions.obstacles.pictures import AROUND
+from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
-    from ..core.types import Array, StrPath
+    from ..core.types import StrPath
     from ..beam.layout import WhichBeam
-
-
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400
@@ -97,50 +97,63 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     >>> ax.get_title(loc="left")
     'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
     """
-    Figure = figure_class()
-    from matplotlib.collections import LineCollection, PolyCollection
-
-    states, undeformed = _states(state), require_flag("undeformed", undeformed)
-    colorbar, cmap = require_flag("colorbar", colorbar), colormap(cmap)
+    Figure, states, cmap = figure_class(), _states(state), colormap(cmap)
+    colorbar, unit = require_flag("colorbar", colorbar), require_text("unit", unit)
     filename, dpi = page(ax, title, filename, dpi)
-    unit = require_text("unit", unit)
-    scenery = Scenery(states, field, thickness, limits, subdivide, recover)
-    drawn, bodies, factor, values = scenery.field, scenery.beams, scenery.factor, scenery.found
-    ghosts = [line for b in scenery.frames[0] if undeformed
-              for line in b.outline(b.reference, factor)]
-    edges = [line for b in bodies for line in b.outline(b.deformed, factor)]
-    rigid = [line for k in range(len(states)) for line in scenery.outlines(k)]
-
+    scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover)
+    drawn, values = scenery.field, scenery.found
     if ax is None:
-        ax = Figure(figsize=_figsize(np.concatenate(ghosts + edges + rigid), colorbar),
+        ax = Figure(figsize=_figsize(scenery.every[:, :2], colorbar),
                     layout="constrained").add_subplot()
-    if ghosts:
-        ax.add_collection(PolyCollection(ghosts, facecolor=GHOST, edgecolor=GHOST, linewidth=0.5,
-                                         zorder=1), autolim=True)
-    if rigid:
-        ax.add_collection(PolyCollection(rigid, facecolor=RIGID, edgecolor=INK, linewidth=0.5,
-                                         zorder=1.5), autolim=True)
-    if bodies:
-        points = [b.points(b.deformed, factor).reshape(2, -1) for b in bodies]
-        image = ax.tripcolor(triangulation(np.concatenate(points, axis=1), cells_of(bodies)),
-                             values, shading="gouraud", cmap=scenery.colours(cmap),
-                             vmin=scenery.low, vmax=scenery.high, zorder=2)
-    ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in edges],
-                                     colors=INK, linewidths=0.5, zorder=3))
-    box = around(np.concatenate(ghosts + edges + rigid).T)
-    walls = [wall for s in states for wall in outlines(s, box)]
-    if walls:
-        ax.add_collection(LineCollection(np.concatenate(walls), colors=WALL, linewidths=1.2,
-                                         zorder=2.5), autolim=False)
+    image, _ = paint(ax, scenery, range(len(states)), cmap)
     ax.set_aspect("equal")
-    ax.margins(AROUND if walls else 0.04)
+    ax.margins(AROUND if len(scenery.walls[0]) else 0.04)
     ax.autoscale_view()
     dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note)
-    if colorbar and bodies:
-        _add_colorbar(ax, image, bool(np.any(values < scenery.low)),
-                      bool(np.any(values > scenery.high)), scenery.unit(unit))
+    if colorbar and image is not None:
+        ends = bool(np.any(values < scenery.low)), bool(np.any(values > scenery.high))
+        colour_bar(ax, image, _EXTEND[ends], scenery.unit(unit))
     save(ax, filename, dpi=dpi, bbox_inches="tight")
     return ax
+
+
+def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any) -> tuple[Any, list[Any]]:
+    """Draw frames over each other; returns the coloured image, or None, and all artists.
+
+    Parameters
+    ----------
+    ax, scenery, frames
+        The Axes, what is drawn, and the numbers of the frames.
+    cmap
+        A colour map, or None for one that fits the field.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.tri import Triangulation
+
+    ghosts = scenery.outlines(0, True) if scenery.undeformed else []
+    rigid = [line for k in frames for line in scenery.rigid_outlines(k)]
+    edges = [np.vstack([line, line[:1]]) for k in frames for line in scenery.outlines(k)]
+    walls = np.concatenate([scenery.walls[k] for k in frames])
+    image, artists = None, []
+    if ghosts:
+        artists.append(ax.add_collection(PolyCollection(
+            ghosts, facecolor=GHOST, edgecolor=GHOST, linewidth=0.5, zorder=1), autolim=True))
+    if rigid:
+        artists.append(ax.add_collection(PolyCollection(
+            rigid, facecolor=RIGID, edgecolor=INK, linewidth=0.5, zorder=1.5), autolim=True))
+    if edges:
+        points, cells = scenery.beam_points(frames), scenery.cells(frames)
+        image = ax.tripcolor(
+            Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])),
+            np.concatenate([b.values for k in frames for b in scenery.frames[k]]),
+            shading="gouraud", cmap=scenery.colours(cmap), vmin=scenery.low, vmax=scenery.high,
+            zorder=2)
+        artists += [image, ax.add_collection(LineCollection(edges, colors=INK, linewidths=0.5,
+                                                            zorder=3))]
+    if len(walls):
+        artists.append(ax.add_collection(LineCollection(
+            walls, colors=WALL, linewidths=1.2, zorder=2.5), autolim=False))
+    return image, artists
 
 
 def _states(state):
@@ -153,18 +166,15 @@ def _states(state):
     return states
 
 
-def _add_colorbar(ax, image, below, above, unit):
-    """A bar as high as the picture, or below a flat one."""
+def colour_bar(ax: Any, image: Any, extend: str, label: str) -> None:
+    """A bar as high as the picture, or below a flat one; extend and label are those of the bar."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     flat = (y1 - y0) < 0.35 * (x1 - x0)
-    if flat:
-        bar = ax.figure.colorbar(image, ax=ax, location="bottom", shrink=0.6, aspect=45, pad=0.06,
-                                 extend=_EXTEND[below, above])
-    else:
-        bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.03, 0.0, 0.03, 1.0]),
-                                 extend=_EXTEND[below, above])
+    place: dict[str, Any] = (dict(ax=ax, location="bottom", shrink=0.6, aspect=45, pad=0.06)
+                             if flat else dict(cax=ax.inset_axes([1.03, 0.0, 0.03, 1.0])))
+    bar = ax.figure.colorbar(image, extend=extend, **place)
     bar.outline.set_visible(False)
-    bar.set_label(unit, fontsize=8, color=MUTED)
+    bar.set_label(label, fontsize=8, color=MUTED)
     bar.ax.tick_params(labelsize=8, color=MUTED, labelcolor=INK)
     bar.formatter.set_powerlimits((-3, 4))
     bar.formatter.set_useMathText(True)
@@ -323,16 +333,3 @@ def dress(ax: Any, title: str | None, note: str = "") -> None:
     if note:
         ax.annotate(note, (0, 1), (0, 5), va="bottom",
                     xycoords="axes fraction", textcoords="offset points", fontsize=8, color=MUTED)
-
-
-def triangulation(points: Array, cells: Array) -> Any:
-    """Two triangles for each quad.
-
-    Parameters
-    ----------
-    points, cells
-        Shape (2, n), and rows of 4 of them, (nc, 4).
-    """
-    from matplotlib.tri import Triangulation
-
-    return Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))

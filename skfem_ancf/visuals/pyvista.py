@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
-                           require_like, require_options, require_path, require_text, shown)
+from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
+                           require_options, require_path, require_text)
 from ..recovery.fields import FIELDS, find_fields
 from ..core.archive import output_file
 from ..recovery.grids import grids, in_space
 from ..actions.obstacles.pictures import around, outlines
+from .animation import pixels
 from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery
 
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
 #: VTK's numbers of the cells.
 CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
-
-#: Width and height of a picture, least and largest.
-PIXELS = (100, 10000)
 
 #: Pictures that a plotter writes.
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -169,7 +167,7 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
         mesh.append(block, name=grid.name)
     box = around(np.concatenate([grid.points(undeformed)[:, :2] for grid in found]).T)
     for k, wall in enumerate(outlines(state, box)):
-        mesh.append(lines_of(wall), name=f"obstacle {k}")
+        mesh.append(_lines(wall), name=f"obstacle {k}")
     return mesh if len(mesh) > 1 else mesh[0]
 
 
@@ -178,58 +176,6 @@ def has_display() -> bool:
     if "ipykernel" in sys.modules or sys.platform in ("win32", "darwin"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def dressed(scenery: Scenery, plotter: Any, cmap: Any, undeformed: bool,
-            unit: str | None) -> tuple[Any, Any]:
-    """Put frame 0 into a plotter, seen from the front; returns the meshes of bodies and obstacles.
-
-    Parameters
-    ----------
-    scenery
-        What is drawn.
-    plotter, cmap, undeformed, unit
-        Those of :func:`view`.
-    """
-    pv, field, faces = _pyvista(), scenery.field, scenery.faces
-    if undeformed:
-        ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
-        plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
-    mesh, wall = pv.PolyData(scenery.points(0), faces), None
-    mesh.point_data[field.name] = scenery.values(0)
-    unit = scenery.unit(unit)
-    plotter.add_mesh(
-        mesh, scalars=field.name, clim=(scenery.low, scenery.high), lighting=False,
-        cmap=scenery.colours(cmap), nan_color=RIGID,
-        scalar_bar_args=dict(title=f"{field.name} ({unit})\n" if unit else f"{field.name}\n",
-                             color="black", vertical=False, title_font_size=18,
-                             label_font_size=14, n_labels=5, position_x=0.2, width=0.6,
-                             height=0.09, fmt="%.3g"))
-    if len(scenery.walls[0]):
-        wall = lines_of(scenery.walls[0])
-        plotter.add_mesh(wall, color=WALL, line_width=2, lighting=False)
-    if scenery.note:
-        plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
-    plotter.set_background("white")
-    plotter.enable_parallel_projection()
-    low, high = scenery.every.min(axis=0), scenery.every.max(axis=0)
-    width, height = plotter.window_size
-    low[1] -= 0.25 * max(high[1] - low[1], (high[0] - low[0]) * height / width)  # the colour bar
-    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
-    return mesh, wall
-
-
-def lines_of(walls: Any) -> Any:
-    """Straight pieces as a mesh of pyvista.
-
-    Parameters
-    ----------
-    walls
-        Their ends, shape (n, 2, 2).
-    """
-    ends = in_space(walls.reshape(-1, 2).T)
-    return _pyvista().PolyData(ends, lines=np.insert(
-        np.arange(len(ends)).reshape(-1, 2), 0, 2, axis=1).ravel())
 
 
 def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
@@ -275,28 +221,47 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
     if plotter is not None:
         require_like("plotter", plotter, "pyvista Plotter", "add_mesh", "screenshot")
     cmap, unit = colormap(cmap), require_text("unit", unit)
-    scenery = Scenery([state], field, thickness, limits, subdivide, recover)
+    scenery = Scenery([state], field, thickness, undeformed, limits, subdivide, recover)
     if plotter is None:
-        plotter = new_plotter(pv, off_screen if path is None else True, window_size)
-    dressed(scenery, plotter, cmap, require_flag("undeformed", undeformed), unit)
+        plotter = _new_plotter(off_screen if path is None else True, window_size)
+    name, faces, unit = scenery.field.name, scenery.faces, scenery.unit(unit)
+    if undeformed:
+        ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
+        plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
+    mesh = pv.PolyData(scenery.points(0), faces)
+    mesh.point_data[name] = scenery.values(0)
+    plotter.add_mesh(
+        mesh, scalars=name, clim=(scenery.low, scenery.high), lighting=False,
+        cmap=scenery.colours(cmap), nan_color=RIGID,
+        scalar_bar_args=dict(title=f"{name} ({unit})\n" if unit else f"{name}\n",
+                             color="black", vertical=False, title_font_size=18,
+                             label_font_size=14, n_labels=5, position_x=0.2, width=0.6,
+                             height=0.09, fmt="%.3g"))
+    if len(scenery.walls[0]):
+        plotter.add_mesh(_lines(scenery.walls[0]), color=WALL, line_width=2, lighting=False)
+    if scenery.note:
+        plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
+    plotter.set_background("white")
+    plotter.enable_parallel_projection()
+    low, high = scenery.every.min(axis=0), scenery.every.max(axis=0)
+    width, height = plotter.window_size
+    low[1] -= 0.25 * max(high[1] - low[1], (high[0] - low[0]) * height / width)  # the colour bar
+    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
     if path is not None:
         with output_file(path) as temporary:
             plotter.screenshot(str(temporary))
     return plotter
 
 
-def new_plotter(pv: Any, off_screen: bool | None, window_size: tuple[int, int]) -> Any:
-    """A plotter, with a window where there is a display.
+def _lines(walls):
+    """Straight pieces (n, 2, 2) as a mesh of pyvista."""
+    ends = in_space(walls.reshape(-1, 2).T)
+    return _pyvista().PolyData(ends, lines=np.insert(
+        np.arange(len(ends)).reshape(-1, 2), 0, 2, axis=1).ravel())
 
-    Parameters
-    ----------
-    pv
-        The module pyvista.
-    off_screen
-        As for :func:`view`.
-    window_size
-        As for :func:`view`, shape (2,).
-    """
+
+def _new_plotter(off_screen, window_size):
+    """A plotter, with a window where there is a display."""
     from vtkmodules.vtkCommonCore import vtkLogger
 
     hidden = not has_display()
@@ -305,24 +270,6 @@ def new_plotter(pv: Any, off_screen: bool | None, window_size: tuple[int, int]) 
     if hidden and off_screen:  # that there is no display, which VTK looks for all the same
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     try:
-        return pv.Plotter(off_screen=off_screen, window_size=size)
+        return _pyvista().Plotter(off_screen=off_screen, window_size=size)
     finally:
         vtkLogger.SetStderrVerbosity(said)
-
-
-def pixels(name: str, size: Any) -> tuple[int, int]:
-    """Width and height of a picture in pixels.
-
-    Parameters
-    ----------
-    name
-        Of the argument, for the message.
-    size
-        Two integers, shape (2,).
-    """
-    try:
-        width, height = (require_integer(name, k, *PIXELS) for k in size)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be two integers from {PIXELS[0]} to {PIXELS[1]}, the width "
-                         f"and height in pixels, got {shown(size)}") from None
-    return width, height

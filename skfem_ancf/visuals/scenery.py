@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import (InputError, require_finite_scalar, require_positive, shown,
-                           require_unmasked)
+from ..core.errors import (InputError, require_finite_scalar, require_flag, require_positive,
+                           require_unmasked, shown)
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
 from ..recovery.grids import grids, in_space
 from ..actions.obstacles.pictures import around, outlines
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ..recovery.grids import Grid
     from ..core.types import Array
 
@@ -99,7 +101,7 @@ class Scenery:
     ----------
     states
         States of the same beams.
-    field, thickness, limits, subdivide, recover
+    field, thickness, undeformed, limits, subdivide, recover
         Those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
 
     Attributes
@@ -114,9 +116,10 @@ class Scenery:
         Of the thickness; the range of the colours.
     """
 
-    def __init__(self, states: list[Any], field: Any, thickness: Any, limits: Any,
-                 subdivide: tuple[int, int], recover: bool) -> None:
+    def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
+                 limits: Any, subdivide: tuple[int, int], recover: bool) -> None:
         self.field: Field = find_field(field, DRAWN)
+        self.undeformed = require_flag("undeformed", undeformed)
         self.frames: list[list[_Body]] = []
         self.rigid: list[list[Grid]] = []
         for state in states:
@@ -132,9 +135,9 @@ class Scenery:
 
     @cached_property
     def every(self) -> Array:
-        """Points of all frames, deformed and not, shape (n, 3)."""
-        return np.concatenate([self.points(k, undeformed) for k in range(len(self.frames))
-                               for undeformed in (False, True)])
+        """All points that are drawn, shape (n, 3)."""
+        return np.concatenate([self.points(k) for k in range(len(self.frames))]
+                              + [self.points(0, True)] * self.undeformed)
 
     @cached_property
     def walls(self) -> list[Any]:
@@ -143,30 +146,42 @@ class Scenery:
         return [np.concatenate([np.zeros((0, 2, 2)), *outlines(state, box)])
                 for state in self._states]
 
+    def beam_points(self, frames: Iterable[int], undeformed: bool = False) -> Array:
+        """Points of the beams of frames, shape (2, n), deformed or not."""
+        return np.concatenate([np.zeros((2, 0)), *(
+            b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
+            for k in frames for b in self.frames[k])], axis=1)
+
     def points(self, k: int, undeformed: bool = False) -> Array:
-        """Points of frame ``k``, shape (n, 3), deformed or not."""
-        return np.concatenate([np.zeros((0, 3)), *(
-            in_space(b.points(b.reference if undeformed else b.deformed, self.factor))
-            for b in self.frames[k]), *(g.points(undeformed) for g in self.rigid[k])])
+        """Points of frame ``k``, those of rigid bodies too, shape (n, 3), deformed or not."""
+        return np.concatenate([in_space(self.beam_points([k], undeformed)),
+                               *(g.points(undeformed) for g in self.rigid[k])])
 
     def values(self, k: int) -> Array:
         """Values of frame ``k``, shape (n,); NaN on rigid bodies."""
         return np.concatenate([b.values for b in self.frames[k]] + [
             np.full(g.x.shape[1], np.nan) for g in self.rigid[k]])
 
-    def outlines(self, k: int) -> list[Array]:
+    def outlines(self, k: int, undeformed: bool = False) -> list[Array]:
+        """Closed lines around the beams of frame ``k``, shapes (n, 2), deformed or not."""
+        return [line for b in self.frames[k] for line in b.outline(
+            b.reference if undeformed else b.deformed, self.factor)]
+
+    def rigid_outlines(self, k: int) -> list[Array]:
         """Corners of the rigid bodies of frame ``k``, shapes (n, 2)."""
         return [(g.x + g.u).T for g in self.rigid[k]]
 
-    @property
-    def cells(self) -> Array:
-        """Quads of the beams of a frame as rows of points, shape (nc, 4)."""
-        return cells_of(self.frames[0])
+    def cells(self, frames: Iterable[int] = (0,)) -> Array:
+        """Quads of the beams of frames, one behind the other, as rows of points, (nc, 4)."""
+        bodies = [b for k in frames for b in self.frames[k]]
+        first = np.cumsum([0] + [b.values.size for b in bodies])
+        return np.concatenate([np.zeros((0, 4), dtype=int), *(
+            f + b.cells for f, b in zip(first, bodies))])
 
     @property
     def faces(self) -> Array:
         """Quads, and outlines of rigid bodies: the number of corners and the points of each."""
-        cells, at = self.cells, sum(b.values.size for b in self.frames[0])
+        cells, at = self.cells(), sum(b.values.size for b in self.frames[0])
         parts = [np.hstack([np.full((len(cells), 1), 4), cells]).ravel()]
         for grid in self.rigid[0]:
             corners = grid.x.shape[1]
@@ -188,9 +203,3 @@ class Scenery:
         """The colour map that is given, or for None one that fits the field."""
         return cmap or ("RdYlBu_r" if self.field.signed else "viridis")
 
-
-def cells_of(bodies: list[Any]) -> Array:
-    """Quads of bodies on grids, one behind the other, as rows of points, shape (nc, 4)."""
-    first = np.cumsum([0] + [b.values.size for b in bodies])
-    return np.concatenate([np.zeros((0, 4), dtype=int), *(
-        f + b.cells for f, b in zip(first, bodies))])
