@@ -263,7 +263,7 @@ def compute(cases=None, elements=None):
             if name in entry.without:
                 continue
             value, scene = entry.solve(element, n)
-            errors[name], coordinates[name] = float(value / known - 1), scene.N
+            errors[name], coordinates[name] = float(value / known - 1), scene.layout.N
         rows.append(Row(entry, known, errors, coordinates))
     return rows
 

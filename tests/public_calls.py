@@ -402,7 +402,6 @@ call("Scene", lambda **k: Scene(*k.values()), dict(beams=beam()), beams="other")
 call("Scene of a list", lambda **k: Scene([beam(), *k.values()]), dict(beams=second()),
      beams="other")
 call("scene.beam", lambda **k: two().beam(**k), dict(beam=0), beam="beam")
-call("scene.offset", lambda **k: two().offset(**k), dict(beam=0), beam="beam")
 call("scene.clamp", lambda **k: free().clamp(**k),
      dict(boundary="left", beam=0, thickness="fixed"), boundary="facets", beam="beam?",
      thickness="name")
@@ -593,8 +592,8 @@ call("scene.load", load_of, dict(form=weight, boundary="top", beam=0, amplitude=
      form="other", boundary="facets?", beam="beam?", amplitude="function?")
 call("scene.initial_velocity", lambda **k: moved(clamped().initial_velocity(**k)),
      dict(v=lambda x: 0.0 * x, beam=0), v="other", beam="beam?")
-call("scene.with_beams", lambda **k: clamped().with_beams(**k), dict(beams=[beam()]),
-     beams="other")
+call("scene.replace of beams", lambda **k: clamped().replace(**k), dict(beams=[beam()]),
+     beams="other?")
 call("scene.plan", lambda **k: loaded_once().plan(**k), dict(kind="static"), kind="name")
 
 
@@ -608,7 +607,7 @@ def joined(kind, scene, **options):
 
 call("scene.joint", lambda joint: clamped().joint(joint, at=(1.0, 0.0), direction=(1.0, 0.0)),
      dict(joint="line"), joint="name")
-call("scene.add", lambda **k: free().add(**k), dict(thing=Weight((0.0, -1.0))), thing="other")
+call("scene.add", lambda **k: free().add(**k), dict(item=Weight((0.0, -1.0))), item="other")
 call("joint hinge", lambda **k: joined("hinge", two, **k),
      dict(beams=(0, 1), at=(1.0, 0.0), name="h"), beams="other", at="vector", name="label?")
 call("joint weld", lambda **k: joined("weld", two, **k),

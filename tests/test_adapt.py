@@ -80,7 +80,7 @@ def test_refined_space_holds_the_coarse_one(name):
     mesh = MeshBeam.init_line([0, 0.3, 0.5, 1], 0.1, angle=0.4)
     scene = Scene(Beam(mesh, element, StVenantKirchhoff(2.0, 0.3), 0.3))
     fine, prolong = refine(scene, [[0, 2]])
-    u = 0.05 * np.random.default_rng(0).standard_normal(scene.N)
+    u = 0.05 * np.random.default_rng(0).standard_normal(scene.layout.N)
     a, b = State(scene.system, u), State(fine.system, prolong(u))
     heights = [0.5] if element.order == 0 else [0.3, 0.6, 0.2]
     for xi, eta in zip((0.2, 0.6, 0.9), 3 * heights):
@@ -97,14 +97,14 @@ def test_scene_is_put_on_other_beams():
     scene = Scene(left, right).clamp("left", beam="left").gravity((0, -1))
     scene.joint("weld", beams=(left, right), at=("right", "left"))
     scene.point_force((0, -0.1), at=(2, 0), beam=right).fix("right", ["r^1"], beam=1)
-    again = scene.with_beams([b.replace(mesh=b.mesh.refined(3)) for b in scene.beams])
+    again = scene.replace(beams=[b.replace(mesh=b.mesh.refined(3)) for b in scene.beams])
     assert (len(again.loads), len(again.joints)) == (3, 1) and again.system.constraints.m == 3
     a, b = scene.solve_linear(), again.solve_linear()
     assert_allclose(b.displacement((2, 0), "right"), a.displacement((2, 0), "right"), rtol=0.1,
                     atol=1e-12)
     numbered = Scene(left).clamp(np.array([0]))
     with pytest.raises(InputError, match="names or functions"):
-        numbered.with_beams([left.replace(mesh=left.mesh.refined())])
+        numbered.replace(beams=[left.replace(mesh=left.mesh.refined())])
 
 
 # the degree
@@ -126,7 +126,7 @@ def test_degrees_need_fewer_coordinates_than_halved_elements():
         "split"}
     assert [(r.kind, r.degree) for r in found[15].refinements] == [
         ("degree", 9), ("degree", 11), ("degree", 13)]
-    N = {most: state.scene.N for most, state in found.items()}
+    N = {most: state.scene.layout.N for most, state in found.items()}
     assert N[15] <= 70 and N[15] < 0.6 * N[7] and N[15] < 0.6 * N[5]
 
 

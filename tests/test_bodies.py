@@ -370,10 +370,11 @@ def mechanism():
 
 def test_order_of_beams_and_bodies():
     scene = mechanism()
-    assert [b.name for b in scene.members] == ["beam", "crank", "bob"]
+    assert [b.name for b in scene.layout.members] == ["beam", "crank", "bob"]
     assert scene.beam(0) is scene.beams[0] and scene.beam("bob") is scene.beam(2)
     assert scene.beam() is scene.beams[0]
-    assert scene.N == scene.beams[0].N + 8 and scene.offset("crank") == scene.beams[0].N
+    N = scene.beams[0].N
+    assert scene.layout.N == N + 8 and scene.layout.offset("crank") == N
     assert "2 rigid bodies" in repr(scene)
     plan = scene.plan()
     assert plan["rigid bodies"].status == "computed" and "2:" in plan["rigid bodies"].reason
@@ -402,7 +403,7 @@ def test_a_run_with_bodies_goes_on_from_its_checkpoint(tmp_path):
     path = tmp_path / "run.npz"
     scene.integrate(0.2, 0.01, checkpoint=path, every=5)
     assert np.array_equal(scene.resume(path).u, whole.u)
-    other = Scene(*(b.replace(mass=0.31) if b.name == "crank" else b for b in scene.members))
+    other = Scene(*(b.replace(mass=0.31) if b.name == "crank" else b for b in scene.layout.members))
     with pytest.raises(CheckpointError, match="rigid body crank"):
         other.resume(path)
 
@@ -419,7 +420,7 @@ def test_finer_meshes_keep_the_bodies():
     state = scene.solve_static(adapt=1e-3)
     assert state.beams[0].mesh.nelements > 3
     fine = MeshBeam.init_line(np.linspace(0, 1, 49), 0.05)
-    fine = scene.with_beams([scene.beams[0].replace(mesh=fine)]).solve_static()
+    fine = scene.replace(beams=[scene.beams[0].replace(mesh=fine)]).solve_static()
     assert_allclose(state.angle("crank"), fine.angle("crank"), rtol=3e-3)
     assert state.error_estimate["displacement"] <= 1e-3
 
@@ -432,7 +433,7 @@ def test_what_names_a_body_itself_is_found_again():
     scene.control(lambda t, bob: -0.5 * bob.angle, at=body, kind="moment", sections={"bob": body})
     scene.spring(2.0, (("ground", (1.1, 1.0)), body)).torsional_spring(0.1, body)
     state = scene.solve_static(adapt=1e-3)
-    fine = scene.with_beams([beam_of(24, E=1e6)]).solve_static()
+    fine = scene.replace(beams=[beam_of(24, E=1e6)]).solve_static()
     assert_allclose(state.angle("bob"), fine.angle("bob"), rtol=2e-3)
     assert_allclose(state.angle(body), scene.solve_static().angle(body), rtol=1e-2)
 
@@ -870,7 +871,7 @@ def test_a_scene_of_bodies_is_kept_and_written(tmp_path):
 @pytest.mark.parametrize("wrong, words", [
     (lambda scene, body: scene.replace(loads=[]).solve_static(), "scene.pin"),
     (lambda scene, body: scene.obstacle(Line((0, -3), (0, 1))), "surfaces of beams"),
-    (lambda scene, body: scene.pressure(1.0, "top"), "beams"),
+    (lambda scene, body: scene.pressure("top", 1.0), "beams"),
     (lambda scene, body: scene.integrate(0.02, 0.01).state(-1).resultants(), "bodies alone"),
 ])
 def test_what_bodies_alone_have_not(wrong, words):

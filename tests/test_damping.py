@@ -328,7 +328,7 @@ def test_copies_files_and_other_meshes(tmp_path):
     other = hinged("sections", 1e-3).damping(mass=0.6, modal=[0.1])
     with pytest.raises(CheckpointError, match="damping"):
         other.resume(path)
-    finer = scene.with_beams([b.replace(mesh=b.mesh.refined()) for b in scene.beams])
+    finer = scene.replace(beams=[b.replace(mesh=b.mesh.refined()) for b in scene.beams])
     assert finer.beams[0].damping.time == 1e-3
     assert finer.integrate(0.06, 1e-3).dissipated[-1] == pytest.approx(history.dissipated[-1],
                                                                       rel=0.2)

@@ -645,7 +645,7 @@ def test_only_asked_instants_are_stored():
     every = scene.integrate(1.0, 0.01)
     t = np.array([0.0, 0.123, 0.5, 0.501, 1.0])
     some = scene.integrate(1.0, 0.01, t_eval=t)
-    assert np.array_equal(some.t, t) and some.u.shape == (5, scene.N)
+    assert np.array_equal(some.t, t) and some.u.shape == (5, scene.layout.N)
     for k, n in ((0, 0), (2, 50), (4, 100)):
         assert np.allclose(some.u[k], every.u[n], rtol=0, atol=1e-14)
         assert np.allclose(some.v[k], every.v[n], rtol=0, atol=1e-13)

@@ -524,7 +524,7 @@ def test_copies_files_other_meshes_and_adaptive_solutions(tmp_path):
     assert np.array_equal(scene.resume(path).u, history.u)
     with pytest.raises(CheckpointError, match="force element 0"):
         SCENES["to the ground"](weighing("sections")).damping(mass=0.1, modal=[0.01]).resume(path)
-    finer = scene.with_beams([b.replace(mesh=b.mesh.refined()) for b in scene.beams])
+    finer = scene.replace(beams=[b.replace(mesh=b.mesh.refined()) for b in scene.beams])
     assert len(finer.elements) == len(scene.elements) == 6
     assert_allclose(finer.integrate(0.03, 1e-3).displacement((1, 0))[-1],
                     history.displacement((1, 0))[-1], atol=3e-4)
@@ -615,7 +615,7 @@ def test_springs_between_beams_named_by_themselves_go_to_other_meshes():
     left, right = beam_of(), beam_of(x0=1.5)
     scene = Scene(left, right).clamp("left", beam=0).clamp("right", beam=1)
     scene.spring(5.0, ((left, (1, 0)), (right, (1.5, 0))), length=0.3)
-    finer = scene.with_beams([b.replace(mesh=b.mesh.refined()) for b in scene.beams])
+    finer = scene.replace(beams=[b.replace(mesh=b.mesh.refined()) for b in scene.beams])
     assert_allclose(finer.solve_static().displacement((1, 0)),
                     scene.solve_static().displacement((1, 0)), atol=1e-6)
 

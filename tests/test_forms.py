@@ -403,7 +403,7 @@ def test_pressure_on_a_closed_surface(body, element):
     """Its force is minus p times the derivative of the deformed area; it has no resultant."""
     beam, p = make(body, element), 0.7
     facets = np.concatenate([beam.mesh.boundaries[name] for name in ENDS])
-    load = Pressure(beam, facets, p)
+    load = Pressure(facets, p).bind(beam)
     u = deformed(beam, 0.1)
     f = load.force(u)
 
@@ -427,7 +427,7 @@ def test_pressure_on_a_closed_surface(body, element):
 def test_pressure_on_one_surface(body, boundary):
     """The resultant is p b times the deformed chord, turned; the derivative is exact."""
     beam, p = make(body, "3"), 0.7
-    load = Pressure(beam, boundary, p)
+    load = Pressure(boundary, p).bind(beam)
     u = deformed(beam, 0.1)
     # the surface from its start to its end with the body on its left
     corners = {"bottom": (0, 0, 1, 0), "right": (1, 0, 1, 1), "top": (1, 1, 0, 1),
@@ -452,7 +452,7 @@ def test_pressure_on_one_surface(body, boundary):
 def test_positive_pressure_pushes():
     for name, sign in (("top", (0, -1)), ("bottom", (0, 1)), ("left", (1, 0)), ("right", (-1, 0))):
         beam = make("straight")
-        f = beam.rigid_motions()[:, :2].T @ Pressure(beam, name, 2.0).force(np.zeros(beam.N))
+        f = beam.rigid_motions()[:, :2].T @ Pressure(name, 2.0).bind(beam).force(np.zeros(beam.N))
         size = 2.0 * WIDTH * (1.5 if sign[0] == 0 else 0.2)
         assert_allclose(f, size * np.array(sign), atol=1e-14)
 
@@ -462,7 +462,7 @@ def test_positive_pressure_pushes():
 @pytest.mark.parametrize("body", BODIES)
 def test_end_moment(body, element, end):
     beam, M = make(body, element), 1.3
-    load = EndMoment(beam, node_of(beam.mesh, end), M)
+    load = EndMoment(end, M).bind(beam)
     u = moved(beam, deformed(beam), 2.4, np.array([1.0, -2.0]))
     f, h = load.force(u), 1e-6
     gradient = np.array([(load.potential(u + h * e) - load.potential(u - h * e)) / (2 * h)
@@ -493,7 +493,8 @@ def test_end_moment_is_that_of_a_linear_traction(body, element):
         return -12 * 1.3 * Y / (WIDTH * h**3) * e1[:, None, None]
 
     f = asm(forms.traction(traction, WIDTH), beam.facet_basis("right"))
-    assert_allclose(EndMoment(beam, node, 1.3).force(np.zeros(beam.N)), f, atol=1e-12)
+    moment = EndMoment(np.array([node]), 1.3).bind(beam)
+    assert_allclose(moment.force(np.zeros(beam.N)), f, atol=1e-12)
 
 
 def test_end_moment_counts_whole_turns():
@@ -507,14 +508,14 @@ def test_end_moment_counts_whole_turns():
         c, s = np.cos(angle), np.sin(angle)
         q[:, 1] = np.array([c, s]).T
         q[:, 2:] = np.array([-s, c]).T[:, None]
-        load = EndMoment(beam, node_of(beam.mesh, "right"), 2.0)
+        load = EndMoment("right", 2.0).bind(beam)
         assert abs(load.potential(q.ravel() - beam.q0) + 4 * np.pi * turns) < 1e-12
 
 
 def test_loads_without_potential_say_so():
     beam = make("straight")
     u = deformed(beam)
-    assert Pressure(beam, "top", 1.0).potential(u) is None
+    assert Pressure("top", 1.0).bind(beam).potential(u) is None
     assert DeadLoad(beam, np.ones(beam.N)).potential(u) == -u.sum()
     with pytest.raises(ValueError, match="NaN"):
         DeadLoad(beam, np.full(beam.N, np.nan))

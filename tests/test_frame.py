@@ -365,7 +365,7 @@ def test_modes_and_buckling_of_many_lines_are_those_with_multipliers(monkeypatch
     for few in (tangent.FEW, 10**6):
         monkeypatch.setattr(tangent, "FEW", few)
         found.append([*frame.modes(3, state).frequencies, *frame.buckling(2).factors])
-    assert frame.N > 600
+    assert frame.layout.N > 600
     assert_allclose(found[0], found[1], rtol=1e-8)
 
 
@@ -385,9 +385,9 @@ def test_modes_of_a_frame_factorise_twice(monkeypatch):
     monkeypatch.setattr(Condensed, "factorize", factorized)
     monkeypatch.setattr(Condensed, "solve", solved)
     modes, mass = frame.modes(10), frame.system.mass.tocsc()
-    assert frame.N > 600 and len(factors) == 2
+    assert frame.layout.N > 600 and len(factors) == 2
     assert solutions.count(10) == 2 and 20 < solutions.count(1) == len(solutions) - 2 < 60
-    assert mass.nnz == np.count_nonzero(mass.toarray()) < 0.3 * 23 * frame.N
+    assert mass.nnz == np.count_nonzero(mass.toarray()) < 0.3 * 23 * frame.layout.N
     assert_allclose(modes.shapes @ (mass @ modes.shapes.T), np.eye(10), atol=1e-10)
 
 
@@ -647,9 +647,9 @@ def test_a_frame_on_other_beams():
     twice = loaded(2, sections={"girder": {"material": STEEL.replace(E=4e11)}})
     assert np.array_equal(stiffer.solve_static().u, twice.solve_static().u)
     with pytest.raises(InputError, match="a chain for each line"):
-        frame.with_beams(frame.beams[::-1])
+        frame.replace(beams=frame.beams[::-1])
     with pytest.raises(InputError, match="list of 2 Beam"):
-        frame.with_beams([frame.beams[0]])
+        frame.replace(beams=[frame.beams[0]])
 
 
 # tapers

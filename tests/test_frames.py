@@ -82,7 +82,7 @@ def test_a_joint_gives_its_entries_or_its_dense_rows():
         jacobian = Joint.jacobian
 
     scene = Scene(bar((0, 0), (1, 0)))
-    u = np.zeros(scene.N)
+    u = np.zeros(scene.layout.N)
     full, part = scene.joint(Dense()), scene.joint(Entries())
     _, columns, values = full.entries(u, 0.0)
     assert set(columns) == set(full.r.dofs[1]) and np.all(values == full.rows[0, columns])
@@ -104,7 +104,7 @@ def test_dense_rows_of_a_subclass_replace_the_entries_above():
 
     scene = Scene(bar((0, 0), (1, 0)))
     joints = [scene.joint(kind((1, 0), (0, 1))) for kind in (OnCircle, Tilted)]
-    one, two = (joint.entries(np.zeros(scene.N), 0.0) for joint in joints)
+    one, two = (joint.entries(np.zeros(scene.layout.N), 0.0) for joint in joints)
     assert_allclose(two[2], 2.0 * one[2])
 
 
@@ -169,7 +169,7 @@ def test_a_welded_chain_bends_like_one_beam():
     scene, P = chain(48), 1.0
     scene.clamp("left", beam=0).point_force((0, -P), (1, 0), beam=47)
     assert not scene.system.constraints.bordered
-    assert sparse.issparse(scene.system.constraints.jacobian(np.zeros(scene.N), 0.0))
+    assert sparse.issparse(scene.system.constraints.jacobian(np.zeros(scene.layout.N), 0.0))
     state = scene.solve_static()
     assert state.displacement((1, 0), beam=47)[1] == pytest.approx(-P / (3 * EI), rel=2e-4)
     assert str(state.verdict) == "stable"

@@ -88,9 +88,9 @@ def test_the_tangent_is_the_derivative_and_the_force_that_of_the_potential(law, 
                                                     xy=0.02)
     load, = scene.system.loads
     rng = np.random.default_rng(0)
-    u, d = 1e-3 * rng.standard_normal((2, scene.N))
+    u, d = 1e-3 * rng.standard_normal((2, scene.layout.N))
     i, j, v = load.stiffness(u)
-    K = np.zeros((scene.N, scene.N))
+    K = np.zeros((scene.layout.N, scene.layout.N))
     np.add.at(K, (i, j), v)
     h = 1e-3
     slope = (load.force(u + h * d) - load.force(u - h * d)) / (2 * h)

@@ -73,14 +73,14 @@ def test_joints_are_tables_where_they_say_so(joint):
 
 def test_value_is_zero_at_the_start(joint):
     joint, scene = joint
-    assert np.abs(joint.value(np.zeros(scene.N), 0.0)).max() < 1e-14
-    assert joint.value(np.zeros(scene.N), 0.0).shape == (len(joint.equations),)
+    assert np.abs(joint.value(np.zeros(scene.layout.N), 0.0)).max() < 1e-14
+    assert joint.value(np.zeros(scene.layout.N), 0.0).shape == (len(joint.equations),)
 
 
 def test_jacobian_is_the_derivative(joint):
     joint, scene = joint
     rng = np.random.default_rng(0)
-    u, v, t = 0.3 * rng.standard_normal(scene.N), rng.standard_normal(scene.N), 0.7
+    u, v, t = 0.3 * rng.standard_normal(scene.layout.N), rng.standard_normal(scene.layout.N), 0.7
     h, tol = 1.0, 1e-12  # Phi is quadratic at most: central differences are exact
     if type(joint) in CURVED:
         u, h, tol = 0.03 * u, STEP, 1e-5
@@ -92,14 +92,14 @@ def test_jacobian_is_the_derivative(joint):
 def test_curvature_is_the_derivative_of_the_jacobian(joint):
     joint, scene = joint
     rng = np.random.default_rng(1)
-    u, v, t = 0.3 * rng.standard_normal(scene.N), rng.standard_normal(scene.N), 0.7
+    u, v, t = 0.3 * rng.standard_normal(scene.layout.N), rng.standard_normal(scene.layout.N), 0.7
     multipliers = rng.standard_normal(len(joint.equations))
     h, tol = 1.0, 1e-12
     if type(joint) in CURVED:
         u, h, tol = 0.03 * u, STEP, 1e-4
     along = 0.5 / h * multipliers @ (joint.jacobian(u + h * v, t) - joint.jacobian(u - h * v, t))
     second = joint.curvature(u, t, multipliers)
-    C = np.zeros((scene.N, scene.N))
+    C = np.zeros((scene.layout.N, scene.layout.N))
     if second is not None:
         np.add.at(C, (second[0], second[1]), second[2])
     assert np.allclose(C, C.T, rtol=0, atol=1e-14)

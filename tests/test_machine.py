@@ -106,7 +106,7 @@ def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
     assert said[0].startswith("skfem_ancf: compiling once, about 12 s, kept in ")
     assert said[-1].endswith("100%") and len(said) == 5  # one for each part, and the steps
     assert s.plan("dynamic")["compiled loop"].reason.endswith("compiled code is loaded")
-    s.system.internal_force(np.full(s.N, 1e-3))  # as energies of the motion ask for them
+    s.system.internal_force(np.full(s.layout.N, 1e-3))  # as energies of the motion ask for them
     assert loads == ["steps", "evaluate"]
 
 

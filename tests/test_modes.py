@@ -162,7 +162,7 @@ def test_shapes_and_modes():
     modes = scene.modes(4)
     M = scene.system.mass.tocsc()
     assert np.allclose(modes.shapes @ (M @ modes.shapes.T), np.eye(4), atol=1e-9)
-    scene.system.assemble(np.zeros(scene.N))
+    scene.system.assemble(np.zeros(scene.layout.N))
     K = scene.system.K.tocsc()
     stiffness = modes.shapes @ (K @ modes.shapes.T)
     assert np.allclose(stiffness, np.diag(modes.frequencies**2), atol=1e-9 * stiffness.max())

@@ -104,7 +104,7 @@ def test_a_scene_built_again_goes_on_too():
     rest = other.integrate(0.2, 2.5e-3, start=half.state(-1))
     assert np.array_equal(rest.u[0], half.u[-1])
     assert np.abs(rest.acceleration[0] - half.acceleration[-1]).max() > 1.0
-    free = ~np.isin(np.arange(other.N), other.system.constraints.fixed)
+    free = ~np.isin(np.arange(other.layout.N), other.system.constraints.fixed)
     assert_allclose(rest.v[0][free], half.v[-1][free], rtol=0, atol=1e-6)
 
 

@@ -101,7 +101,7 @@ def test_they_pickle_and_are_in_the_plan():
     assert "2 read" in scene.plan("dynamic")["sensors"].reason
     still = scene.plan()["sensors"]
     assert still.status == "skipped" and "motions" in still.reason
-    assert "tip" in repr(a.sensors) and "position" in repr(scene.sensors["tip"])
+    assert "tip" in repr(a.sensors) and "position" in repr(scene._sensors["tip"])
 
 
 @pytest.mark.parametrize("make, error, message", [

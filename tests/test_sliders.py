@@ -40,12 +40,12 @@ def test_derivatives_on_elements_of_unequal_length(element, angle):
     scene = Scene(a, b, RigidBody(1.0, 0.1, (1.5, 0.4)))
     for at in (("b", (0.8, 0.2)), (2, (1.2, 0.3)), ("ground", (1.2, 0.3))):
         joint = scene.slider(at, "a", angle=angle)
-        u, v = 0.01 * rng.standard_normal(scene.N), rng.standard_normal(scene.N)
+        u, v = 0.01 * rng.standard_normal(scene.layout.N), rng.standard_normal(scene.layout.N)
         m, h = rng.standard_normal(1 + angle), 1e-6
         slope = (joint.value(u + h * v, 0) - joint.value(u - h * v, 0)) / (2 * h)
         assert_allclose(joint.jacobian(u, 0) @ v, slope, atol=1e-8)
         i, j, values = joint.curvature(u, 0, m)
-        C = np.zeros((scene.N, scene.N))
+        C = np.zeros((scene.layout.N, scene.layout.N))
         np.add.at(C, (i, j), values)
         second = m @ (joint.jacobian(u + h * v, 0) - joint.jacobian(u - h * v, 0)) / (2 * h)
         assert_allclose(C @ v, second, rtol=0, atol=1e-7 * np.abs(second).max())
@@ -157,7 +157,7 @@ def test_discrete_gradients(element):
     beam = line((0, 0), (2, 0.5), 4, element, "a", grading=1.3)
     scene = Scene(beam, RigidBody(1.0, 0.1, (1.5, 0.4)))
     joint = scene.slider((1, (1.2, 0.3)), "a", angle=True)
-    N, m, seen = scene.N, np.array([0.7, -0.3]), set()
+    N, m, seen = scene.layout.N, np.array([0.7, -0.3]), set()
     for size in (1e-7, 1e-3, 0.3):
         for _ in range(4):
             ends = [0.02 * rng.standard_normal(N)]

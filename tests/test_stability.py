@@ -170,10 +170,10 @@ def state_of(scene, u, load=1.0):
 @pytest.mark.parametrize("kind", SUPPORTS)
 def test_verdict_of_a_state(kind):
     scene = scene_of(kind, 4, 0.02, ELEMENTS[0])
-    zero = state_of(scene, np.zeros(scene.N))
+    zero = state_of(scene, np.zeros(scene.layout.N))
     assert (zero.stability, zero.negative_pivots) == ("stable", 0)
     assert "stable" in str(zero) and "det F from 1, stretch from 1 to 1" in str(zero)
-    u = 0.01 * np.random.default_rng(1).standard_normal(scene.N)
+    u = 0.01 * np.random.default_rng(1).standard_normal(scene.layout.N)
     negative = int(np.sum(dense_eigenvalues(scene.system, u) < 0))
     state = state_of(scene, u)
     assert (state.stability, state.negative_pivots) == ("unstable", negative)

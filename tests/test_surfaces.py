@@ -42,7 +42,7 @@ def test_forces_on_surfaces_are_those_of_the_forms(body, element):
             continue
         if not beam.has_sections and place in ("left", "right"):
             continue
-        load = Pressure(beam, place, 2.0)
+        load = Pressure(place, 2.0).bind(beam)
         expected = 2.0 * (asm(forms.pressure(0.3), basis) @ q)
         assert np.allclose(load.force(q - beam.q0), expected, rtol=1e-11,
                            atol=1e-12 * np.max(np.abs(expected)))
@@ -74,7 +74,7 @@ def test_sections_of_layers_have_the_areas_of_all():
 
 def test_a_closed_surface_under_pressure_has_no_resultant():
     beam = Beam(BODIES["arc"](), ElementBeamANCF(2), LAW, 0.2)
-    load = Pressure(beam, ("left", "right", "bottom", "top"), 5.0)
+    load = Pressure(("left", "right", "bottom", "top"), 5.0).bind(beam)
     q = beam.q0 + 1e-2 * np.random.default_rng(1).standard_normal(beam.N)
     nodal = load.force(q - beam.q0).reshape(-1, beam.nd // 2, 2)
     assert np.allclose(nodal[:, 0].sum(axis=0), 0.0, atol=1e-12 * np.max(np.abs(nodal)))

@@ -135,7 +135,8 @@ def example_5_3(settings, watch):
         for n in settings.elements_thick:
             scene = case.scene(model, n, shear_correction=1.0, load=False)
             state = scene.clamp("left").traction("right", traction).solve_static()
-            sheet.rows.append((LIKE_2D, n, scene.N, float(state.displacement(case.tip)[1]), None))
+            tip = float(state.displacement(case.tip)[1])
+            sheet.rows.append((LIKE_2D, n, scene.layout.N, tip, None))
     for meshes in watch([settings.meshes_2d], "5.3 in 2D"):
         body = cantilever_tip(case, meshes)
     sheet.rows += [(BODY_2D, n, dofs, u_y, None) for n, dofs, _, u_y in body]

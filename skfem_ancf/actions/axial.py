@@ -9,21 +9,22 @@ import numpy as np
 from ..beam.interpolation import probe
 from ..core.errors import ask_field, require_finite
 from ..beam.kernels.section import beam_gradients
-from .loads import DeadLoad, Load
+from .item import Item
+from .loads import DeadLoad, Load, number_at
 from ..core.quadrature import gauss
 from ..beam.points import Points
-from ..beam.rigid import RigidBody
+from ..beam.rigid import RigidBody, on_body
 from ..beam.distribution import AXIS, Sampled, Spread
 from ..mesh.places import as_point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
     from ..beam.beam import Beam
     from ..core.types import Array, TimeFunction
-    from ..beam.layout import WhichBeam
+    from ..beam.layout import Layout, WhichBeam, WhichMember
 
 
 class FollowerForce(Load):
@@ -37,8 +38,10 @@ class FollowerForce(Load):
         The force in the stress-free state, shape (2,).
     at
         The point: its place (x, y) in the stress-free body, shape (2,).
-    beam, amplitude
-        As for :class:`~skfem_ancf.actions.loads.Load`.
+    beam
+        The beam, its name or its number, where several have the point; or a RigidBody.
+    amplitude
+        A function of time by which the force is multiplied in a motion.
     line
         The number of the chain of elements of the beam whose tangent it is, where several meet.
     """
@@ -55,10 +58,14 @@ class FollowerForce(Load):
     _start: Any
     _turn: Any
 
-    def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+    def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                  amplitude: TimeFunction = None, line: int | None = None) -> None:
+        at, beam = on_body(at, beam)
         super().__init__(beam, amplitude)
         self.total, self.at, self.line = require_finite("force", force, (2,)), at, line
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        return (self._with(beam=number_at(layout, self.at, self.beam)),)
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         bound = cast("FollowerForce", super().bind(cast("Beam", beam)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 from scipy import sparse
@@ -23,6 +23,7 @@ from ..beam.kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from ..beam.kernels.law import LINEAR
 from ..beam.kernels.section import linearised
 from ..core.linear import first_order, step, stress_of
+from .item import Item
 from .loads import Load
 from ..beam.distribution import Spread
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from ..beam.beam import Beam
     from ..sections import Layer
     from ..core.types import Array, TimeFunction
-    from ..beam.layout import WhichBeam
+    from ..beam.layout import Layout, WhichBeam
 
 #: Products of a function of place and one of time that a function of both may be.
 MOST = 8
@@ -52,7 +53,8 @@ class EigenStrain(Load):
     ----------
     xx, yy, xy
         eps_xx, eps_yy and eps_xy (not twice that): numbers, or functions of material coordinates x,
-        the parameter of the axis, and y, the distance from it, arrays of one shape. None for zero.
+        the parameter of the axis, and y, the distance from it, arrays of one shape; or of
+        (x, y, t), which statics take at t = 1. None for zero.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
@@ -68,10 +70,14 @@ class EigenStrain(Load):
     grows = False
     # that in a motion
     _size = 1.0
+    #: What is given, and what messages call it.
+    given: ClassVar = {"xx": "eps_xx", "yy": "eps_yy", "xy": "eps_xy"}
 
     def __init__(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
+        if xx is None and yy is None and xy is None:
+            raise InputError("a stress-free strain has a component: give xx, yy or xy")
         self.xx, self.yy, self.xy = (_number_or_function(f"eps_{name}", f) for name, f in (
             ("xx", xx), ("yy", yy), ("xy", xy)))
 
@@ -93,6 +99,20 @@ class EigenStrain(Load):
         factors = 1.0, 1.0, 2.0
         return np.array([c * _asked(f"eps_{name}", f, x, y) for c, name, f in zip(
             factors, COMPONENTS, (self.xx, self.yy, self.xy))])
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        """Products of functions of place and of time, and what does not depend on time."""
+        k, beam = layout.number(self.beam), layout.beam(self.beam)
+        given = {name: getattr(self, name) for name in self.given}
+        timed = {name: f for name, f in given.items() if takes_time(f)}
+        out: list[Item] = []
+        for name, f in timed.items():
+            for g, c in products(self.given[name], f, beam):
+                only = {**dict.fromkeys(given), name: g}
+                out.append(self._with(beam=k, amplitude=c.times(self.amplitude), **only))
+        if not timed or any(f is not None for name, f in given.items() if name not in timed):
+            out.append(self._with(beam=k, **dict.fromkeys(timed)))
+        return out
 
     # the load
 
@@ -123,7 +143,7 @@ class EigenStrain(Load):
     def acting(self, t: float | None) -> tuple[float, Load]:
         if not self.grows:
             return super().acting(t)
-        one = self._unsealed()
+        one = self._thawed()
         one._size = self.factor(t)
         return 1.0, one
 
@@ -268,15 +288,18 @@ class Temperature(EigenStrain):
     Parameters
     ----------
     change
-        Change of the temperature from that of the stress-free state: a number, or a function of
-        material coordinates (x, y).
+        In degrees from the stress-free state: a number, or a function of material coordinates x,
+        the parameter of the axis, and y, the distance from it, arrays of one shape; or of
+        (x, y, t), which statics take at t = 1.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
 
+    given: ClassVar = {"change": "the temperature"}
+
     def __init__(self, change: Any, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
-        super().__init__(None, None, None, beam, amplitude)
+        Load.__init__(self, beam, amplitude)
         self.change = _number_or_function("the temperature", change, False)
 
     def bind(self, beam: Beam) -> Load:
@@ -311,17 +334,17 @@ def _asked(name, f, x, y):
     return ask_array(f"{name}(x, y)", np.shape(x), f, x, y, number=True)
 
 
-def require_alone(loads: Sequence[tuple[int, Any]]) -> None:
+def require_alone(loads: Sequence[Any]) -> None:
     """Raise InputError where two stress-free strains of one beam do not add up.
 
     Parameters
     ----------
     loads
-        Numbers of beams, and loads on them.
+        Loads, bound.
     """
-    eigen = [(k, load) for k, load in loads if isinstance(load, EigenStrain)]
-    for k, load in eigen:
-        if load.alone and sum(other == k for other, _ in eigen) > 1:
+    beams = [load.beam for load in loads if isinstance(load, EigenStrain)]
+    for load in loads:
+        if getattr(load, "alone", False) and sum(beam is load.beam for beam in beams) > 1:
             raise InputError(
                 f"{load.beam!r} has a stress that is not linear in the strain, so its stress-free "
                 "strains do not add up: give their sum as one eigenstrain, a function of (x, y) "

@@ -25,16 +25,18 @@ from ..mesh.places import node_of
 from ..beam.interpolation import locate, probe
 from ..beam.beam import Beam
 from ..core.errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field,
-                           ask_number, require_finite, require_function, require_slope, shown,
-                           warnings_as_errors, warn)
-from ..core.frozen import Sealable, read_only
+                           ask_number, require_finite, require_finite_scalar, require_function,
+                           require_slope, shown, warnings_as_errors, warn)
+from ..core.immutable import read_only
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
-from ..core.kept import cached_property
+from functools import cached_property
 from ..core.origin import ours
 from ..mesh.places import facets_of
-from ..beam.rigid import RigidBody
+from ..beam.rigid import RigidBody, on_body
 from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
 from ..beam.surfaces import add_nodal, surfaces_of
+from .item import Item, beside, require_entries
+from .places import members_at, nearest_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..core.types import Array, Place, TimeFunction
-    from ..beam.layout import WhichBeam
+    from ..beam.layout import Layout, WhichBeam, WhichMember
 
 
 #: A traction on a cable is warned of where the moment by its lever across is more than this part
@@ -60,7 +62,7 @@ class Amplitude:
         return self.function(t) if np.ndim(t) else ask_number("amplitude(t={:g})", self.function, t)
 
 
-class Load(Sealable):
+class Load(Item):
     """Base class: a force on the coordinates of one beam as a function of their displacement.
 
     A load of your own is a subclass, given to a scene by :meth:`skfem_ancf.Scene.add`. It defines
@@ -124,7 +126,6 @@ class Load(Sealable):
     """
 
     constant = True
-    symmetric = True
     beam: Any
     linear = False
     turning = False
@@ -137,27 +138,24 @@ class Load(Sealable):
     pushes: Sequence[Array] = ()
     for_bodies = False
 
-    def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
+    def __init__(self, beam: WhichMember = None, amplitude: TimeFunction = None) -> None:
         self.beam, self.amplitude = beam, amplitude
 
-    def bind(self, beam: Beam) -> Load:
-        """The load on a beam; the scene seals it, so that its attributes do not change then.
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        return (self._with(beam=layout.number(self.beam)),)
 
-        By default a copy with :attr:`beam` set. Override it where something is computed from the
-        beam; leave ``self`` as it is, which is bound to other beams later.
+    def bind(self, beam: Any) -> Any:
+        """The load on a beam: by default a copy with :attr:`beam` set.
+
+        Override it where something is computed from the beam, and leave ``self`` as it is, which is
+        bound to other beams later.
 
         Parameters
         ----------
         beam
-            A :class:`~skfem_ancf.Beam`.
-
-        Returns
-        -------
-        Load
+            A :class:`~skfem_ancf.Beam`, or a :class:`~skfem_ancf.RigidBody` if :attr:`for_bodies`.
         """
-        bound = self._unsealed()
-        bound.beam = beam
-        return bound
+        return self._with(beam=beam)
 
     @property
     def amplitude(self) -> Amplitude | None:
@@ -248,18 +246,17 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
                          "takes scene.gravity, point_force, follower_force, moment, springs and "
                          "joints")
     bound = load.bind(cast("Beam", beam))
-    if type(bound) in (DeadLoad, Pressure, EndMoment):
-        bound._seal()
-        return bound
     if not isinstance(bound, Load) or bound.beam is not beam:
         raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {shown(bound)}")
+    if ours(bound):
+        bound._freeze()
+        return bound
     zero = np.zeros(beam.N)
     try:
         require_finite("its force", bound.force(zero), (beam.N,))
-        bound._seal()
+        bound._freeze()
         if bound.constant:
-            if not ours(bound):
-                _require_constant(bound)
+            _require_constant(bound)
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
@@ -275,28 +272,8 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
     if np.any(far > 1):
         raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
                          "only neighbours of the chain may be coupled, as they are in its elements")
-    if not ours(bound):
-        beside(partial(_require_derivatives, bound), bound.beam.sizes)
+    beside(partial(_require_derivatives, bound), bound.beam.sizes)
     return bound
-
-
-def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
-    """Call a check of derivatives at displacements at which nothing is zero by chance.
-
-    At one of two it may fail: there may be a kink.
-
-    Parameters
-    ----------
-    check
-        A function of a displacement and of a step that is small to it; raises InputError.
-    sizes
-        What coordinates change by where things move by their size, shape (N,).
-    """
-    angles = np.arange(len(sizes))
-    try:
-        check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
-    except InputError:
-        check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))
 
 
 def _require_constant(load):
@@ -331,37 +308,17 @@ def _require_derivatives(load, u, d):
                       1e-13 * abs(potentials[0]))
 
 
-def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
-    """Raise InputError unless rows, columns and values are entries of an n x n matrix.
-
-    Parameters
-    ----------
-    what
-        What messages call the matrix.
-    i, j, v
-        Rows, columns and values, shapes (k,).
-    n
-        Number of rows and columns of the matrix.
-    """
-    i, j = np.asarray(i), np.asarray(j)
-    v = require_finite(what, v, (None,))
-    if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
-        raise InputError(f"{what} must be rows, columns and values of one length, got shapes "
-                         f"{i.shape}, {j.shape}, {v.shape}")
-    if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
-        raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
-                         f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
-
-
 class Weight(Load):
-    """The weight of a beam under an acceleration g (2,).
+    """The weight of beams and rigid bodies.
 
     Parameters
     ----------
     g
-        Acceleration, shape (2,).
-    beam, amplitude
-        As for :class:`Load`.
+        Acceleration, shape (2,), as ``(0, -9.81)``.
+    beam
+        The beam or the rigid body, its name or its number; None for all.
+    amplitude
+        A function of time by which the force is multiplied in a motion.
     """
 
     for_bodies = True
@@ -371,30 +328,41 @@ class Weight(Load):
         super().__init__(beam, amplitude)
         self.g = require_finite("g", g, (2,))
 
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        which = range(len(layout.members)) if self.beam is None else [layout.number(self.beam)]
+        return [self._with(beam=k) for k in which]
+
     def bind(self, beam: Beam | RigidBody) -> Load:
         spread = None if isinstance(beam, RigidBody) else Spread(gravity=self.g)
-        return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)._with(g=self.g)
 
 
 class PointForce(Load):
-    """A dead force (2,) on the material point ``at``.
+    """A dead force on a material point.
 
     Parameters
     ----------
     force
         The force, shape (2,).
     at
-        The material point: its place (x, y) in the stress-free body.
-    beam, amplitude
-        As for :class:`Load`.
+        The point: its place (x, y) in the stress-free body, shape (2,), or "right" for the axis at
+        that end; of a rigid body also None, for its centre of mass.
+    beam
+        The beam, its name or its number, where several have the point; or a RigidBody.
+    amplitude
+        A function of time by which the force is multiplied in a motion.
     """
 
     for_bodies = True
 
-    def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+    def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                  amplitude: TimeFunction = None) -> None:
+        at, beam = on_body(at, beam)
         super().__init__(beam, amplitude)
         self.total, self.at = require_finite("force", force, (2,)), at
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        return (self._with(beam=number_at(layout, self.at, self.beam)),)
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         vector = np.zeros(beam.N)
@@ -406,6 +374,25 @@ class PointForce(Load):
         dofs, weights = probe(beam, self.at, (e, X))
         vector[dofs] = self.total[:, None] * weights  # those of an element, each once
         return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
+
+
+def number_at(layout: Layout, at: Any, beam: Any) -> int:
+    """The number of a beam or body; if none is named, of the one that has a point.
+
+    Parameters
+    ----------
+    layout
+        Of the scene.
+    at
+        The point, or None.
+    beam
+        The beam or body, its name or its number, or None.
+    """
+    if beam is None and at is not None and len(layout.members) > 1:
+        found = nearest_of(layout, at, members_at(layout, at))
+        if len(found) == 1:
+            return found[0]
+    return layout.number(beam)
 
 
 class Traction(Load):
@@ -579,12 +566,16 @@ class DeadLoad(Load):
     """
 
     for_bodies = True
+    #: Of a weight the acceleration, which acts on point masses too.
+    g: Any = None
 
     def __init__(self, beam: Beam | RigidBody, vector: ArrayLike, amplitude: TimeFunction = None,
                  spread: Spread | None = None) -> None:
-        super().__init__(_the_beam(beam, self.for_bodies), amplitude)
+        if not isinstance(beam, (Beam, RigidBody)):
+            raise InputError(f"this load acts on a Beam, got {shown(beam)}")
+        super().__init__(beam, amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))
-        self._spread = spread
+        self._of, self._spread = beam, spread
 
     def spread(self, u: Array) -> Spread | None:
         if self._spread is None:
@@ -592,10 +583,10 @@ class DeadLoad(Load):
         return self._spread
 
     def bind(self, beam: Beam) -> Load:
-        if beam is not self.beam:
+        if beam is not self._of:
             raise InputError("a DeadLoad is a vector of the coordinates of one mesh and cannot be "
                              "put on another: use scene.load(form) or a Load with bind(beam)")
-        return self
+        return self._with(beam=beam)
 
     def force(self, u: Array) -> Array:
         return self.vector
@@ -605,45 +596,48 @@ class DeadLoad(Load):
 
 
 class Pressure(Load):
-    """A pressure that stays normal to the deformed surface: linear in the position in the plane.
+    """A pressure on a surface that stays normal to it as it deforms.
 
-    The surface of a cable is its axis, wherever across the section the place is.
+    It is linear in the position. On the bottom and the top of a cable it acts on its axis, as long
+    as that is: on a curve of radius R its resultant is off by h / (2 R) of it.
 
     Parameters
     ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
     boundary
         A place, see :func:`skfem_ancf.mesh.places.facets_of`.
     p
-        Force per deformed area; positive pushes.
-    amplitude
+        Force per area of the deformed surface; positive pushes.
+    beam, amplitude
         As for :class:`Load`.
     """
 
     constant = False
     symmetric = False
     linear = True
+    # of a bound one
+    matrix: Any
+    _rows: Any
+    _spread: Any
 
-    def __init__(self, beam: Beam, boundary: Place, p: float,
+    def __init__(self, boundary: Place, p: float, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
-        super().__init__(_the_beam(beam), amplitude)
-        self.boundary, self.p = boundary, p
-        facets = np.asarray(facets_of(beam.mesh, boundary))
+        super().__init__(beam, amplitude)
+        self.boundary, self.p = boundary, require_finite_scalar("p", p)
+
+    def bind(self, beam: Beam) -> Load:
+        facets = np.asarray(facets_of(beam.mesh, self.boundary))
         if not beam.has_sections and np.any(facets < beam.mesh.p.shape[1]):
             raise InputError(
-                f"a pressure at {boundary!r} of a cable would do nothing: its points across the "
-                "section are no coordinates. Use an element with sections, as ElementBeamANCF(2), "
-                "or for a force of constant direction scene.traction or scene.point_force")
-        self._rows = _follower(beam, facets, p)
-        self.matrix = self._rows.tocoo()
-        self._spread = on_facets(beam.mesh, facets, pressure=p)
+                f"a pressure at {self.boundary!r} of a cable would do nothing: its points across "
+                "the section are no coordinates. Use an element with sections, as "
+                "ElementBeamANCF(2), or for a force of constant direction scene.traction or "
+                "scene.point_force")
+        rows = _follower(beam, facets, self.p)
+        return self._with(beam=beam, _rows=rows, matrix=rows.tocoo(),
+                          _spread=on_facets(beam.mesh, facets, pressure=self.p))
 
     def spread(self, u: Array) -> Spread | None:
         return self._spread
-
-    def bind(self, beam: Beam) -> Load:
-        return self if beam is self.beam else Pressure(beam, self.boundary, self.p, self.amplitude)
 
     def force(self, u: Array) -> Array:
         return self._rows @ (self.beam.q0_local + u)
@@ -678,15 +672,13 @@ class EndMoment(Load):
 
     Parameters
     ----------
-    beam
-        A :class:`~skfem_ancf.Beam` or a :class:`~skfem_ancf.RigidBody`.
     boundary
-        A place that is one section, see :func:`skfem_ancf.mesh.places.facets_of`; or the number of
-        a node. None, or a point, of a rigid body.
+        A place that is one section, as "right" or the point of a node, see
+        :func:`skfem_ancf.mesh.places.facets_of`; or a RigidBody.
     M
-        The moment, counterclockwise.
-    amplitude
-        As for :class:`Load`.
+        The moment (force times length), counterclockwise.
+    beam, amplitude
+        As for :class:`Load`; the beam may be a RigidBody.
     couple
         Any object that two moments have in common of which one is the opposite of the other: they
         keep the angular momentum. None for a moment from the ground.
@@ -696,23 +688,25 @@ class EndMoment(Load):
     turning = True
     for_bodies = True
 
-    def __init__(self, beam: Beam | RigidBody, boundary: Place | int | None, M: float,
+    # of a bound one: the node, and coordinates and weights of the direction of its section
+    node: int
+    dofs: Any
+    c: Any
+
+    def __init__(self, boundary: Any, M: float, beam: WhichMember = None,
                  amplitude: TimeFunction = None, couple: Any = None) -> None:
-        super().__init__(_the_beam(beam, self.for_bodies), amplitude)
-        self.M, self.boundary, self.couple = M, boundary, couple
-        if isinstance(boundary, (int, np.integer)):
-            self.boundary = np.array([boundary])
+        self.boundary, beam = on_body(boundary, beam)
+        super().__init__(beam, amplitude)
+        self.M, self.couple = require_finite_scalar("M", M), couple
+
+    def bind(self, beam: Beam | RigidBody) -> Load:
         if isinstance(beam, RigidBody):
             beam.dofs(self.boundary)  # raises MeshError unless it is a place
-            self.node, (self.dofs, self.c) = 0, beam.direction()
+            node, (dofs, c) = 0, beam.direction()
         else:
-            self.node = node_of(beam.mesh, cast("Place", self.boundary))
-            self.dofs, self.c = direction(beam, self.node)
-
-    def bind(self, beam: Beam) -> Load:
-        if beam is self.beam:
-            return self
-        return EndMoment(beam, self.boundary, self.M, self.amplitude, self.couple)
+            node = node_of(beam.mesh, self.boundary)
+            dofs, c = direction(beam, node)
+        return self._with(beam=beam, node=node, dofs=dofs, c=c)
 
     def direction(self, u: Array) -> Array:
         """The section's direction d, shape (2,)."""
@@ -764,9 +758,3 @@ class EndMoment(Load):
 
     def potential(self, u: Array) -> float:
         return -self.M * self.angle(u)
-
-
-def _the_beam(beam, bodies=False):
-    if not isinstance(beam, Beam) and not (bodies and isinstance(beam, RigidBody)):
-        raise InputError(f"this load acts on a Beam, got {shown(beam)}")
-    return beam

@@ -1,84 +1,158 @@
-"""Supports: coordinates held at a place."""
+"""Supports: degrees of freedom that are held at a place."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..mesh.places import node_of
-from ..core.errors import InputError, SupportError
-from ..mesh.places import is_point
+from ..core.errors import InputError, SupportError, require_finite_scalar, require_option, shown
+from ..mesh.places import is_point, node_of
+from ..beam.rigid import RigidBody, on_body
+from .item import Item
+from .joints.hinge import Hinge
+from .joints.plane_section import PlaneSection
 
 if TYPE_CHECKING:
-    from ..beam.beam import Beam
+    from collections.abc import Sequence
+
+    from ..beam.layout import Layout, WhichBeam
+    from ..core.types import Place
 
 
-@dataclass(frozen=True)
-class Support:
-    """Coordinates at a place that are given a displacement.
+class Support(Item):
+    """Degrees of freedom of a place that are held at a displacement, by their scikit-fem names.
 
-    Attributes
+    Parameters
     ----------
-    beam : int
-        Number of the beam in its scene.
     boundary
-        A place, see :func:`skfem_ancf.mesh.places.facets_of`.
+        A place: the name of a boundary; a point (x, y) of the stress-free body, which means the
+        section of a node; a function of the points x that returns truth values; or numbers of
+        facets as an array of integers. See :func:`skfem_ancf.mesh.places.facets_of`. A RigidBody
+        is held as a whole.
     names
-        Names of coordinates, or None for all.
-    displacement : float
-        At full load.
-    on_axis : bool
-        What is held is on the axis: a point that names the place must be, too.
-    welded : bool or None
-        Of a welded face, whether the beam has sections: all their coordinates are held, of
-        whatever element it has.
+        As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
+    displacement
+        Their displacement at full load, in the unit of the degree of freedom; it grows with the
+        load.
+    beam
+        The beam, its name or its number, in a scene of several.
+
+    Raises
+    ------
+    NameUnknown
+        If a name is not known; the message lists the known ones.
+    SupportError
+        If a degree of freedom is given two displacements.
     """
 
-    beam: int
-    boundary: Any
-    names: Any = None
-    displacement: float = 0.0
-    on_axis: bool = False
-    welded: bool | None = None
+    # of a bound one: numbers of the degrees of freedom in the scene, and their names
+    dofs: Any
+    _words: Any
 
-    def bind(self, beam: Beam, fixed: dict[tuple[int, int], float]) -> None:
-        """Add what is held of a beam to what is held already.
+    def __init__(self, boundary: Place, names: str | Sequence[str] | None = None,
+                 displacement: float = 0.0, beam: WhichBeam = None) -> None:
+        if callable(displacement):
+            raise InputError("displacement must be a number, got a function: what moves by a "
+                             'function of time is scene.joint("position", at=..., r=...), or '
+                             '"angle"')
+        self.boundary, self.beam = on_body(boundary, beam)
+        several = isinstance(names, (list, set, frozenset, np.ndarray))
+        self.names = tuple(names) if several else names  # type: ignore[arg-type]
+        self.displacement = require_finite_scalar("displacement", displacement)
+
+    def bind(self, layout: Layout) -> Support:
+        beam = layout.beam(self.beam)
+        dofs = beam.dofs(self.boundary, self.names)
+        words = [f"{beam.dofnames[d % beam.nd]} of node {d // beam.nd}" for d in dofs]
+        return self._with(dofs=dofs + layout.offset(beam), _words=words)
+
+    def hold(self, fixed: dict[int, float]) -> None:
+        """Add what it holds, once it is bound.
 
         Parameters
         ----------
-        beam
-            The beam, of this number in its scene.
         fixed
-            From (number of the beam, number of the coordinate) to displacement; it is added to.
+            From number of the degree of freedom to displacement; it is added to.
 
         Raises
         ------
-        InputError
-            If the face of a beam with sections was welded and this one has none, or the reverse.
         SupportError
-            If a coordinate is given two displacements.
+            If a degree of freedom is given two displacements.
         """
-        if self.welded is not None and self.welded != beam.has_sections:
-            raise InputError("clamp holds beams with sections and cables by different equations: "
-                             f"describe the scene of {beam!r} anew")
-        dofs = beam.dofs(self.boundary, beam.element.welded if self.welded else self.names)
-        if self.on_axis and is_point(self.boundary):
-            self._require_on_axis(beam)
-        for d in map(int, dofs):
-            before = fixed.get((self.beam, d))
-            if before is not None and before != self.displacement:
-                raise SupportError(
-                    f"coordinate {beam.dofnames[d % beam.nd]} of node {d // beam.nd} is fixed "
-                    f"twice, with displacements {before!r} and {self.displacement!r}")
-            fixed[self.beam, d] = self.displacement
+        for d, words in zip(self.dofs.tolist(), self._words):
+            if fixed.setdefault(d, self.displacement) != self.displacement:
+                raise SupportError(f"coordinate {words} is fixed twice, with displacements "
+                                   f"{fixed[d]!r} and {self.displacement!r}")
 
-    def _require_on_axis(self, beam: Beam) -> None:
-        x = np.asarray(self.boundary, dtype=float)
-        axis = np.round(beam.mesh.p[:, node_of(beam.mesh, self.boundary)], 12) + 0.0
-        if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
-            raise InputError(
-                f"pin holds the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "
-                f"({x[0]:.9g}, {x[1]:.9g}) of its section: give that point of the axis, or hold "
-                'the other with scene.joint("position", at=..., r=lambda t: point)')
+    def __repr__(self) -> str:
+        names = "all" if self.names is None else self.names
+        return f"<{type(self).__name__} of {names} at {shown(self.boundary)}>"
+
+
+class Pin(Support):
+    """The position of the axis is fixed; the section may turn.
+
+    Parameters
+    ----------
+    boundary
+        A place, as for :class:`Support`; of a rigid body a point, or None for its centre of mass.
+    beam
+        The beam, its name or its number, in a scene of several; or a RigidBody.
+    """
+
+    def __init__(self, boundary: Place, beam: Any = None) -> None:
+        super().__init__(boundary, "r", beam=beam)
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        member = layout.beam(self.beam)
+        if not isinstance(member, RigidBody):
+            return (self,)
+        at = tuple(map(float, member.place(self.boundary)))
+        return (Hinge(("ground", layout.number(member)), at, "of a pin"),)
+
+    def bind(self, layout: Layout) -> Support:
+        beam, bound = layout.beam(self.beam), super().bind(layout)
+        if is_point(self.boundary):
+            x = np.asarray(self.boundary, dtype=float)
+            axis = np.round(beam.mesh.p[:, node_of(beam.mesh, self.boundary)], 12) + 0.0
+            if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
+                raise InputError(
+                    f"pin holds the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "
+                    f"({x[0]:.9g}, {x[1]:.9g}) of its section: give that point of the axis, or "
+                    'hold the other with scene.joint("position", at=..., r=lambda t: point)')
+        return bound
+
+
+class Clamp(Item):
+    """A face is welded, or held as a plane; a rigid body is held as a whole.
+
+    Parameters
+    ----------
+    boundary
+        A place, as for :class:`Support`.
+    beam
+        The beam, its name or its number, in a scene of several; or a RigidBody.
+    thickness
+        "fixed": the position of every material point of the face is fixed, that is ``r`` and the
+        section coordinates at the node; the slope ``r_X``, a strain measure there, stays free.
+        "free": ``r`` is fixed and the section stays in its plane, but may get thinner or thicker
+        there. With nu not zero a welded face causes a boundary layer as long as the beam is high,
+        which long elements exaggerate; the plane does not.
+    """
+
+    def __init__(self, boundary: Place, beam: Any = None, thickness: str = "fixed") -> None:
+        self.boundary, self.beam = on_body(boundary, beam)
+        self.thickness = require_option("thickness", thickness, ("fixed", "free"))
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        k, member = layout.number(self.beam), layout.beam(self.beam)
+        if isinstance(member, RigidBody):
+            return (Support(self.boundary, beam=k),)
+        if member.has_sections and self.thickness == "fixed":
+            return (Support(self.boundary, member.element.welded, beam=k),)
+        return (Support(self.boundary, "r", beam=k),
+                PlaneSection(self.boundary, k, "of a clamp"))
+
+    def __repr__(self) -> str:
+        return f"<Clamp at {shown(self.boundary)}>"

@@ -1,12 +1,16 @@
-"""The degrees of freedom of a scene, as joints and force elements see them when they are bound."""
+"""The degrees of freedom of a scene, as what acts in it sees them when it is bound."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, TypeAlias
+from itertools import accumulate
+from typing import Any, TypeAlias
+
+import numpy as np
 
 from .beam import Beam
 from ..core.errors import InputError, NameUnknown, shown
+from ..core.types import Array
 from .rigid import RigidBody
 
 #: What :func:`select_beam` takes: a Beam, its name or its number; None for the only one.
@@ -16,37 +20,76 @@ WhichBeam: TypeAlias = Beam | str | int | None
 WhichMember: TypeAlias = Beam | RigidBody | str | int | None
 
 
-class Layout(Protocol):
-    """Beams and rigid bodies, and the numbers of their degrees of freedom.
+class Layout:
+    """Beams and rigid bodies, their names, and the numbers of their degrees of freedom.
 
-    ``bind(layout)`` of a joint or a force element finds its points in it. A
-    :class:`~skfem_ancf.Scene` is one.
+    What acts in a scene is bound to it. The degrees of freedom of the beams come first, beam after
+    beam, then those of the rigid bodies.
+
+    Parameters
+    ----------
+    *members
+        Beams and rigid bodies, one at least.
 
     Attributes
     ----------
-    beams, bodies, members
-        The beams, the rigid bodies, and both: beams first.
-    N
+    beams, bodies, members : tuple
+        The beams, the rigid bodies, and both: beams first, in the order of their numbers.
+    N : int
         Number of degrees of freedom.
+
+    Raises
+    ------
+    InputError
+        If there are none, something else is among them, or two are the same or have one name.
     """
 
-    @property
-    def beams(self) -> Sequence[Beam]: ...
+    def __init__(self, *members: Beam | RigidBody) -> None:
+        for one in members:
+            if not isinstance(one, (Beam, RigidBody)):
+                raise InputError(f"a scene is made of Beams and RigidBodies, got {shown(one)}")
+        if not members:
+            raise InputError("a scene needs a Beam or a RigidBody at least, got none")
+        names = [one.name for one in members if one.name is not None]
+        if len(set(names)) < len(names) or len(set(map(id, members))) < len(members):
+            raise InputError(f"the beams of a scene must be different, and so must their names: "
+                             f"{names}")
+        self.beams = tuple(b for b in members if isinstance(b, Beam))
+        self.bodies = tuple(b for b in members if isinstance(b, RigidBody))
+        self.members: tuple[Any, ...] = *self.beams, *self.bodies
+        *self._first, self.N = accumulate((b.N for b in self.members), initial=0)
+        self._numbers = {id(b): k for k, b in enumerate(self.members)}
 
-    @property
-    def bodies(self) -> Sequence[RigidBody]: ...
+    def __reduce__(self):
+        return Layout, self.members
 
-    @property
-    def members(self) -> Sequence[Beam | RigidBody]: ...
+    def number(self, which: WhichMember = None) -> int:
+        """The number of a beam or rigid body, given by itself, its name or its number.
 
-    @property
-    def N(self) -> int: ...
+        Parameters
+        ----------
+        which
+            None for the only one.
+        """
+        if which is None and len(self.members) == 1:
+            return 0
+        found = self._numbers.get(id(which))
+        if found is not None:
+            return found
+        return self._numbers[id(select_member(self.beams, self.bodies, which))]
 
-    def beam(self, beam: WhichMember = None) -> Any:
+    def beam(self, which: WhichMember = None) -> Any:
         """The beam or rigid body meant by itself, a name, a number, or None for the only one."""
+        return self.members[self.number(which)]
 
-    def offset(self, beam: WhichMember) -> int:
+    def offset(self, which: WhichMember = None) -> int:
         """Number of the first degree of freedom of a beam or rigid body."""
+        return self._first[self.number(which)]
+
+    @property
+    def sizes(self) -> Array:
+        """What degrees of freedom change by where members move by their size, shape (N,)."""
+        return np.concatenate([b.sizes for b in self.members])
 
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from ..beam.kinematics import clamps_direction
 from ..core.errors import InputError, ModelWarning, SupportError, shown
-from ..actions.joints.base import Joint, same_joint
+from ..actions.joints.base import Joint
 from ..actions.joints.director import UnitDirector
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.part import Part
@@ -475,10 +475,10 @@ class Constraints:
             multipliers = shared(rows, sizes * all_of, self._left_out, np.array(inner)) / sizes
             return whole.joint_force(joint, multipliers, reaction, u, t)
         for known, part in zip(self.joints, self.multipliers_of(multipliers)):
-            if same_joint(known, joint):
+            if known.same(joint):
                 return -part
         for known, first, factors in self._fixing:
-            if same_joint(known, joint):
+            if known.same(joint):
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 

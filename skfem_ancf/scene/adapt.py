@@ -13,6 +13,7 @@ from ..core.errors import (ConvergenceError, InputError, NameUnknown, require_in
                            require_positive)
 from ..actions.joints.nodes import chain_ends
 from ..core.quadrature import gauss
+from .solve import solve_static
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -130,14 +131,15 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
     while True:
         # each mesh from the stress-free state: what a coarse mesh does not see as strain a finer
         # one does, which makes its solution a poor start
-        coarse, state = rounds.scene, rounds.state or rounds.scene._solve(None, **options)
+        coarse, state = rounds.scene, rounds.state or solve_static(
+            rounds.scene.system, None, **options)
         fine = rounds.finer()
-        better = fine._solve(None, **options)
+        better = solve_static(fine.system, None, **options)
         estimate, errors = _compare(coarse, state, fine, better)
         better = better.replace(error_estimate=estimate, scene=fine,
                                 refinements=rounds.done(errors, fine))
         n = sum(b.mesh.nelements for b in fine.beams)
-        logger.info("%d elements, %d coordinates, estimated error %.3g", n, fine.N,
+        logger.info("%d elements, %d coordinates, estimated error %.3g", n, fine.layout.N,
                     max(estimate.values()))
         if rounds.judge(errors) and max(estimate.values()) <= tol:
             return better
@@ -226,7 +228,7 @@ def _with_elements(scene, elements):
     """The scene with beams of other elements, where they are given."""
     if all(e is None for e in elements):
         return scene
-    return scene.with_beams([b if e is None else b.replace(element=e)
+    return scene.replace(beams=[b if e is None else b.replace(element=e)
                              for b, e in zip(scene.beams, elements)])
 
 
@@ -239,7 +241,7 @@ def _too_few(n, estimate, tol, state):
 def _solve_for_strain(scene, tol, max_elements, **options):
     before = 0, np.inf
     while True:
-        state = scene._solve(None, **options)
+        state = solve_static(scene.system, None, **options)
         parts = [strain_error(state, b) for b in scene.beams]
         errors, sizes = (np.concatenate(x) for x in zip(*parts))
         size = sizes.sum()
@@ -324,7 +326,7 @@ def refine(scene: Any, marked: Sequence[ArrayLike]) -> tuple[Any, Callable[[Arra
         return np.concatenate([*(_prolong(b, m, v) for b, m, v in zip(
             scene.beams, marked, parts)), parts[-1]])
 
-    return scene.with_beams(beams), prolong
+    return scene.replace(beams=beams), prolong
 
 
 def _prolong(old, marked, u):

@@ -8,13 +8,13 @@ import numpy as np
 
 from ..actions.axial import LineLoad
 from ..beam.beam import Beam
+from ..beam.kinematics import direction
 from ..results.arguments import displacement
 from ..elements import ElementBeamCable
 from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
                            require_integer, require_names, require_option, require_options,
                            require_positive, shown,
                            require_unmasked)
-from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
 from ..actions.loads import DeadLoad, EndMoment, Load
@@ -38,31 +38,28 @@ MOST = 2**16
 REST = "lines"
 
 
-class NodeForce(DeadLoad):
+class NodeForce(Load):
     """A dead force on each of some ends of a beam's lines.
 
     Parameters
     ----------
-    beam
-        The beam.
     ends
         Numbers of the ends, two for each line, shape (k,).
     value
         The force on each, shape (2,).
-    amplitude
+    beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
 
-    def __init__(self, beam: Beam, ends: Array, value: Array,
+    def __init__(self, ends: Array, value: Array, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
-        vector = np.zeros(beam.N)
-        vector.reshape(-1, beam.nd)[chain_ends(beam).ravel()[ends], :2] = value
-        super().__init__(beam, vector, amplitude)
+        super().__init__(beam, amplitude)
         self.ends, self.value = ends, value
 
     def bind(self, beam: Beam) -> Load:
-        return self if beam is self.beam else NodeForce(beam, self.ends, self.value,
-                                                        self.amplitude)
+        vector = np.zeros(beam.N)
+        vector.reshape(-1, beam.nd)[chain_ends(beam).ravel()[self.ends], :2] = self.value
+        return DeadLoad(beam, vector, self.amplitude)
 
 
 class NodeMoment(EndMoment):
@@ -70,22 +67,23 @@ class NodeMoment(EndMoment):
 
     Parameters
     ----------
-    beam
-        The beam.
     end
         Number of the end, two for each line.
     M
         The moment, counterclockwise.
-    amplitude
+    beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
 
-    def __init__(self, beam: Beam, end: int, M: float, amplitude: TimeFunction = None) -> None:
-        super().__init__(beam, int(chain_ends(beam).ravel()[end]), M, amplitude)
-        self.end, self.boundary = end, None  # which means the same on other meshes
+    def __init__(self, end: int, M: float, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(None, M, beam, amplitude)
+        self.end = end
 
-    def bind(self, beam: Beam) -> Load:
-        return self if beam is self.beam else NodeMoment(beam, self.end, self.M, self.amplitude)
+    def bind(self, beam: Any) -> Load:
+        node = int(chain_ends(beam).ravel()[self.end])
+        dofs, c = direction(beam, node)
+        return self._with(beam=beam, node=node, dofs=dofs, c=c)
 
     def angle(self, u: Array) -> float:
         start = self.beam.q0_local[self.dofs] @ self.c @ [1.0, 1.0j]
@@ -128,9 +126,18 @@ class Frame(Scene):
         super().__init__(*beams)
         self.net, self._lines, self._hinged = net, lines, hinged
         ends = net.lines[:, lines].T.ravel()
-        self._nodes = Nodes(ends, hinged[:, lines].T.ravel(),
-                            np.zeros((net.points.shape[1], 3), dtype=bool), net, lines)
-        self._join()
+        self._take(Nodes(ends, hinged[:, lines].T.ravel(),
+                         np.zeros((net.points.shape[1], 3), dtype=bool), net, lines))
+
+    def _take(self, nodes):
+        """Join the lines at other nodes."""
+        with self._lock:
+            self._entries, self._system = (self._bound(nodes), *self._entries[1:]), None
+
+    @property
+    def _nodes(self) -> Any:
+        """The joint of the nodes, bound."""
+        return self._entries[0].bound[0]
 
     @classmethod
     def from_lines(cls, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
@@ -302,23 +309,9 @@ class Frame(Scene):
         net.curves = {}  # the meshes have them
         return cls(net, beams, np.concatenate(list(groups.values())), _hinged(net, hinges))
 
-    def _join(self):
-        """Bind the nodes anew."""
-        given = self._nodes._unsealed()
-        with self._lock:
-            bound = bind_joint(given, self)
-            given._seal()
-            self._joints = ((given, bound), *self._joints[1:])
-            self._system = None
-
     def __repr__(self):
         n, m = len(np.unique(self.net.same)), len(self._lines)
         return f"<Frame of {m} line(s) between {n} nodes, {len(self.loads)} load(s)>"
-
-    @property
-    def _bound(self) -> Any:
-        """The joint of the nodes, bound."""
-        return self._joints[0][1]
 
     @property
     def points(self) -> Array:
@@ -368,9 +361,8 @@ class Frame(Scene):
             held[nodes, HELD.index(name)] = True
         if "angle" in names:
             self._require_rigid(nodes, "it has no rotation to hold, pin it")
-        self._nodes = Nodes(known.nodes, known.hinged, held, self.net, self._lines,
-                            known.settled if settled is None else settled)
-        self._join()
+        self._take(Nodes(known.nodes, known.hinged, held, self.net, self._lines,
+                         known.settled if settled is None else settled))
         return self
 
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
@@ -493,8 +485,8 @@ class Frame(Scene):
             return self
         force = require_finite("force", force, (2,))
         number, end = self._ends_at(at)
-        self._put(loads=[(int(k), NodeForce(self.beams[k], end[number == k], force, amplitude))
-                         for k in np.unique(number)])
+        self._put(*(NodeForce(end[number == k], force, int(k), amplitude)
+                    for k in np.unique(number)))
         return self
 
     def moment(self, boundary: Any, M: float, beam: WhichBeam = None,
@@ -526,9 +518,8 @@ class Frame(Scene):
         M = require_finite_scalar("M", M)
         self._require_rigid(self.nodes(boundary), "no line takes a moment there; leave one of them "
                             "rigid, by pairs (line, node) in hinges")
-        loads = [(k, NodeMoment(self.beams[k], int(end), M, amplitude))
-                 for k, end in zip(*self._ends_at(boundary))]
-        self._put(loads=loads)
+        self._put(*(NodeMoment(int(end), M, int(k), amplitude)
+                    for k, end in zip(*self._ends_at(boundary))))
         return self
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
@@ -558,13 +549,13 @@ class Frame(Scene):
         for k, b in enumerate(self.beams):
             some, chains = np.split(chains, [len(chain_ends(b))])
             if np.any(some):
-                loads.append((k, LineLoad(force, None, amplitude, np.flatnonzero(some))))
-        self._put(loads=loads)
+                loads.append(LineLoad(force, k, amplitude, np.flatnonzero(some)))
+        self._put(*loads)
         return self
 
     def _ends_at(self, place):
         """Of nodes the beams (k,) whose ends lead there, and numbers of these ends (k,)."""
-        ends = self._bound.leading(self.nodes(place))
+        ends = self._nodes.leading(self.nodes(place))
         first = np.cumsum([0] + [chain_ends(beam).size for beam in self.beams])
         number = np.searchsorted(first, ends, side="right") - 1
         return number, ends - first[number]
@@ -581,7 +572,7 @@ class Frame(Scene):
         state
             A State of this frame.
         """
-        joint, u = self._bound, displacement(self.system, state, "state")
+        joint, u = self._nodes, displacement(self.system, state, "state")
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
         if state.base is None:
@@ -591,36 +582,14 @@ class Frame(Scene):
             out[joint.nodes[rigid]] = np.angle(start) + (turns / start).imag
         return out[self.net.same]
 
-    def with_beams(self, beams: Sequence[Beam]) -> Frame:
-        """The same frame with other beams, whose lines end where they did.
-
-        Parameters
-        ----------
-        beams
-            As many beams, in the same order: of other elements, materials or sections, or on
-            meshes with other nodes between the ends of the lines.
-
-        Returns
-        -------
-        Frame
-
-        Raises
-        ------
-        InputError
-            If lines end elsewhere, or as :meth:`Scene.with_beams <skfem_ancf.Scene.with_beams>`.
-        """
-        self._require_beams(beams)
+    def _bare(self, beams):
         for old, new in zip(self.beams, beams):
             a, b = (beam.mesh.p[:, chain_ends(beam)] for beam in (old, new))
             if a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.net.size:
                 raise InputError(f"{new!r} must have a chain for each line of {old!r}, from the "
                                  "same point to the same point: nodes between them may be others")
         frame = type(self)(self.net, beams, self._lines, self._hinged)
-        known = self._nodes
-        frame._nodes = Nodes(known.nodes, known.hinged, known.held, self.net, self._lines,
-                             known.settled)
-        frame._join()
-        self._put_on(frame, [joint for joint, _ in self._joints[1:]])
+        frame._take(self._entries[0].given)
         return frame
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..core.errors import NameUnknown, require_option
 from ..core.origin import ours
 from ..solvers.newton import ITERATIONS as OF_STATICS
 from ..core.switch import expecting
+from ..equations.system import System
 
 KINDS = ("static", "linear", "dynamic")
 #: Steps of a motion of which it is said whether they are compiled: how many there will be is not
@@ -45,15 +46,17 @@ class Plan(tuple):
         return "\n".join(f"{i.term:<{width}}  {i.status:<8}  {i.reason}" for i in self)
 
 
-def make_plan(scene: Any, kind: str = "static") -> Plan:
+def make_plan(system: System, kind: str = "static", sensors: int = 0) -> Plan:
     """The plan of a scene.
 
     Parameters
     ----------
-    scene
-        A :class:`~skfem_ancf.Scene`.
+    system
+        The equations of the scene.
     kind
         "static", "linear" (``scene.solve_linear``) or "dynamic".
+    sensors
+        How many there are.
 
     Raises
     ------
@@ -62,12 +65,12 @@ def make_plan(scene: Any, kind: str = "static") -> Plan:
     """
     require_option("kind of solution", kind, KINDS)
     return Plan([Item(*item) for part in (_energy, _matrices, _forces, _solution)
-                 for item in part(scene, kind)])
+                 for item in part(system, kind)] + [Item(*_sensors(sensors, kind == "dynamic"))])
 
 
-def _energy(scene, _):
+def _energy(s, _):
     """What belongs to the strain energy of the beams."""
-    beams = scene.beams
+    beams = s.beams
     points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
     if beams:
         yield "strain energy", "computed", f"{points} integration points, " + ", ".join(
@@ -84,7 +87,7 @@ def _energy(scene, _):
             sorted({f"{b.material.nu:g}" for b in poisson}))
     else:
         yield "Poisson coupling", "skipped", "nu = 0, or a section without thickness strain"
-    yield from _sections(scene)
+    yield from _sections(s)
     held = [b for b in beams if b.kernel.constant is not None]
     yield "stabilisation", "constant" if held else "skipped", (
         "quadratic: one matrix" if held else "the quadrature leaves no mode out")
@@ -104,13 +107,12 @@ def _matrices(_, kind):
         "assembled and factorised once" if dynamic else "no inertia in statics")
 
 
-def _forces(scene, kind):
+def _forces(s, kind):
     """What acts on the beams, and what holds them."""
-    s = scene.system
     yield from (_bodies(s), _damping(s, kind == "dynamic"), _elements(s),
                 _obstacles(s, kind == "linear"))
-    dead = [load for load in scene.loads if load.constant and load.amplitude is None]
-    rest = [load for load in scene.loads if load not in dead]
+    dead = [load for load in s.loads if load.constant and load.amplitude is None]
+    rest = [load for load in s.loads if load not in dead]
     yield "dead loads", "constant" if dead else "skipped", (
         f"{len(dead)} assembled when given" if dead else "there are none")
     yield "varying loads", "computed" if rest else "skipped", (
@@ -118,12 +120,12 @@ def _forces(scene, kind):
         "no follower load, no amplitude")
     yield "multipliers", "computed" if s.constraints.m else "skipped", (
         f"{s.constraints.m} equations of {_kinds(s.constraints.joints)}" if s.constraints.m else
-        "no joints" if not scene.joints else "the joints only fix coordinates")
+        "no joints" if not s.constraints.all_joints else "the joints only fix coordinates")
 
 
-def _solution(scene, kind):
+def _solution(s, kind):
     """How the equations are solved, and what is looked at."""
-    s, beams, dynamic, linear = scene.system, scene.beams, kind == "dynamic", kind == "linear"
+    beams, dynamic, linear = s.beams, kind == "dynamic", kind == "linear"
     yield "linear solver", "computed", _linear_solver(s, dynamic)
     rules = sorted({(b.element.order, t.section_points, t.layer.measure.spent)
                     for b in beams if b.has_sections for t in b.kernel.firsts})
@@ -141,11 +143,14 @@ def _solution(scene, kind):
     if dynamic:
         scheme, reason = choose_scheme(s)
         yield "scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}'
-    sensors = scene.sensors if dynamic else {}
-    yield "sensors", "computed" if sensors else "skipped", (
-        f"{len(sensors)} read at every step" if sensors else
-        "they record motions" if scene.sensors else "there are none")
     yield "fields", "skipped", "strain and stress are computed where a State is asked for them"
+
+
+def _sensors(number, dynamic):
+    """Term, status and reason of sensors."""
+    return "sensors", "computed" if number and dynamic else "skipped", (
+        f"{number} read at every step" if number and dynamic else
+        "they record motions" if number else "there are none")
 
 
 def _linear_solver(s, dynamic):
@@ -177,12 +182,12 @@ def _linear_solver(s, dynamic):
     return solver
 
 
-def _sections(scene):
+def _sections(s):
     """Terms, status and reasons of sections and stress-free strains, where there are any."""
-    uneven = [b for b in scene.beams if not b.across.simple]
+    uneven = [b for b in s.beams if not b.across.simple]
     if uneven:
         yield "sections", "constant", ", ".join(sorted({_section(b) for b in uneven}))
-    eigen = [load for load in scene.loads if isinstance(load, EigenStrain)]
+    eigen = [load for load in s.loads if isinstance(load, EigenStrain)]
     if eigen:
         linear, nonlinear = (sum(of) for of in zip(*((load.linear, load.grows) for load in eigen)))
         kinds = (linear, "of sections, a constant matrix each"), (
@@ -230,7 +235,7 @@ def _bodies(s):
 def _kinds(things):
     """How many there are of each kind, in words."""
     return ", ".join(f"{n} {name}" for name, n in Counter(
-        type(thing).__name__.lstrip("_") for thing in things).items())
+        type(getattr(thing, "item", thing)).__name__.lstrip("_") for thing in things).items())
 
 
 def _elements(s):
@@ -238,7 +243,7 @@ def _elements(s):
     forces = s.forces
     if not forces.elements:
         return "force elements", "skipped", "no springs, no masses"
-    known = sum(ours(element) for element in forces.own)
+    known = sum(ours(getattr(element, "item", element)) for element in forces.own)
     return "force elements", "computed", (
         f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
         f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} of your own, "

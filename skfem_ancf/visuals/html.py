@@ -42,8 +42,7 @@ def scene_html(scene: Any) -> str:
     """A table of what is in a Scene, and its stress-free body."""
     rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
     rows += [("rigid body", b) for b in scene.bodies]
-    rows += [("support", s) for s in scene.supports]
-    rows += [("joint", j) for j in scene.joints] + [("load", f) for f in scene.loads]
+    rows += [("item", one) for one in scene.items]
     table = "".join(f"<tr><td>{kind}</td><td>{html.escape(_short(thing))}</td></tr>"
                     for kind, thing in rows)
     return (_words(repr(scene)[1:-1]) + f"<table>{table}</table>"

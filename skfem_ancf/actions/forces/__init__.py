@@ -1,6 +1,6 @@
 """Force elements: springs, dashpots, foundations, drag, masses, and those of one's own."""
 
-from ..joints.base import point, section
+from ..places import point, section
 from .base import ForceElement, bind_force
 from .control import Control
 from .distributed import Drag, Foundation

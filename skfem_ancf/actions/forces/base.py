@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.errors import AncfError, InputError, require_finite, shown, warnings_as_errors
-from ...core.frozen import Sealable
-from ..joints.base import Vector
+from ..item import Item
+from ..places import Vector
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,41 +25,6 @@ ASIDE = 0.01
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
-class Link(NamedTuple):
-    """A plane vector ``start + sum(u[dofs] * weights, axis=1)``, perhaps constant.
-
-    Attributes
-    ----------
-    start
-        Shape (2,).
-    dofs, weights
-        Shape (2, k) both; weights (k,) are those of both components.
-    """
-
-    start: Any
-    dofs: Any = np.zeros((2, 0), dtype=int)
-    weights: Any = np.zeros((2, 0))
-
-
-def link(vector: Vector | Link) -> Link:
-    """A Vector of joints as a :class:`Link`."""
-    return Link(np.asarray(vector.start, dtype=float), vector.dofs,
-                np.broadcast_to(vector.weights, np.shape(vector.dofs)))
-
-
-def difference(a: Vector | Link, b: Vector | Link) -> Link:
-    """The Link of b - a.
-
-    Parameters
-    ----------
-    a, b
-        Vectors or Links.
-    """
-    return Link(np.asarray(b.start, dtype=float) - a.start,
-                np.concatenate([a.dofs, b.dofs], axis=1),
-                np.concatenate([-link(a).weights, link(b).weights], axis=1))
-
-
 class Part(NamedTuple):
     """An element of a kind that texts know.
 
@@ -68,18 +33,18 @@ class Part(NamedTuple):
     kind
         Of :mod:`skfem_ancf.actions.forces.texts`.
     d, e
-        Its two Links.
+        Its two vectors.
     numbers
         Its five numbers.
     """
 
     kind: int
-    d: Link
-    e: Link
+    d: Vector
+    e: Vector
     numbers: tuple[float, ...]
 
 
-class ForceElement(Sealable):
+class ForceElement(Item):
     """A force on points and sections of beams, of their places, velocities and time.
 
     An element of your own is a subclass that defines :meth:`bind` and :meth:`force`, and perhaps
@@ -92,9 +57,6 @@ class ForceElement(Sealable):
 
     Attributes
     ----------
-    symmetric : bool
-        The derivative of the force by the places is symmetric: it has a potential. Where it is
-        not, say so in the class: tangents keep their other half then, and modes may be complex.
     distributed : bool
         It acts all along a beam, not on a few points.
     along
@@ -129,20 +91,18 @@ class ForceElement(Sealable):
     (True, True)
     """
 
-    symmetric = True
     distributed = False
     along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None
     links: Any = ()
     groups: Any = ()
 
-    def bind(self, layout: Layout) -> Sequence[Vector | Link]:
-        """The points and sections on which it acts, found in the scene's coordinates.
+    def bind(self, layout: Layout) -> Sequence[Vector]:
+        """The points and sections on which it acts; the scene calls it of a copy.
 
         Parameters
         ----------
         layout
-            Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
-            ``offset(which)``, the number of its first coordinate, and ``N``.
+            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
 
         Returns
         -------
@@ -179,16 +139,27 @@ class ForceElement(Sealable):
         """
         return None
 
-    def gain(self, x: Array, y: Array) -> float | None:
+    def potential_at(self, x: Array, t: float) -> float | None:
+        """The potential at a time, of items whose energy depends on it.
+
+        Parameters
+        ----------
+        x, t
+            Places of the points, shape (n, 2), and the time.
+        """
+        return self.potential(x)
+
+    def gain(self, x: Array, y: Array, t: float) -> float | None:
         """The potential at y less that at x; None if there is none.
 
         Parameters
         ----------
-        x, y
-            Places of the points at the start and the end of a step, shape (n, 2) each.
+        x, y, t
+            Places of the points at the start and the end of a step, shape (n, 2) each, and the
+            time in the middle of it.
         """
-        before = self.potential(x)
-        after = None if before is None else self.potential(y)
+        before = self.potential_at(x, t)
+        after = None if before is None else self.potential_at(y, t)
         return None if before is None or after is None else after - before
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
@@ -210,10 +181,10 @@ class ForceElement(Sealable):
         ndarray
             Shape (n, 2).
         """
-        zero, d = 0.0 * x, y - x
-        force = np.asarray(self.force(0.5 * (x + y), zero, t), dtype=float)
+        d = y - x
+        force = np.asarray(self.force(0.5 * (x + y), 0.0 * x, t), dtype=float)
         square = np.sum(d * d)
-        gain = self.gain(x, y) if square > 0.0 else None
+        gain = self.gain(x, y, t) if square > 0.0 else None
         if gain is None:
             return force
         return force - (gain + np.sum(force * d)) / square * d
@@ -231,7 +202,7 @@ class ForceElement(Sealable):
         ndarray
             Shape (n, 2, n, 2), the derivative's last.
         """
-        return _derivative(lambda y: self.force(y, v, t), x)
+        return derivative(lambda y: self.force(y, v, t), x)
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         """Derivative of the force by the velocities, as :meth:`stiffness`.
@@ -246,11 +217,15 @@ class ForceElement(Sealable):
         ndarray
             Shape (n, 2, n, 2).
         """
-        return _derivative(lambda w: self.force(x, w, t), v)
+        return derivative(lambda w: self.force(x, w, t), v)
 
     def unheld(self) -> ForceElement:
         """Itself as it is at the start of a motion: without what it has kept of one."""
         return self
+
+    def mass_entries(self) -> tuple[Array, Array, Array] | None:
+        """Rows, columns and values that it adds to the mass matrix, shapes (k,); None for none."""
+        return None
 
     def parts(self) -> list[Part] | None:
         """Of what the texts know, once it is bound; None for an element of your own."""
@@ -261,34 +236,46 @@ class ForceElement(Sealable):
 
 
 def differences(function: Callable[[Array], Any], x: Array) -> Array:
-    """The derivative of a function of places by differences, shape (n, 2, n, 2).
+    """The derivative of a function of an array by central differences.
 
     Parameters
     ----------
     function
-        From (n, 2) to (n, 2).
+        Of an array of the shape of x.
     x
-        Where, shape (n, 2).
+        Where, shape (...).
+
+    Returns
+    -------
+    ndarray
+        Shape (..., ...): that of the function's values, then that of x.
     """
-    n = len(x)
-    out, units = np.zeros((n, 2, n, 2)), np.eye(2 * n).reshape(2 * n, n, 2)
     step = STEP * max(1.0, float(np.abs(x).max(initial=0.0)))
-    for k in range(2 * n):
-        out[:, :, k // 2, k % 2] = (np.asarray(function(x + step * units[k]))
-                                    - function(x - step * units[k])) / (2 * step)
-    return out
+    units = step * np.eye(x.size).reshape(x.size, *x.shape)
+    columns = [(np.asarray(function(x + d)) - function(x - d)) / (2.0 * step) for d in units]
+    return np.stack(columns, axis=-1).reshape(*np.shape(columns[0]), *x.shape)
 
 
-def _derivative(function, x):
-    """As :func:`differences`, by complex steps where those agree."""
+def derivative(function: Callable[[Array], Any], x: Array) -> Array:
+    """As :func:`differences`, by complex steps where those agree; of a complex x by these alone.
+
+    Parameters
+    ----------
+    function, x
+        As there, x of shape (...).
+    """
+    if np.iscomplexobj(x):
+        raise TypeError("complex steps of complex steps")
     out = differences(function, x)
-    for k, unit in enumerate(np.eye(x.size).reshape(-1, *x.shape)):
-        rough = out[:, :, k // 2, k % 2]
+    for k in np.ndindex(x.shape):
+        column = (..., *k)
+        step, rough = np.zeros(x.shape, dtype=complex), out[column]
+        step[k] = 1e-30j
         try:
             with warnings_as_errors(_COMPLEX):
-                found = np.imag(function(x + 1e-30j * unit)) / 1e-30
+                found = np.imag(function(x + step)) / 1e-30
             if np.allclose(found, rough, rtol=1e-4, atol=1e-4 * np.abs(rough).max(initial=0.0)):
-                out[:, :, k // 2, k % 2] = found
+                out[column] = found
         except (TypeError, ValueError, _COMPLEX):
             pass
     return out
@@ -302,19 +289,19 @@ def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
     element
         A :class:`ForceElement`.
     layout
-        The :class:`~skfem_ancf.Scene`.
+        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
 
     Raises
     ------
     InputError
         If the element does not keep to the interface of :class:`ForceElement`.
     """
-    bound = element._unsealed()
+    bound = element._thawed()
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
     try:
         bound.links = _links(element, bound.bind(layout))
         if bound.parts() is None:
-            _try(bound)
+            try_force(bound)
     except AncfError:
         raise
     except Exception as error:
@@ -324,21 +311,30 @@ def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
             f"{element!r} fails in the stress-free state: {type(error).__name__}: {error}; a force "
             "element defines bind(scene), which returns a list of points, and force(x, v, t) of "
             "shape (points, 2)") from error
-    bound._seal()
+    bound._freeze()
     return bound
 
 
 def _links(element, links):
     if not isinstance(links, (list, tuple)) or not links or not all(
-            isinstance(x, (Vector, Link)) for x in links):
+            isinstance(x, Vector) for x in links):
         raise InputError(f"bind(scene) of {element!r} must return a list of points and sections, "
                          "as [point(scene, None, (1, 0))] with "
                          "skfem_ancf.actions.forces.point, got "
                          f"{shown(links)}")
-    return [link(x) for x in links]
+    return list(links)
 
 
-def _try(bound):
+def try_force(bound: Any, sizes: Any = None) -> None:
+    """Raise InputError unless what a user-defined force element returns fits together.
+
+    Parameters
+    ----------
+    bound
+        A bound element.
+    sizes
+        What its places change by, shape (n, 2); their distance from the origin, or one, by default.
+    """
     x = np.array([x.start for x in bound.links])
     n, zero = len(x), np.zeros_like(x)
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
@@ -346,12 +342,13 @@ def _try(bound):
         require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
                        (n, 2, n, 2))
     # where nothing is zero by chance, as it may be in the stress-free state
-    y = x + ASIDE * max(1.0, float(np.abs(x).max())) * np.cos(np.arange(2.0 * n)).reshape(n, 2)
+    sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
+    y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
     K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))
     if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
                          "symmetric: it has no potential. Say so in its class: symmetric = False")
-    if bound.potential(y) is not None:
+    if bound.potential_at(y, 0.0) is not None:
         _require_potential(bound, y)
 
 
@@ -359,10 +356,11 @@ def _require_potential(bound, x):
     """Raise InputError unless the force without velocities is minus the slope of the potential."""
     step, zero = STEP * max(1.0, float(np.abs(x).max())), np.zeros_like(x)
     units = step * np.eye(x.size).reshape(-1, *x.shape)
-    slope = [(bound.potential(x + d) - bound.potential(x - d)) / (2.0 * step) for d in units]
-    slope = require_finite(f"the slope of potential(x) of {bound!r}", slope, (x.size,))
-    noise = 1e-15 * abs(bound.potential(x)) / step
     for t in (0.0, ASIDE):
+        slope = [(bound.potential_at(x + d, t) - bound.potential_at(x - d, t)) / (2.0 * step)
+                 for d in units]
+        slope = require_finite(f"the slope of potential(x) of {bound!r}", slope, (x.size,))
+        noise = 1e-15 * abs(bound.potential_at(x, t)) / step
         force = np.ravel(bound.force(x, zero, t))
         if not np.allclose(-slope, force, rtol=0.0, atol=1e-3 * np.abs(force).max() + 10.0 * noise):
             raise InputError(

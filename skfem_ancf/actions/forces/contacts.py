@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.band import Band
 from ...core.errors import InputError
-from ...core.kept import cached_property
+from functools import cached_property
 from ...core.callbacks import handle_of
 from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION, HEADER, LAST,
                             LOOK, MEMORY, MIDDLE, NOW, NUMBERS, OWN, POSE, POSES, PRESSURES, RATE,

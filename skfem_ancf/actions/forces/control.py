@@ -10,10 +10,10 @@ import numpy as np
 
 from ...core.errors import (InputError, ask_array, ask_number, require_function, require_option,
                             require_positive, shown)
-from ..joints.base import is_ground, named_place, section
+from ..places import Vector, is_ground, named_place, section
 from ...mesh.places import is_point
 from ...beam.rigid import RigidBody
-from .base import ForceElement, Link, differences, link
+from .base import ForceElement, differences
 from .springs import end_of
 from .texts import turned, turning
 
@@ -98,11 +98,11 @@ class Control(ForceElement):
                              "in both")
         self.dt = None if dt is None else require_positive("dt", dt)
 
-    def bind(self, layout: Layout) -> list[Link]:
+    def bind(self, layout: Layout) -> list[Vector]:
         find = self._point if self.kind == "force" else self._section
         ends = [find(layout, self.at)]
         if self.kind == "moment":
-            ends.append(Link(ends[0].start) if self.other is None else find(layout, self.other))
+            ends.append(Vector(ends[0].start) if self.other is None else find(layout, self.other))
         elif self.other is not None:
             ends.append(find(layout, self.other))
         if not ends[0].weights.size:
@@ -118,7 +118,7 @@ class Control(ForceElement):
     def _point(self, layout, place):
         if self.beam is not None and is_point(place):
             place = (self.beam, place)
-        return link(end_of(layout, place))
+        return end_of(layout, place)
 
     def _section(self, layout, place):
         if isinstance(place, RigidBody):
@@ -131,7 +131,7 @@ class Control(ForceElement):
             which, at = self.beam, place
         if is_ground(which):
             raise InputError("the ground does not turn: leave other= out for a moment from there")
-        return link(section(layout, which, at)[1])
+        return section(layout, which, at)[1]
 
     # what it does
 

@@ -13,10 +13,14 @@ from ...beam.kernels.section import beam_gradients
 from ...core.quadrature import gauss
 from ...beam.distribution import AXIS, Facets
 from ...beam.surfaces import groups_of, surfaces_of
-from .base import ForceElement, Link, Part, link
+from ..places import Vector
+from .base import ForceElement, Part
 from .texts import DRAG, FOUNDATION
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..item import Item
     from ...beam.layout import Layout
     from ...core.types import Place
     from ...beam.layout import WhichBeam
@@ -49,7 +53,7 @@ class Foundation(ForceElement):
         self.side, self.one_sided = side, require_flag("one_sided", one_sided)
         self.beam = beam
 
-    def bind(self, layout: Layout) -> list[Link]:
+    def bind(self, layout: Layout) -> list[Vector]:
         beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
         self._at, found = [], surfaces_of(beam, self.side, beam.element.facet_points)
         self.along = (beam, *groups_of(beam.mesh, found))
@@ -59,12 +63,12 @@ class Foundation(ForceElement):
                                          one.normals.transpose(1, 2, 0)):
                 for x, area, normal in zip(X.T, areas, normals):
                     dofs, weights = probe_reference(beam, e, x)
-                    self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
+                    self._at.append((Vector(np.zeros(2), dofs + first, weights), float(area),
                                      normal))
         return [place for place, _, _ in self._at]
 
     def parts(self) -> list[Part]:
-        none, one = Link(np.zeros(2)), float(self.one_sided)
+        none, one = Vector(np.zeros(2)), float(self.one_sided)
         return [Part(FOUNDATION, place, none, (self.k * area, self.damping * area, n[0], n[1], one))
                 for place, area, n in self._at]
 
@@ -85,7 +89,7 @@ class Drag(ForceElement):
     normal, tangential
         Coefficients, zero or positive.
     beam
-        The beam, its name or its number, in a scene of several.
+        The beam, its name or its number; None for all.
 
     References
     ----------
@@ -103,7 +107,11 @@ class Drag(ForceElement):
         self.tangential = require_not_negative("tangential", tangential)
         self.beam = beam
 
-    def bind(self, layout: Layout) -> list[Link]:
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
+        return [self._with(beam=layout.number(beam)) for beam in beams]
+
+    def bind(self, layout: Layout) -> list[Vector]:
         beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         xi, w = gauss(beam.element.axis_degree + 1)
@@ -117,8 +125,8 @@ class Drag(ForceElement):
         for e in range(mesh.nelements):
             for k, x in enumerate(X.T):
                 dofs, weights = probe_reference(beam, e, x)
-                place = link(Link(np.zeros(2), dofs + first, weights))
-                slope = link(Link(frame[0, e, k], dofs + first, slopes[0, e, k]))
+                place = Vector(np.zeros(2), dofs + first, weights)
+                slope = Vector(frame[0, e, k], dofs + first, slopes[0, e, k])
                 self._at.append((place, slope, float(w[k] * length[e, k])))
         return [place for place, _, _ in self._at]
 

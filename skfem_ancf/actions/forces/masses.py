@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.errors import InputError, require_finite, require_not_negative, shown
-from ..joints.base import point, section
-from .base import ForceElement, Link, Part, link
+from ..places import Vector, point, section
+from .base import ForceElement, Part
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -44,10 +44,10 @@ class PointMass(ForceElement):
             raise InputError("a point mass needs a mass or an inertia that is positive, got two "
                              "zeros")
 
-    def bind(self, layout: Layout) -> list[Link]:
-        self._masses = [(self.mass, link(point(layout, self.beam, self.at)))]
+    def bind(self, layout: Layout) -> list[Vector]:
+        self._masses = [(self.mass, point(layout, self.beam, self.at))]
         if self.inertia:
-            self._masses.append((self.inertia, link(section(layout, self.beam, self.at)[1])))
+            self._masses.append((self.inertia, section(layout, self.beam, self.at)[1]))
         return [place for _, place in self._masses]
 
     def parts(self) -> list[Part]:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown
-from ..joints.base import GROUND, Vector, both_of, named_place, point, section
+from ..places import GROUND, Vector, both_of, named_place, point, section
 from ...mesh.places import points_of_rows
 from ...beam.rigid import RigidBody, on_body
-from .base import ForceElement, Link, Part, difference, link
+from .base import ForceElement, Part
 from ...beam.kernels.moments import mean_turning
 from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
 from .texts import SPRING, TINY, TORSION, turned, turning
@@ -71,12 +71,12 @@ class Spring(ForceElement):
         self.between = tuple((place, None) if isinstance(place, RigidBody) else place
                              for place in between)
 
-    def bind(self, layout: Layout) -> list[Link]:
+    def bind(self, layout: Layout) -> list[Vector]:
         a, b = (end_of(layout, place) for place in self.between)
         if not a.weights.size and not b.weights.size:
             raise InputError(f"neither end of the spring between {shown(self.between)} is a point "
                              "of a beam or a rigid body: both would be of the ground")
-        self._link = difference(a, b)
+        self._link = b - a
         distance = float(np.hypot(*self._link.start))
         if distance == 0.0 and self.length != 0.0:
             raise InputError(f"the spring between {shown(self.between)} has length zero, and so no "
@@ -88,7 +88,7 @@ class Spring(ForceElement):
     def parts(self) -> list[Part] | None:
         if isinstance(self.k, Law) or isinstance(self.damping, Law):
             return None
-        return [Part(SPRING, self._link, Link(np.zeros(2)),
+        return [Part(SPRING, self._link, Vector(np.zeros(2)),
                      (self.k, self._length, self.damping, 0.0, 0.0))]
 
     def _along(self, x):
@@ -104,7 +104,7 @@ class Spring(ForceElement):
     def potential(self, x: Array) -> float:
         return potential_of(self.k, self._along(x)[0] - self._length)
 
-    def gain(self, x: Array, y: Array) -> float:
+    def gain(self, x: Array, y: Array, t: float) -> float:
         return work_of(self.k, *(self._along(z)[0] - self._length for z in (x, y)))
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
@@ -163,10 +163,9 @@ class TorsionalSpring(ForceElement):
                              "section is known up to whole turns only. Of a spring wound by "
                              "more, add the moment of the turns, 2 pi k each, by scene.moment")
 
-    def bind(self, layout: Layout) -> list[Link]:
-        self._d = link(section(layout, self.beam, self.at)[1])
-        self._e = link(Link(self._d.start)) if self.other is None else link(
-            section(layout, *self.other)[1])
+    def bind(self, layout: Layout) -> list[Vector]:
+        self._d = section(layout, self.beam, self.at)[1]
+        self._e = Vector(self._d.start) if self.other is None else section(layout, *self.other)[1]
         d, e = self._d.start, self._e.start
         self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle
         return [self._d, self._e]
@@ -199,7 +198,7 @@ class TorsionalSpring(ForceElement):
     def potential(self, x: Array) -> float:
         return potential_of(self.k, self._angle(x))
 
-    def gain(self, x: Array, y: Array) -> float:
+    def gain(self, x: Array, y: Array, t: float) -> float:
         return work_of(self.k, self._angle(x), self._angle(y))
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:

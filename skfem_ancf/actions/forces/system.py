@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.kept import cached_property
+from functools import cached_property
 from .base import Part
 from .contacts import NO_CONTACTS, Contacts
 from .control import Control
-from .masses import PointMass
 from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness, potential,
                     run_kinds, turned, vectors_of)
 
@@ -18,7 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...core.types import Array
-    from .base import ForceElement, Link
+    from ..places import Vector
+    from .base import ForceElement
 
 #: Kinds that the texts know.
 KINDS = 4
@@ -72,7 +72,7 @@ class Forces:
         vectors = [[part.d, part.e] for part in self.parts]
         own = [element.links for element in self.own]
         # links, numbers of their components, and where the derivatives by them are
-        blocks: list[tuple[list[Link], Array, Array]] = []
+        blocks: list[tuple[list[Vector], Array, Array]] = []
         for k, pair in enumerate(vectors):
             rows = k + n * np.arange(4)
             blocks.append((pair, rows, k + n * np.arange(16).reshape(4, 4)))
@@ -87,7 +87,7 @@ class Forces:
         self._couplings = [self._coupling(k) for k in range(len(blocks))]
         self._far = [bool(np.any(np.abs(i - j) > bandwidth)) for i, j, _, _ in self._couplings]
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
-        self.masses = [element for element in self.elements if isinstance(element, PointMass)]
+        self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         self.contacts = Contacts(self.elements)
         self.resists = bool(self.own) or any(_resists(part) for part in self.parts) or any(
             one.damping > 0.0 for one in self.contacts.obstacles)
@@ -220,7 +220,7 @@ class Forces:
         """
         y = self.vectors(tables, u)
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
-            element.potential(y[rows].reshape(-1, 2)) or 0.0
+            element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.own, self._slices))
 
     @cached_property

@@ -8,6 +8,7 @@ from ...core.errors import require_option
 from .base import Joint, bind_joint
 from .guides import OnCircle, OnLine
 from .hinge import Hinge
+from .motor import Motor
 from .plane_section import PlaneSection
 from .prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
 from .sliders import Sleeve, Slot
@@ -48,6 +49,6 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
     return JOINTS[require_option("joint", joint, JOINTS)](**options)
 
 
-__all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",
-           "PrescribedPosition", "PrescribedTurn", "Sleeve", "Slot", "Weld", "bind_joint",
-           "get_joint"]
+__all__ = ["JOINTS", "Hinge", "Joint", "Motor", "OnCircle", "OnLine", "PlaneSection",
+           "PrescribedAngle", "PrescribedPosition", "PrescribedTurn", "Sleeve", "Slot", "Weld",
+           "bind_joint", "get_joint"]

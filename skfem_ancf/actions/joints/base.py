@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
-from os import urandom
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...mesh.places import node_of
-from ...beam.interpolation import locate, probe_reference
-from ...beam.kinematics import direction as direction_of, direction_weights
-from ...core.errors import AncfError, InputError, MeshError, require_finite, require_slope, shown
-from ...core.frozen import Sealable
-from ..loads import beside, require_entries
+from ...core.errors import AncfError, InputError, require_finite, require_slope, shown
+from ..item import Item, beside, require_entries
 from ...core.origin import ours
-from ...mesh.places import as_point, is_place, is_point, points_of_rows
-from ...beam.rigid import RigidBody
+from ..places import Vector, point, section
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,65 +19,6 @@ if TYPE_CHECKING:
 
     from ...beam.layout import Layout
     from ...core.types import Array
-    from ...beam.layout import WhichMember
-
-
-class Vector:
-    """A plane vector that depends affinely on the coordinates.
-
-    ``start + sum(u[dofs] * weights, axis=1)``: the position of a material point, the direction of a
-    section and that of a rigid body are such vectors, and so is a point of the ground.
-
-    Parameters
-    ----------
-    start
-        Its value in the stress-free state, shape (2,).
-    dofs
-        Numbers of the coordinates of both components, shape (2, n).
-    weights
-        Their weights, shape (2, n), or (n,) if they are those of both components.
-    """
-
-    def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
-        self.start, self.dofs = np.asarray(start), dofs
-        self.weights = weights + np.zeros(dofs.shape)
-
-    def __call__(self, u: Array) -> Array:
-        return self.start + np.sum(u[self.dofs] * self.weights, axis=1)
-
-    def row(self, direction: ArrayLike, n: int) -> Array:
-        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,).
-
-        Parameters
-        ----------
-        direction
-            Shape (2,).
-        n
-            Number of all coordinates.
-
-        Returns
-        -------
-        ndarray
-            Shape (n,).
-        """
-        out = np.zeros(n)
-        np.add.at(out, self.dofs, np.asarray(direction)[:, None] * self.weights)
-        return out
-
-    def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
-        """The derivative of ``direction . vector`` by the coordinates.
-
-        Parameters
-        ----------
-        direction
-            Shape (2,).
-
-        Returns
-        -------
-        columns, values
-            Shapes (k,).
-        """
-        return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
@@ -118,7 +53,7 @@ def rotation(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-class Joint(Sealable):
+class Joint(Item):
     """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
 
     A joint is bound to a scene by :meth:`bind`, which finds its points; from then on ``u`` is
@@ -149,7 +84,6 @@ class Joint(Sealable):
     constant = True
     moving = False
     tabled = True
-    name: str | None = None
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
@@ -171,13 +105,12 @@ class Joint(Sealable):
             cls.jacobian = jacobian  # type: ignore[method-assign]
 
     def bind(self, layout: Layout) -> None:
-        """Find the points and sections in the scene's coordinates.
+        """Find the points and sections; the scene calls it of a copy.
 
         Parameters
         ----------
         layout
-            Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
-            ``offset(which)``, the number of its first coordinate, and ``N``.
+            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
         """
         raise NotImplementedError
 
@@ -482,24 +415,20 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
     joint
         A :class:`Joint`, as it was given.
     layout
-        The :class:`~skfem_ancf.Scene`.
+        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
 
     Raises
     ------
     InputError
         If the joint does not keep to the interface of :class:`Joint`.
     """
-    # by which it is known again: in a bound copy, on another mesh, in another process
-    if "_key" not in vars(joint):
-        vars(joint)["_key"] = urandom(16).hex()
-    bound = joint._unsealed()
+    bound = joint._thawed()
     try:
         bound.bind(layout)
-        bound._seal()
+        bound._freeze()
         if not ours(joint):
             _try(bound, layout.N)
-            sizes = np.concatenate([b.sizes for b in layout.members])
-            beside(partial(_require_derivatives, bound, sizes), sizes)
+            beside(partial(require_derivatives, bound, layout.sizes), layout.sizes)
     except AncfError:
         raise
     except Exception as error:
@@ -521,7 +450,7 @@ def _try(joint: Joint, n: int) -> None:
         require_entries(f"curvature of {joint!r}", *found, n)
 
 
-def _require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
+def require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
     """Raise InputError unless jacobian and curvature of a joint of the user's fit its value."""
     multipliers = np.cos(np.arange(len(joint.equations)))
     try:
@@ -540,260 +469,6 @@ def _require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None
     require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
                   "multipliers @ jacobian(u, t)", change * sizes, 2.0 * turned * sizes,
                   1e-12 * np.max(np.abs(multipliers @ J) * sizes, initial=0.0))
-
-
-def same_joint(a: Joint, b: Joint) -> bool:
-    """True if both are the same joint, bound or not, to whatever mesh.
-
-    Parameters
-    ----------
-    a, b
-        Joints.
-    """
-    return a is b or (getattr(a, "_key", None) is not None
-                      and getattr(a, "_key", None) == getattr(b, "_key", None))
-
-
-#: What a joint or a spring calls the ground in the place of a beam.
-GROUND = "ground"
-
-
-def _fixed(value: Array) -> Vector:
-    """A Vector that does not move."""
-    return Vector(value, np.zeros((2, 0), dtype=int), np.zeros((2, 0)))
-
-
-def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
-    """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
-    found = Vector(start, dofs + layout.offset(member), weights)
-    size = np.maximum.reduce(np.abs(found.weights)) * member.sizes.take(dofs[0])
-    keep = size > 1e-14 * np.maximum.reduce(size)
-    if not np.logical_and.reduce(keep):
-        found.dofs, found.weights = found.dofs[:, keep], found.weights[:, keep]
-    return found
-
-
-def members_at(layout: Layout, at: ArrayLike) -> list[int]:
-    """Numbers of the beams that have a material point at a place, and of bodies around it.
-
-    Parameters
-    ----------
-    layout
-        What :meth:`Joint.bind` was given.
-    at
-        The place (x, y) in the stress-free state, shape (2,), or the name of an end.
-    """
-    found = []
-    if not isinstance(at, str):
-        at = as_point(at)
-    for k, member in enumerate(layout.members):
-        if isinstance(member, RigidBody):
-            if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
-                found.append(k)
-            continue
-        try:
-            locate(member, at)
-        except MeshError:
-            continue
-        found.append(k)
-    return found
-
-
-def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
-    """Of beams that have a point those whose axes are nearest to it; others if a body has it, too.
-
-    Parameters
-    ----------
-    layout, at
-        As for :func:`members_at`: a point, shape (2,), or the name of a place.
-    found
-        What that returned.
-    """
-    beams: list[Any] = [layout.members[k] for k in found]
-    if len(found) < 2 or isinstance(at, str) or any(isinstance(b, RigidBody) for b in beams):
-        return found
-    where = [(b, *locate(b, at)) for b in beams]
-    off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]
-    return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.alike]
-
-
-def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
-    """Which beam or body a place is of, and the place there.
-
-    Parameters
-    ----------
-    layout
-        What :meth:`Joint.bind` was given.
-    place
-        (x, y): the material point there; (beam, (x, y)), or another place of a beam; a RigidBody,
-        for its centre of mass; ("ground", (x, y)); "right", for the end that one beam alone has.
-    where_none_is
-        Whose a point is where no beam and no body is: "ground", or None to raise InputError.
-
-    Returns
-    -------
-    which, at
-        As :func:`point` takes them.
-
-    Raises
-    ------
-    InputError
-        If there is no beam and no body, or more than one.
-    """
-    if isinstance(place, RigidBody):
-        return place, None
-    if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
-        which, at = place
-        if is_ground(which):
-            at = tuple(map(float, require_finite("a point of the ground", at, (2,))))
-        elif isinstance(at, np.ndarray):
-            at = tuple(at.tolist())
-        return which, at
-    found = members_at(layout, place) if isinstance(place, str) else []
-    if not found:
-        place = require_finite("a point of a spring or a joint", place, (2,))
-        found = members_at(layout, place)
-    found = nearest_of(layout, place, found)
-    if len(found) > 1:
-        names = [layout.members[k].name or k for k in found]
-        raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
-                         f"({names[0]!r}, {shown(place)})")
-    if not found and where_none_is is None:
-        raise InputError(f"no beam and no rigid body is at the point {shown(place)}: for one of "
-                         f"the ground write ('ground', {shown(place)}), for one outside of the "
-                         "outline of a rigid body (body, (x, y))")
-    return (found[0] if found else where_none_is), (
-        place if isinstance(place, str) else tuple(map(float, place)))
-
-
-def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
-    """The position of a material point, as a :class:`Vector`.
-
-    Parameters
-    ----------
-    layout
-        What :meth:`Joint.bind` was given.
-    beam
-        The beam or rigid body, its name or its number; "ground" for a point of the ground.
-    at
-        The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
-        mass of a rigid body; a place of a beam that is one section, as "left", for its axis there.
-    """
-    if is_ground(beam):
-        return _fixed(np.array(as_point(at)))
-    member = layout.beam(beam)
-    if isinstance(at, str) and not isinstance(member, RigidBody):
-        return section(layout, member, at)[0]
-    dofs, weights = member.probe(at)
-    if isinstance(member, RigidBody):
-        start = member.place(at)
-    else:
-        e, X = locate(member, at)
-        start = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    return _of(layout, member, start, dofs, weights)
-
-
-def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vector]:
-    """Position and direction of a section, as two :class:`Vector`.
-
-    Parameters
-    ----------
-    layout
-        What :meth:`Joint.bind` was given.
-    beam
-        The beam or rigid body, its name or its number; "ground" for the ground.
-    place
-        A place that is one section, whose position is that of its axis; or a material point (x, y),
-        at which the section through it may lie inside an element. Of a cable the position is that
-        of the axis, and the direction that of its tangent. Of a rigid body a point, or None for its
-        centre of mass.
-    """
-    if is_ground(beam):
-        return point(layout, beam, place), _fixed(np.array([1.0, 0.0]))
-    member = layout.beam(beam)
-    if isinstance(member, RigidBody):
-        dofs, weights = member.direction()
-        return (point(layout, member, place),
-                _of(layout, member, member.q0[dofs] @ weights, dofs, weights))
-    try:
-        node = node_of(member.mesh, place)
-    except MeshError:
-        if not is_point(place):
-            raise
-        return _inner_section(layout, member, place)
-    dofs, weights = direction_of(member, node)
-    direction = _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights)
-    if is_point(place) and member.has_sections:
-        return point(layout, member, place), direction
-    first = layout.offset(member) + node * member.nd
-    return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
-
-
-def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
-    """As :func:`section`, for a section inside an element."""
-    e, X = locate(beam, at)
-    if not beam.has_sections:
-        X = np.array([X[0], 0.5])
-        at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    dofs, _ = probe_reference(beam, e, X)
-    weights = direction_weights(beam, e, float(X[0]))
-    return point(layout, beam, at), _of(layout, beam, beam.q0_local[dofs] @ weights, dofs, weights)
-
-
-def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
-    """A place for each of several beams: given once for all of them, or once for each.
-
-    Parameters
-    ----------
-    value
-        One place, or n of them: a tuple, a list, or the rows of an array of points, shape (n, 2).
-    what
-        What it is, for messages.
-    n
-        How many beams there are.
-    """
-    if value is None:
-        raise InputError(f"a joint needs {what}")
-    value = points_of_rows(value)
-    if is_place(value):
-        return (value,) * n
-    if isinstance(value, (tuple, list)) and len(value) == n:
-        return tuple(value)
-    raise InputError(f"a joint of {n} beams needs {what}, one for all of them or one for each, as "
-                     f"at=('right', 'left'), got {shown(value)}")
-
-
-def both_of(name: str, place: Any) -> tuple[Any, Any]:
-    """A beam or body and a place of it; a RigidBody alone is all of it.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    place
-        As (beam, place), or a RigidBody.
-    """
-    if isinstance(place, RigidBody):
-        return place, None
-    if not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place):
-        raise InputError(f"{name} is a beam with a place of it, as (1, 'left'), or a RigidBody, "
-                         f"got {shown(place)}")
-    return place[0], place[1]
-
-
-def is_ground(beam: Any) -> bool:
-    """True for the name of the ground."""
-    return isinstance(beam, str) and beam == GROUND
-
-
-def several(beams: Any) -> tuple[Any, ...]:
-    """The beams and bodies of a joint, two at least."""
-    if not isinstance(beams, (tuple, list)) or len(beams) < 2:
-        raise InputError("beams must be two beams or rigid bodies or more, by Beam, RigidBody, "
-                         f"name or number, or 'ground', got {shown(beams)}")
-    if all(map(is_ground, beams)):
-        raise InputError(f"a joint holds a beam or a rigid body, got {shown(beams)}")
-    return tuple(beams)
 
 
 def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
@@ -854,3 +529,7 @@ class Aligned:
         columns = np.broadcast_to(self.e.dofs[None, None], values.shape).ravel()
         values = -factor * values.ravel()
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
+
+
+__all__ = ["Aligned", "Joint", "Vector", "angle_to", "bind_joint", "equations_of", "gradients",
+           "point", "require_derivatives", "rotation", "section"]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.errors import InputError, require_finite, require_label, require_positive
-from .base import Joint, gradients, point
+from .base import Joint, gradients
+from ..places import point
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

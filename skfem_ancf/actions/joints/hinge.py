@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.errors import require_label
-from .base import Joint, each, equations_of, gradients, point, several
+from .base import Joint, equations_of, gradients
+from ..places import each, point, several
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ...beam.kinematics import direction
-from ...core.kept import cached_property
 from .base import Joint
 from .settlements import HELD, Settlements
 

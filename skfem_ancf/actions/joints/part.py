@@ -32,7 +32,7 @@ class Part(Joint):
         self.tabled = joint.tabled and ours(joint)
         self._number = np.full(len(joint.equations), -1)
         self._number[kept] = np.arange(len(kept))
-        self._seal()
+        self._freeze()
 
     def __repr__(self) -> str:
         return repr(self.joint)

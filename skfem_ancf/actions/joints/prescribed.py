@@ -12,7 +12,8 @@ from ...core.errors import (ask_array, ask_number, require_finite_scalar, requir
                             require_label)
 from ...beam.rigid import on_body
 from ...core.sampling import sample
-from .base import Aligned, Joint, angle_to, both_of, gradients, point, rotation, section
+from .base import Aligned, Joint, angle_to, gradients, rotation
+from ..places import both_of, point, section
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,8 +11,9 @@ from ...core.errors import InputError, require_finite, require_flag, require_lab
 from ...beam.layout import select_beam
 from ...mesh.mapping import cross
 from .axis import Axis
-from .base import (GROUND, Aligned, Joint, Vector, angle_to, gradients, named_place, point,
-                   rotation, section)
+from .base import Aligned, Joint, angle_to, gradients, rotation
+from ...beam.rigid import RigidBody
+from ..places import GROUND, Vector, is_ground, named_place, point, section
 from .spans import Family, Product, Span
 
 if TYPE_CHECKING:
@@ -344,3 +345,24 @@ class Slot(Joint):
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         i, j, v = zip(*(turned.second(m) for turned, m in zip(self.pairs, multipliers)))
         return np.concatenate(i), np.concatenate(j), np.concatenate(v)
+
+
+def slider(layout: Layout, at: Any, on: WhichMember, direction: ArrayLike | None = None,
+           angle: bool = False, name: str | None = None) -> Joint:
+    """A :class:`Sleeve` on a beam, or a :class:`Slot` of a rigid body or the ground.
+
+    Parameters
+    ----------
+    layout
+        Of the scene.
+    at, on, direction, angle, name
+        As for these classes, direction of shape (2,).
+    """
+    at = tuple(named_place(layout, at))
+    if is_ground(on) or isinstance(layout.beam(on), RigidBody):
+        if direction is None:
+            raise InputError(f"a slider on {shown(on)} needs the direction of its line")
+        return Slot(at, on, direction, angle=angle, name=name)
+    if direction is not None:
+        raise InputError("a slider on a beam moves along its axis: give no direction")
+    return Sleeve(at, on, angle, name)  # type: ignore[arg-type]

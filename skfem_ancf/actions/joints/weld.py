@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.errors import InputError, require_flag, require_label
-from .base import (Aligned, Joint, angle_to, each, equations_of, gradients, is_ground, rotation,
-                   section, several)
+from .base import Aligned, Joint, angle_to, equations_of, gradients, rotation
+from ..places import each, is_ground, section, several
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...beam.layout import Layout
     from ...core.types import Array
-    from .base import Vector
+    from ..places import Vector
 
 
 class Weld(Joint):

@@ -11,8 +11,9 @@ from ...beam.layout import select_beam
 from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                             require_integer, require_not_negative, require_option, require_positive,
                             shown, warn)
-from ..forces.base import ForceElement, Link, Part
+from ..forces.base import ForceElement, Part
 from ..forces.contacts import Contacts, Group
+from ..places import Vector
 from ..forces.poses import carried, taken_back
 from ...beam.kernels.section import beam_gradients
 from ...core.quadrature import gauss_lobatto
@@ -181,7 +182,7 @@ class Obstacle(ForceElement):
             np.array([corners.min(axis=1), corners.max(axis=1)]).T, t)
         return carried(pose, points), pieces
 
-    def bind(self, layout: Layout) -> list[Link]:
+    def bind(self, layout: Layout) -> list[Vector]:
         if not layout.beams:
             raise InputError("an obstacle is touched by surfaces of beams, the scene has rigid "
                              "bodies alone: hold them by one-sided springs, or add a beam")
@@ -204,7 +205,7 @@ class Obstacle(ForceElement):
                     f"{shown(place.tolist())} of its surface is {-found[0, deepest]:.4g} "
                     "deep in it. Move the obstacle, or the body to where it is")
         self._require_outside(beams)
-        return [Link(np.zeros(2))]
+        return [Vector(np.zeros(2))]
 
     def _require_outside(self, beams):
         """Raise InputError if the surface of a shape is inside of a beam."""

@@ -11,7 +11,7 @@ from ...core.errors import (CallbackError, InputError, ask, require_finite, requ
                             require_function, require_not_negative, require_positive, shown,
                             warnings_as_errors)
 from ..forces.contact_texts import OUTLINE, OWN, outline
-from ...core.frozen import Sealable
+from ...core.immutable import Immutable
 from .outlines import circle, clipped, contour
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ UNKNOWN = 1e300
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
-class Shape(Sealable):
+class Shape(Immutable):
     """What is solid. Its surface has no thickness, and its inside no end.
 
     Attributes
@@ -431,7 +431,7 @@ class SignedDistance(Shape):
         return out
 
     def fitted(self, x: Array, scale: float) -> SignedDistance:
-        made = self._unsealed()
+        made = self._thawed()
         made._scale, made._by_steps = scale, False
         rough = made._differences(x, 0.0)
         steep = np.hypot(*rough)

@@ -1,0 +1,168 @@
+"""The protocol of all that acts in a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+import numpy as np
+
+from ..core.errors import InputError, require_finite
+from ..core.immutable import Immutable
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from typing_extensions import Self
+
+    from ..beam.layout import Layout
+    from ..core.types import Array
+
+
+class Item(Immutable):
+    """What acts in a scene: base class of loads, supports, joints, force elements, and of yours.
+
+    An item is described without a mesh. :meth:`skfem_ancf.Scene.add` keeps a copy of it and binds
+    another to the degrees of freedom (DOFs) of the scene; on another mesh, as for
+    ``solve_static(adapt=...)``, it is bound again. A class of your own defines what it has of
+
+    * ``energy(u, t)``: its potential energy, a number,
+    * ``force(u, v, t)``: the force that it exerts on the DOFs, shape (N,); by default minus the
+      gradient of the energy,
+    * ``stiffness(u, v, t)`` and ``damping(u, v, t)``: the derivatives of the force by u and by v,
+      as arrays or sparse matrices (N, N); by default differences of the force,
+    * ``constraint(u, t)``: what Lagrange multipliers hold at zero, shape (m,),
+    * ``jacobian(u, t)``: the derivative of that by u, shape (m, N); by default by differences,
+    * ``mass()``: what it adds to the mass matrix, (N, N), between DOFs of one node.
+
+    Here u and v are the displacement and the velocity of all DOFs of the scene, shape (N,), and t
+    is the time, in statics the load factor. It then works in statics, stability, continuation,
+    modes, motions by every scheme, sweeps and pictures. Derivatives by differences take complex
+    steps, to round-off, where the functions take complex arrays.
+
+    :class:`~skfem_ancf.actions.loads.Load`, :class:`~skfem_ancf.actions.joints.Joint` and
+    :class:`~skfem_ancf.actions.forces.ForceElement` are items with hooks of their own: for what is
+    scaled with the loads, for sparse constraints, and for forces on few points.
+
+    Attributes
+    ----------
+    symmetric : bool
+        The stiffness is symmetric: the force has a potential. Where it is not, say so in the class.
+    moving : bool
+        The constraint depends on time; False saves asking for that.
+    dofs
+        Numbers of the DOFs that energy and force depend on and act on, which :meth:`bind` may set;
+        all by default, which makes matrices dense: for small scenes.
+    name : str or None
+        What messages call it.
+
+    Examples
+    --------
+    A spring of fourth order, known by its energy:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
+    >>> class Quartic(Item):
+    ...     def __init__(self, k, at):
+    ...         self.k, self.at = k, at
+    ...     def bind(self, layout):
+    ...         bound = super().bind(layout)
+    ...         bound.point = layout.point(self.at)
+    ...         bound.dofs = bound.point.dofs
+    ...         return bound
+    ...     def energy(self, u, t):
+    ...         d = self.point(u) - self.point.start
+    ...         return self.k / 4 * np.sum(d**2)**2
+    >>> beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamCable(5),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(beam).clamp("left").gravity((0, -9.81)).add(Quartic(1e3, (1, 0)))
+    >>> bool(-0.2 < scene.solve_static().displacement((1, 0))[1] < -0.1)
+    True
+    """
+
+    symmetric = True
+    moving = True
+    dofs: Any = None
+    name: str | None = None
+    _key: str
+
+    def __new__(cls, *args: Any, **options: Any) -> Self:
+        made = super().__new__(cls)
+        #: by which copies are known again: bound ones, on another mesh, in another process
+        vars(made)["_key"] = uuid4().hex
+        return made
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        """What it consists of in a scene: itself by default, or one item for each of some beams.
+
+        Parameters
+        ----------
+        layout
+            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+        """
+        return (self,)
+
+    def bind(self, layout: Any) -> Any:
+        """The item on the DOFs of a scene: by default a copy.
+
+        Override it where something is found there, and leave ``self`` as it is, which is bound to
+        other meshes later.
+
+        Parameters
+        ----------
+        layout
+            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+        """
+        return self._thawed()
+
+    def same(self, other: Any) -> bool:
+        """True if both were made at once: one is a copy of the other, bound or not."""
+        return self._key == getattr(other, "_key", None)
+
+    def _with(self, **changes):
+        """A copy with other attributes."""
+        other = self._thawed()
+        for name, value in changes.items():
+            setattr(other, name, value)
+        return other
+
+
+def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
+    """Raise InputError unless rows, columns and values are entries of an n x n matrix.
+
+    Parameters
+    ----------
+    what
+        What messages call the matrix.
+    i, j, v
+        Rows, columns and values, shapes (k,).
+    n
+        Number of rows and columns of the matrix.
+    """
+    i, j = np.asarray(i), np.asarray(j)
+    v = require_finite(what, v, (None,))
+    if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
+        raise InputError(f"{what} must be rows, columns and values of one length, got shapes "
+                         f"{i.shape}, {j.shape}, {v.shape}")
+    if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
+        raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
+                         f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
+
+
+def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
+    """Call a check of derivatives at displacements at which nothing is zero by chance.
+
+    At one of two it may fail: there may be a kink.
+
+    Parameters
+    ----------
+    check
+        A function of a displacement and of a step that is small to it; raises InputError.
+    sizes
+        What DOFs change by where things move by their size, shape (N,).
+    """
+    angles = np.arange(len(sizes))
+    try:
+        check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
+    except InputError:
+        check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))

@@ -1,0 +1,68 @@
+"""A motor turns a section or a rigid body."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...core.errors import InputError, require_finite_scalar
+from ..item import Item
+from ..loads import EndMoment
+from ..places import both_of
+from .prescribed import PrescribedAngle, PrescribedTurn, Turned
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...beam.layout import Layout
+    from ...core.types import TimeFunction
+
+
+class Motor(Item):
+    """Turn a rigid body or a section: by a given angle, at a given speed, or with a torque.
+
+    A torque that depends on the state is a :class:`~skfem_ancf.Control`.
+
+    Parameters
+    ----------
+    at
+        A RigidBody, or (beam, place) with a place that is one section, as (0, "left").
+    angle
+        The angle from that of the start as a function of time, in radians.
+    speed
+        Angular velocity, a number or a function of time: the angle is its integral from the time 0.
+    torque
+        Moment, a number or a function of time; a function counts as one in statics, as every
+        amplitude.
+    other
+        What the motor stands on, as ``at``: the angle is measured from it, and it takes the torque
+        with the opposite sign. The ground by default.
+
+    Raises
+    ------
+    InputError
+        Unless one of angle, speed and torque is given.
+    """
+
+    def __init__(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,
+                 other: Any = None) -> None:
+        given = [name for name, value in (("angle", angle), ("speed", speed), ("torque", torque))
+                 if value is not None]
+        if len(given) != 1:
+            raise InputError("a motor has an angle, a speed or a torque: give one of them, got "
+                             f"{given or 'none'}")
+        self.at = both_of("at", at)
+        self.other = None if other is None else both_of("other", other)
+        self.torque = torque if torque is None or callable(torque) else (
+            require_finite_scalar("torque", torque))
+        self.angle: Any = angle if speed is None else Turned(speed)
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        if self.torque is None:
+            if self.other is None:
+                return (PrescribedAngle(self.at[1], self.angle, self.at[0]),)
+            return (PrescribedTurn(self.at, self.other, self.angle),)
+        M, amplitude = (1.0, self.torque) if callable(self.torque) else (self.torque, None)
+        couple = None if self.other is None else object()
+        places = [(self.at, M)] + ([] if self.other is None else [(self.other, -M)])
+        return [EndMoment(place, size, layout.number(which), amplitude, couple)
+                for (which, place), size in places]

@@ -1,0 +1,530 @@
+"""What a scene is made of: beams, rigid bodies and items, and the methods that add items."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from threading import RLock
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from ..actions.axial import FollowerForce, LineLoad
+from ..actions.binding import bind_item
+from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
+from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
+                              TorsionalSpring)
+from ..actions.item import Item
+from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
+from ..actions.joints.sliders import slider
+from ..actions.loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight
+from ..actions.obstacles import Obstacle
+from ..actions.places import joined
+from ..actions.supports import Clamp, Pin, Support
+from ..beam.beam import Beam
+from ..beam.layout import Layout
+from ..beam.rigid import RigidBody
+from ..core.errors import InputError, shown
+from ..materials.damping import Damping
+from ..mesh.places import on_other_mesh
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+    from skfem.assembly import LinearForm
+    from typing_extensions import Self
+
+    from ..actions.obstacles import Shape
+    from ..beam.layout import WhichBeam, WhichMember
+    from ..core.types import Array, Place, TimeFunction
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def parameters_of(item: type) -> Callable[[Method], Method]:
+    """Give a method the *Parameters* of the class of which it adds an instance.
+
+    Parameters
+    ----------
+    item
+        The class, whose constructor takes the arguments of the method.
+    """
+    found = re.search(r"^Parameters\n-+\n.*?(?=^\w+\n-+\n|\Z)",
+                      inspect.cleandoc(item.__doc__ or ""), re.DOTALL | re.MULTILINE)
+
+    def add(method: Method) -> Method:
+        if method.__doc__ and found:
+            method.__doc__ = f"{inspect.cleandoc(method.__doc__)}\n\n{found[0].rstrip()}\n"
+        return method
+
+    return add
+
+
+class Entry(NamedTuple):
+    """An item of a scene.
+
+    Attributes
+    ----------
+    given
+        As it was given, with beams by number: it fits other meshes.
+    bound
+        What it is on the degrees of freedom of the scene.
+    """
+
+    given: Item
+    bound: tuple[Any, ...]
+
+
+class Model:
+    """Beams, rigid bodies, and what acts on them: the description of a :class:`Scene`.
+
+    Methods that add something return the scene, so that they can be chained, but for those of
+    joints, which return the joint: ``state.joint_force(joint)`` is its force. Each constructs an
+    item and adds it; ``scene.add(Spring(...))`` is the same as ``scene.spring(...)``.
+
+    Parameters
+    ----------
+    *beams
+        One or more :class:`~skfem_ancf.Beam`, and :class:`~skfem_ancf.RigidBody` among them. Bodies
+        are numbered behind the beams.
+    """
+
+    def __init__(self, *beams: Any) -> None:
+        if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
+            beams = tuple(beams[0])
+        #: Beams, bodies and the numbers of their degrees of freedom.
+        self.layout = Layout(*beams)
+        self._entries: tuple[Entry, ...] = ()
+        self._fixed: dict[int, float] = {}
+        self._damping: Damping | None = None
+        self._system: Any = None
+        self._lock = RLock()
+
+    def __getstate__(self):
+        """Without the equations, which are built again."""
+        return {name: value for name, value in vars(self).items() if name != "_lock"} | {
+            "_system": None}
+
+    def __setstate__(self, state):
+        vars(self).update(state, _lock=RLock())
+
+    @property
+    def beams(self) -> tuple[Beam, ...]:
+        """The beams."""
+        return self.layout.beams
+
+    @property
+    def bodies(self) -> tuple[RigidBody, ...]:
+        """The rigid bodies."""
+        return self.layout.bodies
+
+    @property
+    def N(self) -> int:
+        """Number of degrees of freedom."""
+        return self.layout.N
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        """All that acts, as it was given, in the order in which it was added."""
+        return tuple(entry.given for entry in self._entries)
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads, bound to the beams: a tuple of :class:`~skfem_ancf.actions.loads.Load`."""
+        return self._all(Load)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints, bound to the beams: a tuple of :class:`~skfem_ancf.actions.joints.Joint`."""
+        return self._all(Joint)
+
+    @property
+    def elements(self) -> tuple[ForceElement, ...]:
+        """The force elements, bound: springs, foundations, masses, obstacles, your own."""
+        return self._all(ForceElement)
+
+    def _all(self, kind):
+        return tuple(one for entry in self._entries for one in entry.bound if isinstance(one, kind))
+
+    def beam(self, beam: WhichMember = None) -> Any:
+        """The Beam or RigidBody meant by itself, a name, a number, or None for the only beam."""
+        return self.layout.beam(beam)
+
+    def _bound(self, item):
+        """An entry, of which nothing is kept yet."""
+        if not isinstance(item, Item):
+            raise InputError(f"a scene takes an Item, as a Spring, a Load or a Joint, got "
+                             f"{shown(item)}: derive yours from skfem_ancf.Item")
+        bound = [part for one in item.expand(self.layout) for part in bind_item(one, self.layout)]
+        given = item._with(**{name: self._numbered(value) for name, value in vars(item).items()
+                              if not name.startswith("_")})
+        given._freeze()
+        return Entry(given, tuple(bound))
+
+    def _numbered(self, value):
+        """The number of a Beam, tuples and lists with numbers in place of them, or the value."""
+        if isinstance(value, Beam):  # rigid bodies stay the same on other meshes
+            return self.layout.number(value)
+        if not isinstance(value, (tuple, list)):
+            return value
+        inner = [self._numbered(v) for v in value]
+        return value if all(a is b for a, b in zip(inner, value)) else tuple(inner)
+
+    def _put(self, *items):
+        """Bind everything, then keep it: what fails leaves the scene as it was.
+
+        Returns what the items are bound to.
+        """
+        with self._lock:
+            entries, fixed = [self._bound(item) for item in items], dict(self._fixed)
+            bound = [one for entry in entries for one in entry.bound]
+            for one in bound:
+                if isinstance(one, Support):
+                    one.hold(fixed)
+            require_alone([*self.loads, *(one for one in bound if isinstance(one, Load))])
+            self._entries, self._fixed, self._system = self._entries + tuple(entries), fixed, None
+        return bound
+
+    def add(self, item: Item) -> Self:
+        """Add a load, a support, a joint, a force element, or an item of your own.
+
+        Parameters
+        ----------
+        item
+            An :class:`~skfem_ancf.Item`. The scene keeps it as it is now, and binds a copy to its
+            beams; on another mesh, as for ``solve_static(adapt=...)``, it is bound again.
+
+        Returns
+        -------
+        Scene
+            Itself. Ask a State or History for the force of a joint with ``joint_force(item)``.
+
+        Raises
+        ------
+        InputError
+            If it is none, or does not keep to the protocol.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, Clamp, ElementBeamANCF, MeshBeam, PointForce, Scene
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3), width=0.01))
+        >>> state = scene.add(Clamp("left")).add(PointForce((0, -1e-3), at=(1, 0))).solve_static()
+        >>> state.converged
+        True
+        """
+        self._put(item)
+        return self
+
+    # supports
+
+    @parameters_of(Clamp)
+    def clamp(self, boundary: Place, beam: WhichBeam = None, thickness: str = "fixed") -> Self:
+        """Weld a face, or hold it as a plane: a :class:`~skfem_ancf.Clamp`."""
+        return self.add(Clamp(boundary, beam, thickness))
+
+    @parameters_of(Pin)
+    def pin(self, boundary: Place, beam: WhichBeam = None) -> Self:
+        """Fix the position of the axis; the section may turn: a :class:`~skfem_ancf.Pin`."""
+        return self.add(Pin(boundary, beam))
+
+    @parameters_of(Support)
+    def fix(self, boundary: Place, names: str | Sequence[str] | None = None,
+            displacement: float = 0.0, beam: WhichBeam = None) -> Self:
+        """Fix degrees of freedom by their scikit-fem names: a :class:`~skfem_ancf.Support`."""
+        return self.add(Support(boundary, names, displacement, beam))
+
+    # joints
+
+    def joint(self, joint: str | Joint, **options: Any) -> Joint:
+        """Add a joint, held by Lagrange multipliers.
+
+        In statics the time of a motion is the load factor. A joint that only fixes degrees of
+        freedom is eliminated like a support.
+
+        Parameters
+        ----------
+        joint
+            A name from :data:`skfem_ancf.actions.joints.JOINTS` with its options, or a Joint:
+
+            * ``"hinge", beams=(a, b), at=point``: two beams share a point, see :meth:`hinge`,
+            * ``"weld", beams=(a, b), at=("right", "left")``: two sections keep their angle, see
+              :meth:`weld`,
+            * ``"line", at=point, direction=(1, 0)``: a point slides on a line,
+            * ``"circle", at=point, center=(0, 0)``: a point slides on a circle,
+            * ``"position", at=point, r=function``: a point follows ``r(t)``,
+            * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``,
+            * ``"plane", at="left"``: a section stays in its plane,
+            * ``"sleeve", at=(a, point), on=b``, ``"slot", at=(a, point), on=body, direction=d``:
+              a point slides along a beam, along a line of a body, see :meth:`slider`.
+        **options
+            Arguments of the joint's class, where it is given by its name.
+
+        Returns
+        -------
+        Joint
+            Ask a State or History for its force with ``joint_force(joint)``.
+
+        Raises
+        ------
+        NameUnknown
+            If the joint's name is not known.
+        SupportError
+            When solving, if joints contradict each other or the supports.
+        """
+        return self._put(get_joint(joint, **options))[0]
+
+    def hinge(self, *places: Any, name: str | None = None) -> Joint:
+        """Join material points of beams and rigid bodies: they stay together, and may turn.
+
+        Parameters
+        ----------
+        *places
+            One point (x, y), at which two beams or bodies or more meet; or a place for each of
+            them: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, (beam, "right"), a
+            point that only one of them has, ("ground", (x, y)), or a RigidBody for its centre of
+            mass.
+        name
+            What messages call the joint.
+
+        Returns
+        -------
+        Joint
+            A :class:`~skfem_ancf.Hinge`.
+
+        Raises
+        ------
+        InputError
+            If a place is of no beam and no body, or of several.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> a, b = (Beam(MeshBeam.init_line([0, 1, 2], 0.1, origin=origin, angle=angle),
+        ...              ElementBeamCable(), StVenantKirchhoff(1e6, 0.3), width=0.1)
+        ...         for origin, angle in (((0, 0), 0.0), ((1, 0), 1.5707963267948966)))
+        >>> scene = Scene(a, b).clamp("left", a).clamp("right", b)
+        >>> scene.hinge((1, 0)).equations
+        ('force along x', 'force along y')
+        """
+        return self.joint(Hinge(*joined(self.layout, places), name))
+
+    def weld(self, *places: Any, name: str | None = None, apart: bool = False) -> Joint:
+        """Join beams and rigid bodies: points stay together, and sections keep their angles.
+
+        The point of a beam may be anywhere, inside of an element too: so the end of one is welded
+        to the middle of another, or several meet in one point.
+
+        Parameters
+        ----------
+        *places
+            As for :meth:`hinge`; (beam, "right") is the axis at that end.
+        name
+            What messages call the joint.
+        apart
+            Allow that the points are apart in the stress-free state: the weld draws them together.
+
+        Returns
+        -------
+        Joint
+            A :class:`~skfem_ancf.Weld`.
+        """
+        return self.joint(Weld(*joined(self.layout, places), name, apart))
+
+    def slider(self, at: Any, on: WhichMember, direction: ArrayLike | None = None,
+               angle: bool = False, name: str | None = None) -> Joint:
+        """A material point slides along the axis of a beam, or along a line of a rigid body.
+
+        Parameters
+        ----------
+        at
+            The point: (x, y) if one beam or body alone has it, (beam, (x, y)) with a Beam, a
+            RigidBody, a name or a number, ("ground", (x, y)), a RigidBody for its centre of mass.
+        on
+            The beam, along whose axis it slides, however far that bends; or a RigidBody or
+            "ground".
+        direction
+            Direction of the line of a body or the ground in the state of the start, shape (2,).
+        angle
+            Keep the angle between the section at the point and the axis or the line: a sleeve that
+            carries a moment.
+        name
+            What messages call the joint.
+
+        Returns
+        -------
+        Joint
+            A :class:`~skfem_ancf.Sleeve`, whose ``distance(state.u)`` says where along the axis
+            the point is, or a :class:`~skfem_ancf.Slot`.
+
+        Raises
+        ------
+        InputError
+            If the point is not on the axis.
+        ConvergenceError
+            When solving, if the point leaves the beam at an end.
+        """
+        return self.joint(slider(self.layout, at, on, direction, angle, name))
+
+    @parameters_of(Motor)
+    def motor(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,
+              other: Any = None) -> Joint | Load:
+        """Turn a rigid body or a section: a :class:`~skfem_ancf.Motor`.
+
+        It returns the joint, whose ``joint_force`` is the moment of the motor, or the load.
+        """
+        return self._put(Motor(at, angle, speed, torque, other))[0]
+
+    # loads
+
+    @parameters_of(Weight)
+    def gravity(self, g: ArrayLike, beam: WhichBeam = None, amplitude: TimeFunction = None) -> Self:
+        """Weight of every beam and rigid body, or of one: a :class:`~skfem_ancf.Weight`."""
+        return self.add(Weight(g, beam, amplitude))
+
+    @parameters_of(PointForce)
+    def point_force(self, force: ArrayLike, at: Any, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Self:
+        """A dead force on a material point: a :class:`~skfem_ancf.PointForce`."""
+        return self.add(PointForce(force, at, beam, amplitude))
+
+    @parameters_of(FollowerForce)
+    def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                       amplitude: TimeFunction = None, line: int | None = None) -> Self:
+        """A force that turns with the tangent of the axis: a :class:`~skfem_ancf.FollowerForce`."""
+        return self.add(FollowerForce(force, at, beam, amplitude, line))
+
+    @parameters_of(LineLoad)
+    def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                  amplitude: TimeFunction = None) -> Self:
+        """A dead force per length of the axis: a :class:`~skfem_ancf.LineLoad`."""
+        return self.add(LineLoad(force, beam, amplitude))
+
+    @parameters_of(Traction)
+    def traction(self, boundary: Place, t: ArrayLike | Callable[[Array], Array],
+                 beam: WhichBeam = None, amplitude: TimeFunction = None) -> Self:
+        """A dead traction on a surface: a :class:`~skfem_ancf.Traction`."""
+        return self.add(Traction(boundary, t, beam, amplitude))
+
+    @parameters_of(Pressure)
+    def pressure(self, boundary: Place, p: float, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> Self:
+        """A pressure normal to the deformed surface: a :class:`~skfem_ancf.Pressure`."""
+        return self.add(Pressure(boundary, p, beam, amplitude))
+
+    @parameters_of(Temperature)
+    def temperature(self, change: Any, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Self:
+        """A change of the temperature: a :class:`~skfem_ancf.Temperature`."""
+        return self.add(Temperature(change, beam, amplitude))
+
+    @parameters_of(EigenStrain)
+    def eigenstrain(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Self:
+        """A strain that the body would have without stress, of growth, muscles, drying, voltage.
+
+        An :class:`~skfem_ancf.EigenStrain`.
+        """
+        return self.add(EigenStrain(xx, yy, xy, beam, amplitude))
+
+    @parameters_of(EndMoment)
+    def moment(self, boundary: Place, M: float, beam: WhichBeam = None,
+               amplitude: TimeFunction = None) -> Self:
+        """A moment on a section or a rigid body: an :class:`~skfem_ancf.EndMoment`."""
+        return self.add(EndMoment(boundary, M, beam, amplitude))
+
+    @parameters_of(FormLoad)
+    def load(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
+             amplitude: TimeFunction = None) -> Self:
+        """Any scikit-fem ``LinearForm`` as a dead load: a :class:`~skfem_ancf.FormLoad`."""
+        return self.add(FormLoad(form, boundary, beam, amplitude))
+
+    # force elements
+
+    @parameters_of(Spring)
+    def spring(self, k: Any, between: Sequence[Any], damping: Any = 0.0,
+               length: float | None = None) -> Self:
+        """A spring between two points, with a dashpot: a :class:`~skfem_ancf.Spring`."""
+        return self.add(Spring(k, between, damping, length))
+
+    @parameters_of(TorsionalSpring)
+    def torsional_spring(self, k: Any, at: Place, damping: Any = 0.0, beam: WhichBeam = None,
+                         other: Any = None, angle: float = 0.0) -> Self:
+        """A moment against the angle of a section: a :class:`~skfem_ancf.TorsionalSpring`."""
+        return self.add(TorsionalSpring(k, at, damping, beam, other, angle))
+
+    @parameters_of(Control)
+    def control(self, law: Callable[..., Any], at: Any, kind: str = "force", other: Any = None,
+                points: Mapping[str, Any] | None = None,
+                sections: Mapping[str, Any] | None = None, dt: float | None = None,
+                beam: WhichBeam = None) -> Self:
+        """A force or a moment of time and measurements: a :class:`~skfem_ancf.Control`."""
+        return self.add(Control(law, at, kind, other, points, sections, dt, beam))
+
+    @parameters_of(Foundation)
+    def foundation(self, k: float, side: Place = "bottom", one_sided: bool = False,
+                   damping: float = 0.0, beam: WhichBeam = None) -> Self:
+        """Springs along the normal of a side: a :class:`~skfem_ancf.Foundation`."""
+        return self.add(Foundation(k, side, one_sided, damping, beam))
+
+    @parameters_of(Drag)
+    def drag(self, density: float, normal: float, tangential: float = 0.0,
+             beam: WhichBeam = None) -> Self:
+        """A force against the velocity of the axis: a :class:`~skfem_ancf.Drag`."""
+        return self.add(Drag(density, normal, tangential, beam))
+
+    @parameters_of(PointMass)
+    def point_mass(self, mass: float, at: ArrayLike, inertia: float = 0.0,
+                   beam: WhichBeam = None) -> Self:
+        """A mass on a material point, with its weight: a :class:`~skfem_ancf.PointMass`."""
+        return self.add(PointMass(mass, at, inertia, beam))
+
+    @parameters_of(Obstacle)
+    def obstacle(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
+                 beam: WhichBeam = None, **options: Any) -> Self:
+        """Something that the surface of beams cannot enter; ``state.contact()`` says where it is.
+
+        An :class:`~skfem_ancf.actions.obstacles.Obstacle`.
+        """
+        return self.add(Obstacle(shape, friction, stiffness, beam, **options))
+
+    @parameters_of(Damping)
+    def damping(self, mass: float = 0.0, stiffness: float = 0.0, modal: ArrayLike = ()) -> Self:
+        """Damping of the whole scene: Rayleigh's, and of modes.
+
+        A mode of the angular frequency omega gets the damping ratio ``mass / (2 omega) + stiffness
+        omega / 2``. It acts in motions; materials may have their own, ``Beam(...,
+        damping=KelvinVoigt(time))``. A second call takes the place of the first.
+        """
+        with self._lock:
+            self._damping, self._system = Damping(mass, stiffness, modal), None
+        return self
+
+    # other beams, other loads
+
+    def _bare(self, beams):
+        """A scene of other beams on which nothing acts that was added."""
+        return type(self)(*beams, *self.bodies)
+
+    def _on(self, beams):
+        """The same on other beams."""
+        if (not isinstance(beams, (list, tuple)) or len(beams) != len(self.beams)
+                or not all(isinstance(beam, Beam) for beam in beams)):
+            raise InputError(f"beams must be a list of {len(self.beams)} Beam(s), got "
+                             f"{shown(beams)}")
+        scene = self._bare(beams)
+        added = self.items[len(scene._entries):]
+        changed = {k for k, (a, b) in enumerate(zip(self.beams, beams)) if a.mesh is not b.mesh}
+        for item in added if changed else ():
+            which = getattr(item, "beam", None)
+            for name in ("boundary", "at", "side"):
+                place = getattr(item, name, None)
+                if not on_other_mesh(place) and (which is None or self.layout.number(
+                        which) in changed):
+                    raise InputError(f"{item!r} is at facets given by numbers, {place!r}, and "
+                                     "cannot be put on another mesh: give names or functions")
+        scene._damping = self._damping
+        scene._put(*added)
+        return scene

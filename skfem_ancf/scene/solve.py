@@ -1,0 +1,177 @@
+"""From a description to equations, and from what solvers find to states."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..actions.forces import PointMass
+from ..actions.forces.base import ForceElement
+from ..actions.joints import Joint
+from ..actions.loads import Load, PointForce, bind_load
+from ..beam.masses import projected
+from ..beam.rigid import RigidBody
+from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
+                           SupportError, ask_field, require_finite, require_options, shown, warn)
+from ..equations.linearised import linear_external_force, linear_force
+from ..equations.system import System
+from ..results.checks import warn_of
+from ..results.path import CriticalPoint
+from ..results.state import State
+from ..solvers import eigen, newton
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..beam.beam import Beam
+    from ..beam.layout import Layout
+    from ..core.types import Array
+    from ..materials.damping import Damping
+
+OPTIONS = ("method", "tol", "max_iterations", "first_step", "min_step", "progress", "stable")
+#: How often a linear system is solved at most, with one factorisation; the degrees of freedom up to
+#: which it is more than once; and the correction relative to the displacement at which it is
+#: enough.
+LINEAR_SOLVES, SOLVED_AGAIN, CLOSE = 4, 50000, 1e-13
+
+
+def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
+              damping: Damping | None) -> System:
+    """The equations of a scene.
+
+    Parameters
+    ----------
+    layout
+        Of the scene.
+    bound
+        What acts, bound to it.
+    fixed
+        Displacements at full load of degrees of freedom that are held, by their numbers.
+    damping
+        That of the whole scene, or None.
+    """
+    loads = [one for one in bound if isinstance(one, Load)]
+    elements = [one for one in bound if isinstance(one, ForceElement)]
+    return System(layout.beams, loads + _weights(layout, loads, elements),
+                  np.array(list(fixed), dtype=int), np.array(list(fixed.values()), dtype=float),
+                  [one for one in bound if isinstance(one, Joint)], damping, elements,
+                  layout.bodies, eigen.rest_modes)
+
+
+def _weights(layout, loads, elements):
+    """Loads by which gravity acts on point masses."""
+    masses = [one for one in elements if isinstance(one, PointMass) and one.mass]
+    return [bind_load(PointForce(one.mass * load.g, one.at, None, load.amplitude), load.beam)
+            for load in loads if getattr(load, "g", None) is not None
+            for one in masses if layout.beam(one.beam) is load.beam]
+
+
+def velocity_of(member: Beam | RigidBody, v: Any) -> Array:
+    """A velocity of the degrees of freedom of a beam or rigid body, shape (N,).
+
+    Parameters
+    ----------
+    member
+        The beam or rigid body.
+    v
+        As for :meth:`skfem_ancf.Scene.initial_velocity`.
+    """
+    if (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,):
+        uniform = require_finite("v", v, (2,))
+        return velocity_of(member, lambda x: np.multiply.outer(uniform, np.ones(x[0].shape)))
+    if callable(v):
+        function = v
+
+        def field(x: Array) -> Array:
+            return ask_field("v(x)", function, x)
+
+        v = member.velocity_of(field) if isinstance(member, RigidBody) else projected(member, field)
+    return require_finite("v", v, (member.N,))
+
+
+def solve_linear(system: System) -> State:
+    """The small-displacement solution, see :meth:`skfem_ancf.Scene.solve_linear`."""
+    system.constraints.require_supports()
+    zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
+    system.assemble(zero, 1.0, geometric=False)
+    system.solver.factorize(zero, 1.0, none)
+    u, multipliers = np.zeros(system.N), none
+    u[system.constraints.fixed] = system.constraints.values(1.0)
+    gap, J = system.constraints.constraint(zero, 1.0), system.constraints.full_jacobian(zero, 1.0)
+    # solved again with what sums of strains leave: an assembled stiffness rounds off bending
+    for _ in range(LINEAR_SOLVES if system.N <= SOLVED_AGAIN else 1):
+        rest = (linear_external_force(system, zero, u) - linear_force(system, zero, u)
+                - multipliers @ J)
+        du, dm = system.solver.solve(rest, -gap - J @ u)
+        u, multipliers = u + du, multipliers + dm
+        if np.max(np.abs(du)) <= CLOSE * np.max(np.abs(u)):
+            break
+    system.forces.contacts.require_free(u, "solve_linear()", "solve_static()")
+    return State(system, u, iterations=1, message="linear, one factorisation",
+                 multipliers=multipliers, base=State(system, zero, load=0.0))
+
+
+def solve_static(system: System, u: Array | None, memory: Any = None, **options: Any) -> State:
+    """The equilibrium under the full load, without warnings, see :func:`warn_about`.
+
+    Parameters
+    ----------
+    system
+        The equations.
+    u
+        Displacement at the start, shape (N,); None for zero.
+    memory
+        Of the contacts at the start.
+    **options
+        Those of :func:`skfem_ancf.solvers.newton.solve_static`.
+    """
+    require_options("solve_static", options, OPTIONS,
+                    "; first_step=0.1 begins with a tenth of the load; with adapt= those of "
+                    "scene.adapt.solve_adaptive too")
+    system.constraints.require_independent_joints()
+    if system.constraints.adrift:
+        system.constraints.require_supports()
+    try:
+        return _state(system, newton.solve_static(system, u, memory=memory, **options))
+    except Interrupted as error:
+        raise Interrupted(str(error), _state(system, error.state)) from None
+    except ConvergenceError as error:
+        if system.constraints.missing_supports:
+            raise SupportError(f"{system.constraints.missing_supports}. No stable equilibrium was "
+                               "found in which the loads hold what is free") from error
+        state, message = _state(system, error.state), str(error)
+        if state.checks.findings:
+            message += (f". At the load level {state.load:.6g} already "
+                        + "; ".join(state.checks.findings))
+        raise ConvergenceError(message, state) from None
+
+
+def _state(system, result):
+    return State(system, result.u, result.load, result.force, result.converged, result.iterations,
+                 result.message, result.steps, result.multipliers, doubt=result.doubt,
+                 memory=result.memory)
+
+
+def warn_about(state: State) -> None:
+    """Say what makes a static solution doubtful."""
+    if state.doubt:
+        warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
+    warn_of(state)
+
+
+def critical_of(point: CriticalPoint, system: System) -> Any:
+    """What a CriticalPoint of a path of a system was made from.
+
+    Parameters
+    ----------
+    point, system
+        The point, and the system whose path is to branch there.
+    """
+    if not isinstance(point, CriticalPoint) or point.kind != "bifurcation":
+        raise InputError("branch must be a point of path.critical_points of kind 'bifurcation', "
+                         f"got {shown(point)}")
+    if point.state.system is not system:
+        raise InputError("the branch point belongs to another scene, or to this one before it was "
+                         "changed: follow its path again")
+    return point.critical
