@@ -512,30 +512,6 @@ def test_any_changes_one_after_the_other_are_a_scene_built_anew(element, seed):
         assert a.strain_energy == pytest.approx(b.strain_energy, rel=1e-6)
 
 
-@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
-def test_a_driven_motion_asks_its_function_once(monkeypatch, scheme):
-    """For all times; and for three of them alone, once between these, whether that is the same."""
-    asked = []
-
-    def angle(t):
-        asked.append(np.shape(t))
-        return 0.1 * np.sin(3.0 * t) ** 2
-
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.02)
-    scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.02))
-    scene.pin("left").joint("angle", at="left", angle=angle)
-    tried, sparse = (counted(monkeypatch, owner, name) for owner, name in (
-        (Tables, "are_joints"), (Constraints, "sparse_jacobian")))
-    first = scene.integrate(0.1, 0.01, scheme=scheme)
-    assert not tried and not sparse
-    asked.clear()
-    again = scene.integrate(0.1, 0.01, scheme=scheme)
-    assert asked == [(41,)]
-    scene.integrate(0.2, 0.01, scheme=scheme)
-    assert asked[1:] == [(81,), (), (), ()]
-    assert np.array_equal(first.u, again.u)
-
-
 def test_a_driven_motion_whose_function_fails_is_kept_up_to_there():
     def angle(t):
         if np.any(np.asarray(t) > 0.055):
