@@ -222,10 +222,10 @@ def test_damaged_files_end_in_the_errors_of_the_package(reader):
 
 
 @pytest.mark.parametrize("name, new", [
-    ("done", np.array([1.0, 1.0])), ("done", np.array([True])), ("failed", np.array([7])),
-    ("failed", np.array([0])), ("errors", np.array([1.0])), ("format", np.array("1")),
+    ("status", np.array([1.0, 1.0])), ("status", np.array(["done"])), ("format", np.array("1")),
+    ("status", np.array(["done", "lost"])), ("errors", np.array([1.0, 2.0])),
     ("values/value", np.array(["a", "b"])), ("values/value", np.array(1.0)),
-    ("parameters/x", np.array([1.0])), ("other/x", np.array([1.0, 2.0])), ("done", None),
+    ("parameters/x", np.array([1.0])), ("other/x", np.array([1.0, 2.0])), ("status", None),
 ])
 def test_odd_sweeps(name, new, tmp_path):
     path = tmp_path / "sweep.npz"

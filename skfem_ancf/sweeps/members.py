@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
     from ..core.types import Array, StrPath
 
-_FORMAT = 1
-#: Arrays of a file beside those of parameters and values.
-_OWN = ("format", "done", "failed", "errors")
+_FORMAT = 2
 
 
 class Failure(NamedTuple):
@@ -125,8 +123,8 @@ class Sweep:
     def save(self, path: StrPath) -> None:
         """Write a file that ``numpy.load`` reads too; one that is there is replaced at once.
 
-        Its arrays are ``parameters/NAME``, ``values/NAME``, ``done`` (n,), and of those that
-        failed ``failed`` (k,), their places, and ``errors`` (k,).
+        Its arrays are ``parameters/NAME``, ``values/NAME``, ``status`` and ``errors``, of which
+        each has a row for a member.
 
         Parameters
         ----------
@@ -142,10 +140,8 @@ class Sweep:
         """
         path = require_path("path", path, (".npz",))
         require_plain(self.parameters)
-        failures = self.failures
-        arrays = {"format": np.array(_FORMAT), "done": self.status == "done",
-                  "failed": np.array([f.member for f in failures], dtype=int),
-                  "errors": np.array([f.error for f in failures], dtype=str)}
+        arrays = {"format": np.array(_FORMAT), "status": self.status,
+                  "errors": np.array([self._errors.get(k, "") for k in range(len(self))])}
         for folder, columns in (("parameters", self.parameters), ("values", self.values)):
             arrays.update((f"{folder}/{name}", column) for name, column in columns.items())
         try:
@@ -169,43 +165,34 @@ class Sweep:
         """
         path = require_path("path", path, (".npz",))
         try:
-            arrays = read(path)
-            columns: dict[str, dict[str, Array]] = {"parameters": {}, "values": {}}
-            for key, x in arrays.items():
-                folder, _, name = key.partition("/")
-                if key in _OWN:
-                    continue
-                if folder not in columns or x.dtype.kind == "S":
-                    raise Unreadable(f"the array {key!r} belongs to none")
-                columns[folder][name] = x
-            done, errors = _states(arrays)
-            if any(x.shape[:1] != done.shape for part in columns.values() for x in part.values()):
-                raise Unreadable("its arrays are not of equal length")
-            if not columns["parameters"] or done.any() and not columns["values"]:
-                raise Unreadable("arrays are missing")
-            if any(x.dtype.kind not in "fc" for x in columns["values"].values()):
-                raise Unreadable("its values are no floats")
+            parameters, values, status, errors = _read(path)
         except (OSError, Unreadable) as error:
             raise FileError(f"{path} cannot be read as a sweep: {error}") from error
-        return cls(columns["parameters"], [
-            {name: column[k] for name, column in columns["values"].items()} if done[k]
-            else str(errors[k]) if k in errors else None for k in range(len(done))])
+        return cls(parameters, [
+            {name: column[k] for name, column in values.items()} if word == "done"
+            else str(errors[k]) if word == "failed" else None for k, word in enumerate(status)])
 
 
-def _states(arrays):
-    """Which members are done (n,), and errors by the number of a member."""
-    missing = [name for name in _OWN if name not in arrays]
-    if missing:
-        raise Unreadable(f"{missing} are missing")
-    form, done, failed, errors = (arrays[name] for name in _OWN)
-    if form.shape or form.dtype.kind not in "iu" or form != _FORMAT:
-        raise Unreadable("it is of another version")
-    if (done.dtype.kind != "b" or failed.dtype.kind not in "iu" or errors.dtype.kind != "U"
-            or done.ndim != 1 or failed.ndim != 1 or failed.shape != errors.shape
-            or len(set(failed.tolist())) < len(failed)
-            or any(not 0 <= k < len(done) or done[k] for k in failed.tolist())):
-        raise Unreadable("what it says of its members does not fit")
-    return done, dict(zip(failed.tolist(), errors))
+def _read(path):
+    """Parameters, values, status and errors of a file; raises Unreadable."""
+    arrays = read(path)
+    form = arrays.pop("format", None)
+    if form is None or form.shape or form.dtype.kind not in "iu" or form != _FORMAT:
+        raise Unreadable("it is of another version, or of something else")
+    status, errors = (arrays.pop(name, np.zeros(0)) for name in ("status", "errors"))
+    columns = {"parameters": {}, "values": {}}
+    for key, x in arrays.items():
+        folder, _, name = key.partition("/")
+        if folder not in columns or x.dtype.kind == "S" or folder == "values" and (
+                x.dtype.kind not in "fc"):
+            raise Unreadable(f"the array {key!r} belongs to none")
+        columns[folder][name] = x
+    if not set(status.tolist()) <= {"done", "failed", "open"} or errors.dtype.kind != "U" or any(
+            x.shape[:1] != status.shape for x in (errors, *arrays.values())):
+        raise Unreadable("its arrays do not fit together")
+    if not columns["parameters"] or "done" in status and not columns["values"]:
+        raise Unreadable("arrays are missing")
+    return *columns.values(), status, errors
 
 
 def _plain(x):
@@ -214,14 +201,7 @@ def _plain(x):
 
 
 def column_of(values: Sequence[Any]) -> Array:
-    """An array (n, ...) of n values: of numbers, texts or truth values, else of objects.
-
-    Examples
-    --------
-    >>> from skfem_ancf.sweeps.members import column_of
-    >>> column_of([1, 2.5]), column_of([None, (1, 2)]).dtype, column_of([True, 2.5]).dtype
-    (array([1. , 2.5]), dtype('O'), dtype('O'))
-    """
+    """An array (n, ...) of n values: of numbers, texts or truth values, else of objects."""
     try:
         column = np.array(values)
         types = {type(x) for x in values}
@@ -236,13 +216,7 @@ def column_of(values: Sequence[Any]) -> Array:
 
 
 def require_plain(columns: dict[str, Array]) -> None:
-    """Raise InputError if a parameter is neither numbers nor texts.
-
-    Parameters
-    ----------
-    columns
-        From name to array of shape (n, ...).
-    """
+    """Raise InputError if a parameter, an array (n, ...), is neither numbers nor texts."""
     for name, column in columns.items():
         if column.dtype.kind == "O":
             raise InputError(f"a file takes parameters that are numbers or texts; {name!r} has "
@@ -252,28 +226,16 @@ def require_plain(columns: dict[str, Array]) -> None:
 
 def _alike(found):
     """The same list; members unlike the first that is done are errors."""
+    def listed(values):
+        return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())
+
+    def shapes(values):
+        return {name: value.shape for name, value in values.items()}
+
     first = next((one for one in found if isinstance(one, dict)), {})
-    shapes = {name: value.shape for name, value in first.items()}
-    out = []
-    for one in found:
-        if isinstance(one, dict) and not _fits(one, shapes):
-            one = (f"CallbackError: measure returned {_listed(one)}, of the first member "
-                   f"{_listed(first)}: names and shapes must be those of all members")
-        out.append(one)
-    return out
-
-
-def _fits(values, shapes):
-    if len(values) != len(shapes):
-        return False
-    for name, shape in shapes.items():
-        if name not in values or values[name].shape != shape:
-            return False
-    return True
-
-
-def _listed(values):
-    return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())
+    return [one if not isinstance(one, dict) or shapes(one) == shapes(first) else
+            f"CallbackError: measure returned {listed(one)}, of the first member {listed(first)}: "
+            "names and shapes must be those of all members" for one in found]
 
 
 def _arrays(found, done):

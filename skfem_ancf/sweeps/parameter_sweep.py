@@ -116,41 +116,38 @@ def sweep(build: Callable[..., Any],
     True
     """
     require_function("build", build, "of the parameters that returns a scene")
-    measure = measured(measure)
+    task = Task(build, measured(measure))
     if workers is not None and client is not None:
         raise InputError("workers and client say both where to compute: give one of them")
     if workers is not None:
         workers = require_integer("workers", workers, 1)
-    members = _members(parameters)
+    values = _columns(parameters)
+    members = [dict(zip(values, row)) for row in zip(*values.values())]
+    if not members:
+        raise InputError(f"there are no members in the parameters {shown(parameters)}")
     _require_signature(build, members[0])
-    columns = {name: column_of(members.rows(name)) for name in members[0]}
-    record = _Record(columns, None if path is None else require_path("path", path, (".npz",)))
-    task, places = Task(build, measure), record.places
-    source = _source(task, members, places, workers, client)
+    record = _Record({name: column_of(column) for name, column in values.items()},
+                     None if path is None else require_path("path", path, (".npz",)))
+    places = record.places
+    if client is not None:
+        source = on_cluster(task, members, places, client)
+    elif workers is not None:
+        source = in_processes(task, members, places, workers)
+    else:
+        source = (in_threads if isinstance(task.measure, Probes) else here)(task, members, places)
     try:
         with (progress_bar(progress, len(members), "members") as bar, closing(source),
               expecting(len(places))):
             bar.update(len(members) - len(places))
-            for chunk, found in source:
-                record.add(chunk, found)
-                bar.update(len(chunk))
+            for k, found in source:
+                record.add(k, found)
+                bar.update(1)
     except KeyboardInterrupt:
-        raise Interrupted(record.stopped(), record.kept()) from None
+        raise Interrupted(record.stopped(), record.written()) from None
     except BaseException:
-        record.kept()
+        record.written()
         raise
-    return _judged(record.kept())
-
-
-def _source(task, members, places, workers, client):
-    """Chunks of members and what was found of them, as they come."""
-    if client is not None:
-        return on_cluster(task, members, places, client)
-    if workers is not None:
-        return in_processes(task, members, places, workers)
-    if isinstance(task.measure, Probes):
-        return in_threads(task, members, places)
-    return here(task, members, places)
+    return _judged(record.written())
 
 
 class _Record:
@@ -166,31 +163,26 @@ class _Record:
                 self.found = _done(path, columns)
         self.places = [k for k, one in enumerate(self.found) if one is None]
         if path is not None and self.places:
-            self.result().save(path)  # it can be written
+            Sweep(columns, self.found).save(path)  # it can be written
 
-    def add(self, places, found):
-        """Take what was found of members; write, if it is time to."""
-        for k, one in zip(places, found):
-            self.found[k] = one
+    def add(self, k, found):
+        """Take what was found of a member; write, if it is time to."""
+        self.found[k] = found
         if self.path is not None and time.monotonic() >= self.next:
             begun = time.monotonic()
-            self.kept()
+            self.written()
             now = time.monotonic()
             self.next = now + max(_SECONDS, _RARER * (now - begun))
 
-    def result(self):
-        """The Sweep so far."""
-        return Sweep(self.columns, self.found)
-
-    def kept(self):
+    def written(self):
         """The Sweep so far, in its file too; a warning where that cannot be written any more."""
-        result = self.result()
+        result = Sweep(self.columns, self.found)
         if self.path is not None:
             try:
                 result.save(self.path)
             except FileError as error:
                 warn(f"the results are not in the file, the sweep goes on: {error}",
-                              CheckpointWarning)
+                     CheckpointWarning)
         return result
 
     def stopped(self):
@@ -201,47 +193,25 @@ class _Record:
             if self.path is None else f"call again with {str(self.path)!r} to go on"))
 
 
-class _Members:
-    """Dicts of parameters, made when they are asked for: a sequence."""
-
-    def __init__(self, rows):
-        self._rows = rows
-
-    def rows(self, name):
-        """The values of a name, a list."""
-        return self._rows[name]
-
-    def __len__(self):
-        return len(next(iter(self._rows.values()), ()))
-
-    def __getitem__(self, k):
-        return {name: rows[k] for name, rows in self._rows.items()}
-
-
-def _members(parameters):
-    """Members, at least one, of equal names, at least one."""
+def _columns(parameters):
+    """Lists of values by name, of equal lengths."""
     if isinstance(parameters, Mapping) or hasattr(parameters, "columns"):  # of pandas
         columns = {name: _rows(name, values) for name, values in parameters.items()}
         lengths = {name: len(rows) for name, rows in columns.items()}
         if len(set(lengths.values())) > 1:
             raise InputError(f"the parameters must have equal lengths, got {lengths}; for all "
                              "combinations hand a list of dicts, made by itertools.product")
-    else:
-        if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
-            raise InputError("parameters must be a dict of arrays or a list of dicts, got "
-                             f"{shown(parameters)}")
-        members = list(parameters)
-        for k, member in enumerate(members):
-            if not isinstance(member, Mapping) or set(member) != set(members[0]):
-                raise InputError("parameters must be a dict of arrays, or a list of dicts with "
-                                 f"equal names; the first has {shown(members[0])}, number {k} is "
-                                 f"{shown(member)}")
-        columns = {name: [member[name] for member in members]
-                   for name in (members[0] if members else ())}
-    found = _Members(columns)
-    if not len(found):
-        raise InputError(f"there are no members in the parameters {shown(parameters)}")
-    return found
+        return columns
+    if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
+        raise InputError("parameters must be a dict of arrays or a list of dicts, got "
+                         f"{shown(parameters)}")
+    members = list(parameters)
+    for k, member in enumerate(members):
+        if not isinstance(member, Mapping) or set(member) != set(members[0]):
+            raise InputError("parameters must be a dict of arrays, or a list of dicts with "
+                             f"equal names; the first has {shown(members[0])}, number {k} is "
+                             f"{shown(member)}")
+    return {name: [member[name] for member in members] for name in (members[0] if members else ())}
 
 
 def _rows(name, values):

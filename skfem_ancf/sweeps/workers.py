@@ -1,4 +1,4 @@
-"""Where members of a sweep are computed: here, in other processes, on a cluster."""
+"""Where members of a sweep are computed: here, in threads, in processes, on a cluster."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import pickle
 import signal
 import sys
 from collections import deque
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import copy_context
 from functools import partial
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,58 +21,50 @@ from ..core.switch import expecting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable
-    from concurrent.futures import Future
 
     from ..core.types import Array
 
     #: Values by name, or the text of an error.
     Found = dict[str, Array] | str
-    Chunks = Generator[tuple[list[int], list[Found]], None, None]
+    Results = Generator[tuple[int, Found], None, None]
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-class Task:
+class Task(NamedTuple):
     """A member, from its parameters to what is measured.
 
-    Parameters
+    Attributes
     ----------
     build
         From the parameters to a scene.
     measure
         From the scene to a number, an array or a dict of them.
-
-    Attributes
-    ----------
     share
         Members that a process computes, about.
     """
 
-    def __init__(self, build: Callable[..., Any], measure: Callable[[Any], Any]) -> None:
-        self.build, self.measure, self.share = build, measure, 1.0
+    build: Callable[..., Any]
+    measure: Callable[[Any], Any]
+    share: float = 1.0
 
     def __call__(self, member: dict[str, Any]) -> Found:
         """What is measured of a member, by name, or the text of the error."""
-        return self.begun(member)()
+        with expecting(self.share):
+            return self.begun(member)()
 
     def begun(self, member: dict[str, Any]) -> Callable[[], Found]:
         """A function that measures the scene of a member, which is built now."""
         try:
             return partial(self._measured, self.build(**member), member)
         except Exception as error:  # of the caller's functions, which may raise anything
-            text = f"{type(error).__name__}: {error}"
-            return lambda: text
+            return partial(str, f"{type(error).__name__}: {error}")
 
     def _measured(self, scene, member):
         try:
             return _named(self.measure(scene), member)
         except Exception as error:
             return f"{type(error).__name__}: {error}"
-
-    def elsewhere(self, member: dict[str, Any]) -> Found:
-        """The same in another process."""
-        with expecting(self.share):
-            return self(member)
 
 
 def _named(value, member):
@@ -90,41 +82,24 @@ def _named(value, member):
     return found
 
 
-def here(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Chunks:
-    """Compute members in this process; yields their places and what was found.
-
-    Parameters
-    ----------
-    task
-        What is done with each.
-    members
-        Parameters of all.
-    places
-        Which of them are computed.
-    """
+def here(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Results:
+    """Compute the members at some places here; yields the place of each and what was found."""
     for k in places:
-        yield [k], [task(members[k])]
+        yield k, task(members[k])
 
 
-def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Chunks:
-    """As :func:`here`, measured in as many threads as there are processors, built one by one.
-
-    Parameters
-    ----------
-    task, members, places
-        As there.
-    """
-    threads = processors()
-    flying: deque[tuple[int, Future[Found]]] = deque()
+def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Results:
+    """As :func:`here`, measured in as many threads as there are processors, built one by one."""
+    threads, flying = processors(), deque()  # type: ignore[var-annotated]
     with ThreadPoolExecutor(threads) as pool:
         try:
             for k in places:
                 flying.append((k, pool.submit(copy_context().run, task.begun(members[k]))))
                 if len(flying) > 2 * threads:
                     first, future = flying.popleft()
-                    yield [first], [future.result()]
+                    yield first, future.result()
             for k, future in flying:
-                yield [k], [future.result()]
+                yield k, future.result()
         finally:
             pool.shutdown(cancel_futures=True)
 
@@ -138,75 +113,48 @@ def processors() -> int:
 
 
 def in_processes(task: Task, members: list[dict[str, Any]], places: Iterable[int], workers: int
-                 ) -> Chunks:
-    """As :func:`here`, in processes of this computer, started anew ("spawn").
-
-    Parameters
-    ----------
-    task, members, places
-        As there.
-    workers
-        How many.
-
-    Raises
-    ------
-    PickleError
-        If the functions cannot be sent to another process.
-    """
-    _require_sendable(task)
+                 ) -> Results:
+    """As :func:`here`, in processes of this computer, started anew ("spawn")."""
+    for what, function in (("build", task.build), ("measure", task.measure)):
+        _require_sendable(what, function)
     with _Pool(workers) as pool:
         yield from _spread(pool.submit, workers, task, members, places)
 
 
 def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int], client: Any
-               ) -> Chunks:
-    """As :func:`here`, by the workers of a Dask client.
-
-    Parameters
-    ----------
-    task, members, places
-        As there.
-    client
-        A ``dask.distributed.Client``.
-
-    Raises
-    ------
-    InputError
-        If it is no client, or has no workers.
-    """
+               ) -> Results:
+    """As :func:`here`, by the workers of a Dask client."""
     require_like("client", client, "dask.distributed.Client", "submit", "nthreads")
-    lanes = sum(client.nthreads().values())
-    if lanes < 1:
+    workers = sum(client.nthreads().values())
+    if workers < 1:
         raise InputError("client has no workers: start some, or client.wait_for_workers(n)")
-    yield from _spread(partial(client.submit, pure=False), lanes, task, members, places)
+    yield from _spread(partial(client.submit, pure=False), workers, task, members, places)
 
 
-def _require_sendable(task):
-    named = [("build", task.build), ("measure", task.measure)]
-    for what, function in named:
-        try:
-            pickle.dumps(function)
-        except Exception as error:  # what a function holds may raise anything
-            raise PickleError(
-                f"{what}, {shown(function)}, cannot be sent to another process: {error}. Define "
-                "it by def at the top of a module") from error
-        main = sys.modules["__main__"]
-        if getattr(function, "__module__", None) == "__main__" and not hasattr(main, "__file__"):
-            raise PickleError(f"{what}, {shown(function)}, was typed where other processes cannot "
-                              "find it: write it to a module and import it, leave workers out, or "
-                              "hand a client of dask.distributed, which sends any function")
+def _require_sendable(what, function):
+    try:
+        pickle.dumps(function)
+        found = (getattr(function, "__module__", None) != "__main__"
+                 or hasattr(sys.modules["__main__"], "__file__"))
+        why = "it was typed where other processes cannot find it"
+    except Exception as error:  # what a function holds may raise anything
+        found, why = False, str(error)
+    if not found:
+        raise PickleError(f"{what}, {shown(function)}, cannot be sent to another process: {why}. "
+                          "Define it by def at the top of a module, leave workers out, or hand a "
+                          "client of dask.distributed, which sends any function by cloudpickle")
 
 
 class _Pool:
     """Processes that are started again where one has died."""
 
     def __init__(self, workers):
-        self.workers = workers
+        import multiprocessing  # takes long
+
+        self.workers, self.processes = workers, multiprocessing
+        self.others = set(multiprocessing.active_children())
 
     def __enter__(self):
-        from multiprocessing import active_children
-
-        self.others = set(active_children())
         self.start()
         try:
             self.submit(os.getpid).result()
@@ -218,14 +166,11 @@ class _Pool:
 
     def start(self):
         from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import get_context
 
-        self.pool = ProcessPoolExecutor(self.workers, get_context("spawn"), _quiet)
+        self.pool = ProcessPoolExecutor(self.workers, self.processes.get_context("spawn"), _quiet)
 
     def submit(self, *call):
         """A future, of other processes if one of these has died."""
-        from concurrent.futures import BrokenExecutor
-
         with _single_threads():
             try:
                 return self.pool.submit(*call)
@@ -235,10 +180,8 @@ class _Pool:
                 return self.pool.submit(*call)
 
     def __exit__(self, kind, error, trace):
-        from multiprocessing import active_children
-
         if kind is not None:  # no one waits for what they are doing
-            for process in set(active_children()) - self.others:
+            for process in set(self.processes.active_children()) - self.others:
                 process.terminate()
         self.pool.shutdown(cancel_futures=True)
 
@@ -260,21 +203,21 @@ def _single_threads():
             del os.environ[name]
 
 
-def _spread(submit, lanes, task, members, places):
-    """Members in flight, two for each lane; what came back, as it comes.
+def _spread(submit, workers, task, members, places):
+    """Members in flight, two for each worker; what came back, as it comes.
 
     Members that were in flight when a worker died are computed again, one at a time, so that the
     one which kills is known.
     """
     places, again, flying, back = deque(places), deque(), {}, SimpleQueue()
-    task.share = len(places) / lanes
+    task = task._replace(share=len(places) / workers)
     try:
         while places or again or flying:
             alone = bool(again)
-            source, most = (again, 1) if alone else (places, 2 * lanes)
+            source, most = (again, 1) if alone else (places, 2 * workers)
             while source and len(flying) < most:
                 k = source.popleft()
-                future = submit(task.elsewhere, members[k])
+                future = submit(task, members[k])
                 flying[future] = k, alone
                 future.add_done_callback(back.put)
             future = back.get()
@@ -286,7 +229,7 @@ def _spread(submit, lanes, task, members, places):
                     again.append(k)
                     continue
                 found = f"{type(error).__name__}: {error}"
-            yield [k], [found]
+            yield k, found
     finally:
         for future in flying:
             future.cancel()
