@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from conftest import quarter_arc, s_curve
 from test_points import STEEL, inside
@@ -158,24 +158,6 @@ def test_fields_of_a_point_of_an_arc(xi, eta, e, element):
 
 
 STATES: dict = {}
-
-
-@pytest.mark.parametrize("mesh", [quarter_arc(8, height=0.1), s_curve(0.1)], ids=["arc", "s"])
-def test_many_points_begin_in_squares_as_few_in_a_tree(mesh):
-    x = inside(mesh, 300)[2]
-    x = np.hstack([x, np.random.default_rng(5).uniform(-3.0, 3.0, (2, 3000))])
-    many = finder.Finder(mesh)
-    by_squares = many(x)
-    assert many._of_squares is not None
-    few = finder.Finder(mesh)
-    one_by_one = [few(p[:, None]) for p in x.T]
-    assert few._of_squares is None
-    for found, alone in zip(by_squares, zip(*one_by_one)):
-        alone = np.concatenate(alone, axis=-1)
-        inner = by_squares[2] == 0
-        assert_allclose(found[..., inner], alone[..., inner], atol=1e-12)
-    assert_array_equal(by_squares[2] > many.allowed,
-                       np.concatenate([alone[2] for alone in one_by_one]) > many.allowed)
 
 
 @pytest.mark.parametrize("mesh", [quarter_arc(1, height=0.4), s_curve(0.4),

@@ -8,6 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import lagrange
 
 from ..core.errors import CallbackError, MeshError, ask_array, warnings_as_errors
 from ..core.quadrature import gauss
@@ -88,30 +89,17 @@ class Curve:
         return _turning(*_each(self._moving, s, at), *rule)
 
     def lengths(self, a: Array, b: Array) -> Array:
-        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,).
-
-        Parameters
-        ----------
-        a, b
-            Parameters where the pieces begin and end, shapes (n,).
-        """
+        """Arc lengths from parameters ``a`` to ``b``, all of shape (n,)."""
         at, w = _gauss_points(a, b - a)
         d, = _each(self.rate, at)
         return np.hypot(*d) @ w * (b - a)
 
     def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """What a mesh asks of a curve, which is asked at all points at once.
+        """Positions, unit tangents, lengths, turning and curvature for nodes at parameters (n,).
 
-        Parameters
-        ----------
-        s
-            Parameters of the nodes, increasing, shape (n,).
-
-        Returns
-        -------
-        p, tangent, lengths, turning, bent
-            As :meth:`nodes`, :meth:`lengths` and :meth:`turning` return them, and the curvature of
-            each sixteenth of the elements, shape (16 n - 16,).
+        Positions and tangents are those of :meth:`nodes`, lengths those of the elements, the
+        turning that of :meth:`turning`, and the curvature that of each sixteenth of the elements,
+        (16 n - 16,).
 
         Raises
         ------
@@ -142,13 +130,7 @@ class Curve:
         return p.copy(), here / np.hypot(*here), lengths, _turning(here, d_near, *rule), bent
 
     def moved(self, A: Array, shift: Array) -> Curve:
-        """The curve ``A r(s) + shift``.
-
-        Parameters
-        ----------
-        A, shift
-            Shapes (2, 2) and (2,).
-        """
+        """The curve ``A r(s) + shift``."""
         return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
 
 
@@ -183,15 +165,7 @@ class _Differences:
 
 
 def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[Array], Array]:
-    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences.
-
-    Parameters
-    ----------
-    r
-        Function of parameters (n,) that returns (2, n).
-    s0, s1
-        The ends of the parameters.
-    """
+    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
     differences, complex_step = _Differences(r, s0, s1), _ComplexStep(r)
     try:
         probe = s0 + (s1 - s0) * TRIED
@@ -272,24 +246,14 @@ def _require_no_kink(s, p, beside):
 @cache
 def _lagrange_derivatives():
     """Of each Lagrange polynomial of the stencil the coefficients of its derivative, (7, 6)."""
-    out = []
-    for i, here in enumerate(STENCIL):
-        others = np.delete(STENCIL, i)
-        out.append(np.polyder(np.poly(others) / np.prod(here - others)))
-    return np.array(out)
+    return np.array([np.polyder(lagrange(STENCIL, row).coef) for row in np.eye(len(STENCIL))])
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
     """Raise MeshError where the radius of curvature of the curve is below h/2.
 
-    Parameters
-    ----------
-    bent
-        The curvature of sixteenths of the elements, shape (16 n - 16,).
-    s
-        Parameters of the nodes, shape (n,).
-    height
-        Height of the section, or the largest between two nodes, shape (n - 1,).
+    ``bent`` is the curvature of sixteenths of the elements (16 n - 16,), ``s`` are the parameters
+    of the nodes, and ``height`` is that of the section, or the largest of each element (n - 1,).
     """
     height = np.broadcast_to(height, len(s) - 1).repeat(16)
     k = int(np.argmax(bent * height))

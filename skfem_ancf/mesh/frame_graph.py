@@ -192,32 +192,19 @@ class Net:
     def nodes_at(self, place: Any) -> Array:
         """Numbers of the nodes at a place, shape (k,), k >= 1.
 
-        Parameters
-        ----------
-        place
-            The name of nodes, or of lines for their ends, the number of a node, a point as a tuple
-            (x, y), a function of the points x (2, n) that returns n truth values, an array of
-            numbers, an array of points (k, 2), or a list of these.
+        A place is the name of nodes, or of lines for their ends, the number of a node, a point as a
+        tuple (x, y), a function of the points x (2, n) that returns n truth values, an array of
+        numbers, an array of points (k, 2), or a list of these.
 
         Raises
         ------
-        NameUnknown
-            If a name is not known.
-        MeshError
-            If there is no node at the place.
-        InputError
-            If it is no place.
+        NameUnknown, MeshError, InputError
+            If a name is not known, there is no node at the place, or it is no place.
         """
         return np.unique(self.same[self.points_at(place)])
 
     def points_at(self, place: Any) -> Array:
-        """As :meth:`nodes_at`, of each node all points that are given there, or one.
-
-        Parameters
-        ----------
-        place
-            As there.
-        """
+        """As :meth:`nodes_at`, of each node all points that are given there, or one."""
         require_unmasked("place", place)
         n, place = self.points.shape[1], points_of_rows(place)
         if isinstance(place, str):
@@ -257,13 +244,7 @@ class Net:
         return np.array([k])
 
     def lines_of(self, given: Any) -> Array:
-        """Numbers of lines, shape (k,), from the name of a group, a number, or a list of these.
-
-        Parameters
-        ----------
-        given
-            As above.
-        """
+        """Numbers of lines, shape (k,), from the name of a group, a number, or a list of these."""
         if isinstance(given, str):
             if given not in self.groups:
                 raise NameUnknown("group of lines", given, self.groups)
@@ -274,17 +255,11 @@ class Net:
                                          self.lines.shape[1] - 1)])
 
     def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
-        """A mesh with a chain of elements for each of some lines, in their order.
+        """A mesh with a chain of elements for each of some lines (k,), in their order.
 
-        Parameters
-        ----------
-        lines
-            Their numbers, shape (k,).
-        elements
-            How many each of all lines is divided into, shape (m,).
-        height
-            Of the section: a number, a function of parameters s (n,) from 0 to 1 along each line
-            that returns heights (n,), or a list with one of these for each of the lines.
+        ``elements`` (m,) says how many each of all lines is divided into; ``height`` is a number, a
+        function of parameters s (n,) from 0 to 1 along each line that returns heights (n,), or a
+        list with one of these for each of the lines.
         """
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])
@@ -325,15 +300,7 @@ class Net:
 
 
 def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
-    """A dict that was given, or an empty one for None.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    given
-        What was given.
-    """
+    """A dict that was given, or an empty one for None."""
     if given is not None and not isinstance(given, Mapping):
         raise InputError(f"{name} must be a dict, got {shown(given)}")
     return given or {}
@@ -516,10 +483,9 @@ def _require_sets_of_abaqus(path):
 
 
 def _ends_first(points, cell):
-    """The points of a line: both ends, then what is between them.
+    """The points of a line: both ends, then what is between them, as in all formats but Abaqus.
 
-    So meshio has them of all formats but Abaqus, whose quadratic lines are end, middle, end: of
-    three points those farthest apart are the ends.
+    Its quadratic lines are end, middle, end: of three points those farthest apart are the ends.
     """
     if len(cell) != 3:
         return cell

@@ -11,15 +11,11 @@ from ..core.errors import MeshError
 from ..core.kept import cached_property
 
 if TYPE_CHECKING:
-    from .chain import Chain
     from ..core.types import Array
 
 #: Samples of each element in the tree of the finder, and candidates for a point that is in none of
 #: the elements next to its nearest sample.
 SAMPLES, CANDIDATES = 4, 6
-
-#: Squares of the plane of which a finder remembers what is near, at most.
-MOST = 2**20
 
 
 class Finder:
@@ -31,34 +27,20 @@ class Finder:
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh: Chain) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: Any) -> None:
+        self.mesh, self.mapping = mesh, mesh.mapping()
         self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
         self.allowed = 1e-6 if mesh.is_straight else 1e-3
-        #: Where points begin, for squares of the plane, once there were more of them than squares.
-        self._of_squares: Array | None = None
         self._line = self._straight_line()
 
-    @property
-    def mapping(self) -> Any:
-        """That of the mesh, which keeps it."""
-        return self.mesh.mapping()
-
     @cached_property
-    def _cell(self):
-        return 0.5 * float(np.min(self.mesh.lengths))
-
-    @cached_property
-    def _before(self):
+    def _beside(self):
+        """The element before each in its chain, and the one after it, (2, nelements); or -1."""
         left, right = self.mesh.t
-        return np.where(np.append(False, right[:-1] == left[1:]),
-                        np.arange(self.mesh.nelements) - 1, -1)
-
-    @cached_property
-    def _after(self):
-        return np.append(np.where(self._before[1:] >= 0, np.arange(1, self.mesh.nelements), -1),
-                         -1)
+        joined, e = right[:-1] == left[1:], np.arange(self.mesh.nelements)
+        return np.array([np.append(-1, np.where(joined, e[:-1], -1)),
+                         np.append(np.where(joined, e[1:], -1), -1)])
 
     def _straight_line(self):
         """Start and direction of the one line of all elements, and their ends on it, or None."""
@@ -78,8 +60,8 @@ class Finder:
     def __call__(self, x: Array) -> tuple[Array, Array, Array]:
         """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
 
-        The last is zero for points of the body, and relative to the element; infinite for points
-        that are far away. Of several chains that hold a point it is the one whose axis is nearest.
+        The last is zero for points of the body, relative to the element, and infinite far away. Of
+        several chains that hold a point it is the one whose axis is nearest.
         """
         e, X, outside, _ = self.find(x)
         return e, X, outside
@@ -87,12 +69,7 @@ class Finder:
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """As a call; and of each point whether the axes of several chains are nearest, (n,).
 
-        Parameters
-        ----------
-        x
-            Points, shape (2, n).
-        chain
-            The chain of elements in which they are looked for; None for all.
+        With a number ``chain`` points are looked for in this chain of elements alone.
         """
         noise = 1e-9 + 8 * np.finfo(float).eps * (
             self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
@@ -113,13 +90,7 @@ class Finder:
         return e, X, outside, tied
 
     def from_axis(self, e: Array, X: Array) -> Array:
-        """How far points of elements are from the axis, shape (n,).
-
-        Parameters
-        ----------
-        e, X
-            Elements (n,) and reference points (2, n).
-        """
+        """How far reference points (2, n) of elements (n,) are from the axis, shape (n,)."""
         height = np.ravel(self.mapping.height(X[0][:, None], e)[0])
         return np.abs(X[1] - 0.5) * height
 
@@ -210,34 +181,6 @@ class Finder:
         outside[outside > 1.0] = np.inf
         return e, X, outside
 
-    def _nearest(self, x):
-        """Samples (n,) near points, and whether these are far from all.
-
-        Of many points the sample nearest to the middle of their square of the plane.
-        """
-        low, shape = self._squares
-        if self._of_squares is None and np.prod(shape) > min(x.shape[1], MOST):
-            distance, near = self._tree.query(x.T)
-            return near, distance > self._far
-        if self._of_squares is None:
-            middles = low[:, None, None] + self._cell * (0.5 + np.indices(shape.astype(int)))
-            distance, near = self._tree.query(middles.reshape(2, -1).T)
-            self._of_squares = np.where(distance > self._far + self._cell, -1, near).reshape(
-                middles.shape[1:])
-        place = (x - low[:, None]) / self._cell
-        inside = np.all((place >= 0.0) & (place < shape[:, None]), axis=0)
-        i, j = np.where(inside, place, 0.0).astype(int)
-        near = self._of_squares[i, j]
-        far = ~inside | (near < 0)
-        return np.where(far, 0, near), far
-
-    @cached_property
-    def _squares(self):
-        """The corner of those that hold the body, and how many there are each way."""
-        margin = self._far + self._cell
-        low, high = self._samples.min(axis=1) - margin, self._samples.max(axis=1) + margin
-        return low, np.ceil((high - low) / self._cell)
-
     @cached_property
     def _samples(self):
         samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
@@ -265,8 +208,8 @@ class Finder:
 
     def _near(self, x, noise):
         """From the nearest sample, and to the neighbour where the point is beyond a node."""
-        near, far = self._nearest(x)
-        e = near // SAMPLES
+        distance, near = self._tree.query(x.T)
+        e, far = near // SAMPLES, distance > self._far
         X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
         todo = np.nonzero(~far)[0]
         xi = (near % SAMPLES + 0.5) / SAMPLES
@@ -274,8 +217,9 @@ class Finder:
             X[:, todo] = self.mapping.invF(x[:, todo, None], e[todo], xi=xi[todo, None])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)
             # a point of the section between two elements is one of the left
-            other = np.where(X[0, todo] <= noise, self._before[e[todo]],
-                             np.where(X[0, todo] > 1.0 + noise, self._after[e[todo]], -1))
+            before, after = self._beside[:, e[todo]]
+            other = np.where(X[0, todo] <= noise, before,
+                             np.where(X[0, todo] > 1.0 + noise, after, -1))
             todo, other = todo[other >= 0], other[other >= 0]
             if not len(todo):
                 break
@@ -305,16 +249,7 @@ class Finder:
                 f"{low[1]:.6g} to {high[1]:.6g}")
 
     def refuse(self, x: Array, outside: Array, chain: int | None = None) -> MeshError:
-        """The MeshError for points that are outside.
-
-        Parameters
-        ----------
-        x
-            All points, shape (2, n).
-        outside
-            How far outside each of them is, as the finder says, shape (n,).
-        chain
-            The chain of elements in which they were looked for; None for all.
+        """The MeshError for points (2, n), of which some are ``outside``, as the finder says, (n,).
         """
         bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
         x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"

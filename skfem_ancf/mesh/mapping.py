@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .chain import Chain
     from ..core.types import Array
 
 #: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
@@ -77,7 +76,7 @@ class MappingBeam(Mapping):
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh: Chain) -> None:
+    def __init__(self, mesh: Any) -> None:
         self.mesh = mesh
         self.dim = 2
 
@@ -152,12 +151,7 @@ class MappingBeam(Mapping):
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
         """The height of the section and its derivative by xi; numbers where it is constant.
 
-        Parameters
-        ----------
-        xi
-            Places along the elements, shape (npoints,) or (nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
+        At places xi of shape (npoints,) or (nelements, npoints).
         """
         g, rate = self._relative(xi, tind)
         return self.mesh.height * g, self.mesh.height * rate
@@ -187,20 +181,7 @@ class MappingBeam(Mapping):
     # the map and its derivatives
 
     def F(self, X: Array, tind: Array | None = None) -> Array:
-        """The points of the body of reference points.
-
-        Parameters
-        ----------
-        X
-            Reference points (xi, eta), shape (2, npoints) or (2, nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
-
-        Returns
-        -------
-        ndarray
-            Shape (2, nelements, npoints).
-        """
+        """The points of the body of reference points, (2, nelements, npoints)."""
         axis, director = self._coefficients(tind)
         across = self._sum(director, (X[1] - 0.5) * self._director(X[0]))
         return self._sum(axis, self._axis(X[0])) + self._relative(X[0], tind)[0] * across
@@ -303,23 +284,10 @@ class MappingBeam(Mapping):
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
              xi: ArrayLike = 0.5) -> Array:
-        """The reference points of points of the body, by Newton's method; outside the cell too.
+        """The reference points of points x of the body, by Newton's method; outside the cell too.
 
-        Parameters
-        ----------
-        x
-            Points, shape (2, nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
-        max_iterations
-            Corrections at most.
-        xi
-            To start from, of any shape that fits (nelements, npoints).
-
-        Returns
-        -------
-        ndarray
-            Shape (2, nelements, npoints); NaN where no such point was found.
+        Both are of shape (2, nelements, npoints); NaN where no such point was found after
+        ``max_iterations`` corrections from ``xi``, of any shape that fits (nelements, npoints).
         """
         some = slice(None) if tind is None else tind
         axis, director, beside = (c[..., some, None] for c in self._powers)
@@ -353,14 +321,9 @@ class MappingBeam(Mapping):
         return tind, np.argmax(m.t2f[:, tind] == find, axis=0)
 
     def facet_points(self, X: Array, find: Array | None = None) -> tuple[Array, Array]:
-        """Elements (nf,) and reference points (2, nf, np) of points of facets.
+        """Elements (nf,) and reference points (2, nf, np) of points of facets ``find``, or all.
 
-        Parameters
-        ----------
-        X
-            Points along the facets, shape (1, np) or (1, nf, np), in [0, 1].
-        find
-            Numbers of facets, shape (nf,), or None for all.
+        ``X`` are points along the facets, shape (1, np) or (1, nf, np), in [0, 1].
         """
         tind, local = self._facet_elements(find)
         s = np.broadcast_to(X[0], (len(tind), X.shape[-1]))
@@ -382,18 +345,10 @@ class MappingBeam(Mapping):
         return np.hypot(*np.where((local % 2 == 0)[:, None], J[:, 0], J[:, 1]))
 
     def normals(self, X: Array, tind: Array, find: Array, t2f: Array) -> Array:
-        """Unit normals of facets, outward from the elements ``tind``, (2, nf, np).
+        """Unit normals of facets ``find`` (nf,), outward from elements ``tind`` (nf,): (2, nf, np).
 
-        Parameters
-        ----------
-        X
-            Reference points on the facets, shape (2, nf, np).
-        tind
-            An element of each facet, shape (nf,).
-        find
-            Numbers of the facets, shape (nf,).
-        t2f
-            Facets of all elements, shape (4, nelements).
+        ``X`` are reference points on the facets, (2, nf, np), and ``t2f`` the facets of all
+        elements.
         """
         local = np.argmax(t2f[:, tind] == find, axis=0)
         reference = self.mesh.elem.refdom.normals[local].T

@@ -18,13 +18,7 @@ if TYPE_CHECKING:
 
 
 def chain_of(s: Array) -> Array:
-    """Number of the chain of parameters that run from 2 k to 2 k + 1 along chain k.
-
-    Parameters
-    ----------
-    s
-        Parameters, shape (n,).
-    """
+    """Number of the chain of parameters (n,) that run from 2 k to 2 k + 1 along chain k."""
     return np.floor(0.5 * s).astype(int)
 
 
@@ -46,11 +40,8 @@ class MeshLines(MeshBeam):
 class Heights:
     """The height of chains, for parameters from 2 k to 2 k + 1 on chain k.
 
-    Parameters
-    ----------
-    given
-        For each chain, or for all of them, a number or a function of parameters (n,) from 0 to 1
-        that returns heights (n,).
+    ``given`` holds for each chain, or for all of them, a number or a function of parameters (n,)
+    from 0 to 1 that returns heights (n,).
     """
 
     def __init__(self, given: Sequence[float | Callable[[Array], Any]]) -> None:
@@ -78,21 +69,8 @@ def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
     """Largest height, heights in the elements and their function, as :func:`~.taper.heights_of`.
 
-    Parameters
-    ----------
-    height
-        A positive number, a function of parameters (n,) from 0 to 1 that returns heights (n,), or
-        a list with one of these for each chain.
-    s, t
-        Parameters of the nodes, shape (nvertices,), from 2 k to 2 k + 1 on chain k; and nodes of
-        the elements, (2, nelements).
-    numbers
-        What messages call the chains, shape (nchains,); None for 0, 1, ...
-
-    Raises
-    ------
-    InputError, MeshError
-        As there.
+    Of a positive number, a function of parameters (n,) from 0 to 1, or a list with one of these for
+    each chain, whose ``numbers`` messages name; ``s`` runs from 2 k to 2 k + 1 along chain k.
     """
     chain = chain_of(s)
     own = s - 2.0 * chain
@@ -115,14 +93,9 @@ def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
 class Axes:
     """The axes of the chains of a mesh, that of chain k for parameters from 2 k to 2 k + 1.
 
-    What a mesh asks of a :class:`~skfem_ancf.mesh.curve.Curve`.
-
-    Parameters
-    ----------
-    arcs
-        By the number of a chain its curve, for parameters from 0 to 1; others are straight.
-    start, way
-        Where each begins, and from there to its end, shapes (2, chains).
+    What a mesh asks of a :class:`~skfem_ancf.mesh.curve.Curve`. ``arcs`` has the curve of a chain,
+    for parameters from 0 to 1, by its number; others are straight, from ``start`` by ``way``, (2,
+    chains).
     """
 
     def __init__(self, arcs: Mapping[int, Curve], start: Array, way: Array) -> None:
@@ -152,13 +125,7 @@ class Axes:
         return out
 
     def lengths(self, a: Array, b: Array) -> Array:
-        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,).
-
-        Parameters
-        ----------
-        a, b
-            Parameters of the same chains, shapes (n,).
-        """
+        """Arc lengths from parameters ``a`` to ``b`` of the same chains, all of shape (n,)."""
         chain, x, parts = self._parts(a)
         y = b - 2 * chain
         out = (y - x) * np.hypot(*self.way[:, chain])
@@ -167,12 +134,6 @@ class Axes:
         return out
 
     def moved(self, A: Array, shift: Array) -> Axes:
-        """The axes ``A r(s) + shift``.
-
-        Parameters
-        ----------
-        A, shift
-            Shapes (2, 2) and (2,).
-        """
+        """The axes ``A r(s) + shift``."""
         return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
                     A @ self.start + shift[:, None], A @ self.way)

@@ -3,46 +3,26 @@
 from __future__ import annotations
 
 from math import factorial, perm
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from .chain import Chain
     from ..core.types import Array
 
 
 def turned(d: Array) -> Array:
-    """Vectors (2, ...) turned by a right angle: the normal's derivatives from the tangent's.
-
-    Parameters
-    ----------
-    d
-        Shape (2, ...).
-    """
+    """Vectors (2, ...) turned by a right angle: normals, and their derivatives, of tangents."""
     return np.array([-d[1], d[0]])
 
 
-def nodal_derivatives(mesh: Chain, most: int) -> list[Array]:
-    """Position of the stress-free axis at the nodes, and its derivatives by the arc length.
+def nodal_derivatives(mesh: Any, most: int) -> list[Array]:
+    """Position of the axis at the nodes, and ``most`` derivatives by the arc length, all (2, n).
 
-    Position, tangent and curvature are those of the mesh. A node takes the others of the
-    polynomial of degree 8 that has these three at the node and at its two neighbours in the chain,
-    at an end at the next two (of degree 5 where a chain is one element): they are those of the
-    curve but for the error of that interpolation, of order 9 in the position. Those of a straight
-    mesh are zero.
-
-    Parameters
-    ----------
-    mesh
-        A mesh, with ``p_XY`` where ``most`` is 2 or more.
-    most
-        Number of the highest derivative.
-
-    Returns
-    -------
-    list of ndarray
-        Each of shape (2, nvertices), from the position on: most + 1 of them.
+    Position, tangent and curvature are those of the mesh. A node takes the others of the polynomial
+    of degree 8 that has these three at the node and at its two neighbours in the chain, at an end
+    at the next two (of degree 5 where a chain is one element): they are those of the curve but for
+    the error of that interpolation, of order 9 in the position. Those of a straight mesh are zero.
     """
     known = [mesh.p, mesh.p_X]
     if most > 1 and mesh.p_XY is not None:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .chain import Chain
     from ..core.types import Array, Place
 
 #: How far off a section a point may be that names it, relative to an element next to it.
@@ -56,7 +55,7 @@ def is_place(place: object) -> bool:
     return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
 
 
-def as_point(point: Any, mesh: Chain | None = None) -> Array:
+def as_point(point: Any, mesh: Any = None) -> Array:
     """A material point as an array (2,): two coordinates, or with a mesh the name of a section.
 
     Raises MeshError for anything else.
@@ -79,7 +78,7 @@ def on_other_mesh(place: object) -> bool:
     return True
 
 
-def facets_of(mesh: Chain, place: Place) -> Array:
+def facets_of(mesh: Any, place: Place) -> Array:
     """Numbers of the facets that a place means, shape (n,), n >= 1.
 
     This is the one rule for every method that takes a place:
@@ -142,7 +141,7 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
 
 
-def node_of(mesh: Chain, place: Place) -> int:
+def node_of(mesh: Any, place: Place) -> int:
     """The node of a place that is one section; raises MeshError of others."""
     facets = np.asarray(facets_of(mesh, place))
     if len(facets) != 1 or facets[0] >= mesh.p.shape[1]:
@@ -151,7 +150,7 @@ def node_of(mesh: Chain, place: Place) -> int:
     return int(facets[0])
 
 
-def section_at(mesh: Chain, point: ArrayLike) -> int:
+def section_at(mesh: Any, point: ArrayLike) -> int:
     """The node on whose section a point (2,) of the stress-free body lies.
 
     It may be off by 1e-6 of the shorter element next to it. Raises MeshError if there is none, or
@@ -188,11 +187,11 @@ def _pair(x: Array) -> str:
     return f"({x[0]:.9g}, {x[1]:.9g})"
 
 
-def _names(mesh: Chain) -> str:
+def _names(mesh: Any) -> str:
     return ", ".join(repr(name) for name, facets in (mesh.boundaries or {}).items() if len(facets))
 
 
-def _named(mesh: Chain, name: str) -> Array:
+def _named(mesh: Any, name: str) -> Array:
     if name not in (mesh.boundaries or {}):
         raise NameUnknown("boundary", name, mesh.boundaries or {})
     facets = mesh.boundaries[name]
@@ -202,7 +201,7 @@ def _named(mesh: Chain, name: str) -> Array:
     return facets
 
 
-def _numbered(mesh: Chain, facets: Array) -> Array:
+def _numbered(mesh: Any, facets: Array) -> Array:
     if facets.dtype.kind not in "iu" or facets.ndim != 1 or not len(facets):
         raise InputError(f"facets are a one-dimensional array of integers that is not empty, got "
                          f"{shown(facets)}; a place may also be {KINDS.rsplit(', or', 1)[0]}")

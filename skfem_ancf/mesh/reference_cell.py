@@ -25,13 +25,7 @@ KEPT_POINTS = 512
 
 
 def few(X: Any) -> bool:
-    """True if the functions at points are kept: few, and the same of all elements.
-
-    Parameters
-    ----------
-    X
-        Reference points, shape (2, n) for all elements, or (2, nelements, n).
-    """
+    """True if the functions at points are kept: few, and the same of all elements, (2, n)."""
     return isinstance(X, np.ndarray) and X.ndim == 2 and X.shape[1] <= KEPT_POINTS
 
 
@@ -56,20 +50,7 @@ class RefBeam(Refdom):
 
     @classmethod
     def on_facet(cls, i: int, X: Array) -> Array:
-        """Which points lie on a facet.
-
-        Parameters
-        ----------
-        i
-            Number of the facet: bottom, right, top, left.
-        X
-            Reference points, shape (2, n).
-
-        Returns
-        -------
-        ndarray
-            Truth values, shape (n,).
-        """
+        """Which reference points (2, n) lie on a facet: bottom, right, top, left."""
         return (np.abs(X[1]) < 1e-4, np.abs(X[0] - 1) < 1e-4,
                 np.abs(X[1] - 1) < 1e-4, np.abs(X[0]) < 1e-4)[i]
 
@@ -84,20 +65,7 @@ class ElementBeamP1(ElementH1):
     refdom = RefBeam
 
     def lbasis(self, X: Array, i: int) -> tuple[Array, Array]:
-        """A local function and its derivative.
-
-        Parameters
-        ----------
-        X
-            Reference points, shape (2, ...).
-        i
-            Number of the function: 0, of the left node, or 1.
-
-        Returns
-        -------
-        value, gradient
-            Shapes (...) and (2, ...).
-        """
+        """The function of the left (0) or right (1) node at points (2, ...), and its gradient."""
         if i not in (0, 1):
             self._index_error()
         slope = 2.0 * i - 1.0
@@ -105,15 +73,7 @@ class ElementBeamP1(ElementH1):
 
 
 def linear(xi: ArrayLike, derivative: int = 0) -> Array:
-    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape.
-
-    Parameters
-    ----------
-    xi
-        Points, of any shape (...).
-    derivative
-        Number of derivatives.
-    """
+    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape."""
     xi = np.asarray(xi)
     one = np.ones_like(xi)
     if derivative == 0:
@@ -122,15 +82,7 @@ def linear(xi: ArrayLike, derivative: int = 0) -> Array:
 
 
 def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
-    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape.
-
-    Parameters
-    ----------
-    xi
-        Points, of any shape (...).
-    derivative
-        Number of derivatives, 0 to 2.
-    """
+    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape."""
     x = np.asarray(xi)
     if derivative == 0:
         return np.array([1.0 - x * x * (3.0 - 2.0 * x), x * (1.0 - x) ** 2,
@@ -167,15 +119,6 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
 
     Shape (2 m,) + xi.shape; m = 1 is :func:`linear`, m = 2 :func:`hermite`.
-
-    Parameters
-    ----------
-    m
-        Derivatives that are coordinates at each end, the 0th included.
-    xi
-        Points, of any shape (...).
-    derivative
-        Number of derivatives.
     """
     if m < 3 and derivative < 3:
         return (linear if m == 1 else hermite)(xi, derivative)

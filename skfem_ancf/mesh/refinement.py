@@ -16,19 +16,7 @@ if TYPE_CHECKING:
 
 
 def halved(mesh: Any, ix: Array) -> Any:
-    """The mesh with some elements halved; names are kept.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    ix
-        Numbers of elements, increasing, shape (k,).
-
-    Returns
-    -------
-    MeshBeam
-        New nodes are on the curve, where there is one.
+    """The mesh with elements ``ix`` (k,), increasing, halved; new nodes on the curve, names kept.
     """
     marked = np.zeros(mesh.nelements, dtype=bool)
     marked[ix] = True
@@ -65,17 +53,11 @@ def halved(mesh: Any, ix: Array) -> Any:
 
 
 def by_element(mesh: Any, at: Array) -> Any:
-    """The mesh of elements apart, whose sections turn as their axis beside some nodes.
+    """A curved mesh of elements apart, whose sections turn as their axis beside some nodes.
 
     Where sections are cubic along the elements, or of a higher degree, one rate of turning at a
-    node serves both sides: at a jump of the curvature it is that of neither.
-
-    Parameters
-    ----------
-    mesh
-        A curved :class:`~skfem_ancf.MeshBeam`.
-    at
-        Numbers of the elements that begin at these nodes, shape (k,).
+    node serves both sides: at a jump of the curvature it is that of neither. ``at`` (k,) are the
+    numbers of the elements that begin at these nodes.
     """
     mesh, n, node = mesh.with_sections("cubic"), mesh.nelements, mesh.t.T.ravel()
     fields: dict[str, Any] = {name: getattr(mesh, name)[:, node]
@@ -113,23 +95,17 @@ def _refined_names(mesh, m, first, marked, node):
     tags = mesh._boundaries
     if tags is None:
         return None
-    n, ne = mesh.p.shape[1], mesh.nelements
+    # of each facet the first child, and whether there is another behind it
+    n, children = m.p.shape[1], np.append(marked, marked)
+    start = np.concatenate([node, n + first, n + m.nelements + first])
+    two = np.append(np.zeros(len(node), dtype=bool), children)
     out = {}
     for name, facets in tags.items():
-        ori = getattr(facets, "ori", None)
         f = np.asarray(facets)
-        new, source = [], []
-        for k, facet in enumerate(f):
-            if facet < n:
-                children = [node[facet]]
-            else:
-                side, e = divmod(facet - n, ne)
-                start = m.p.shape[1] + side * m.nelements + first[e]
-                children = [start, start + 1] if marked[e] else [start]
-            new += children
-            source += [k] * len(children)
-        new = np.array(new, dtype=np.int32)
+        source = np.repeat(np.arange(len(f)), 1 + two[f])
+        new = start[f[source]] + np.append(False, source[1:] == source[:-1])[:len(source)]
         order = np.argsort(new, kind="stable")
-        out[name] = (new[order] if ori is None else
-                     OrientedBoundary(new[order], np.asarray(ori)[source][order]))
+        out[name] = new[order].astype(np.int32)
+        if getattr(facets, "ori", None) is not None:
+            out[name] = OrientedBoundary(out[name], np.asarray(facets.ori)[source][order])
     return out
