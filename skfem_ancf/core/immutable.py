@@ -1,11 +1,11 @@
-"""Objects that do not change once they are made; functions of arrays with a cache."""
+"""Objects that do not change once they are made."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
-from functools import cached_property, lru_cache, wraps
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,7 +13,6 @@ import numpy as np
 from .errors import ImmutableError, InputError, NameUnknown
 
 T = TypeVar("T")
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def read_only(value: T) -> T:
@@ -107,43 +106,3 @@ def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
                          "keep it as an attribute of that name, or give it to replace")
     return type(thing)(**{name: getattr(thing, name) for name in names if name not in changes},
                        **changes)
-
-
-class _Numbers:
-    """An array as a key: equal to others of the same shape, type and numbers."""
-
-    def __init__(self, array):
-        self.array, self.key = array, (array.shape, array.dtype.str, array.tobytes())
-
-    def __eq__(self, other):
-        return isinstance(other, _Numbers) and self.key == other.key
-
-    def __hash__(self):
-        return hash(self.key)
-
-
-def array_cache(maxsize: int) -> Callable[[Function], Function]:
-    """``functools.lru_cache`` for functions of arrays, whose results must be read-only.
-
-    Examples
-    --------
-    >>> @array_cache(maxsize=8)
-    ... def total(x):
-    ...     print("computed")
-    ...     return x.sum()
-    >>> total(np.ones(3)) == total(np.ones(3))
-    computed
-    True
-    """
-    def decorate(function):
-        @lru_cache(maxsize)
-        def of_keys(*keys):
-            return function(*(k.array if isinstance(k, _Numbers) else k for k in keys))
-
-        @wraps(function)
-        def cached(*args):
-            return of_keys(*(_Numbers(a) if isinstance(a, np.ndarray) else a for a in args))
-
-        return cached
-
-    return decorate

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from .errors import InputError, require_finite, require_integer, shown
-from .immutable import array_cache
+from .caching import array_cache
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 from contextlib import contextmanager
+from copy import copy
+from functools import cached_property
 from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,7 +14,6 @@ import numpy as np
 from . import compiled
 from .compiled.words import Kept
 from .tables import Tables
-from ..core.kept import cached_property, twin_of
 from ..beam.kernels.law import OWN
 from ..beam.kernels.section import SectionPack
 from ..core.progress import announced_bar
@@ -103,7 +104,7 @@ class Machine:
         tables
             In place of its own.
         """
-        machine = twin_of(self)
+        machine = copy(self)
         machine.tables, machine._kept = tables, self._kept.of(self._rooms.values())
         vars(machine).pop("linearised", None)
         return machine

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.linear import stress_of
 from ..core.errors import require_like
-from ..core.frozen import Content
+from ..core.caching import ArrayKey
 from ..core.immutable import Immutable, read_only
 from ..core.quadrature import gauss, lagrange, product_rule
 
@@ -59,9 +59,9 @@ class Term:
         return read_only(X), read_only(W)
 
     @cached_property
-    def _places(self) -> Content:
+    def _places(self) -> ArrayKey:
         """Where it is sampled: places along of xx, yy and xy, and places across."""
-        return Content(*map(self.nodes, COMPONENTS), self.section_nodes)
+        return ArrayKey(*map(self.nodes, COMPONENTS), self.section_nodes)
 
     def nodes(self, component: str) -> Array:
         """Where along the axis a component is sampled, shape (m,)."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
 from ..core.errors import MeshError
-from ..core.kept import cached_property
 
 if TYPE_CHECKING:
     from ..core.types import Array

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.frozen import Content
+from ...core.caching import ArrayKey
 from ...core.linear import first_order, step
 from ...core.source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ...core.types import Array
@@ -393,7 +393,7 @@ def pair_tables(table: Array, pairs: Array, constant: Array, elements: int) -> P
         Their number.
     """
     nb, (g, h), places = table.shape[2], pairs, _places(table.shape[2])
-    off, number, partners, rounds = _partners(Content(pairs))
+    off, number, partners, rounds = _partners(ArrayKey(pairs))
     (a, b), (c, d) = places.lower, places.strictly
     symmetric, skew = np.zeros((0, len(a), len(g))), np.zeros((0, len(c), np.sum(off) + 1))
     if table.shape[0] == 1:
@@ -418,7 +418,7 @@ def scaled_pair_tables(table: Array, rows: Array, columns: Array, pairs: Array, 
     pairs, constant, elements
         As there, shapes (2, p) and (0, 1 or elements, 2 nb, 2 nb).
     """
-    unit, ends = _unit_pairs(Content(table, pairs))
+    unit, ends = _unit_pairs(ArrayKey(table, pairs))
     of_pair = rows.take(pairs[0]) * rows.take(pairs[1])
     (a, b), (c, d) = unit.lower, unit.strictly
     symmetric = np.multiply.outer(columns.take(a) * columns.take(b), of_pair)[None]

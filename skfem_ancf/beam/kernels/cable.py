@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...core.frozen import read_only
+from ...core.immutable import read_only
 from ...core.linear import first_order
 from ...core.quadrature import gauss
 from ...core.source import F2, F3, I1, lanes, primitive, room, shaped, source

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from ...core.frozen import Content
+from ...core.caching import ArrayKey
 from ...materials import LinearLaw
 from ...core.quadrature import product_rule
 from ...core.source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
@@ -491,7 +491,7 @@ class TermTables:
         whole = self.section_points == 1
         self.points, W = term.quadrature
         rows = {} if rows is None else rows
-        at = id(layer), Content(self.points, W)
+        at = id(layer), ArrayKey(self.points, W)
         if at not in rows:
             rows[at] = across.volume(layer, self.points, W, tind, whole)
         self.w = rows[at]
@@ -567,7 +567,7 @@ def _rows(mesh, element, at, tind, asked):
             len(samples.where[0]), slice(None) if tind is None else tind)
         return G, frame, samples, scaled if len(G) == 1 else None
     for X, G, frame in asked:
-        among = _among(Content(X, samples.X))
+        among = _among(ArrayKey(X, samples.X))
         if among is not None:
             G, frame = G.take(among, axis=2), frame.take(among, axis=2)
             break
@@ -679,7 +679,7 @@ def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums
         if len(several):  # else orthogonal
             least = 1e-14 * (sizes @ np.abs(D))
             keep[several] = (np.abs(moduli.take(several, axis=0)) > least).any(axis=1)
-    layout, shared = _layout(content, len(weights), Content(keep), linear), len(G) == 1
+    layout, shared = _layout(content, len(weights), ArrayKey(keep), linear), len(G) == 1
     if linear:
         moduli = moduli.take(layout.order, axis=0)
     if scaled is not None:
@@ -702,7 +702,7 @@ def _sums_of(samples, law, along, points):
     A key, how moduli come from those at the points, and what :func:`_joined` returns.
     """
     coupled = law.D != 0.0 if law.kind == LINEAR else np.ones((3, 3), bool)
-    content = Content(samples.rows, coupled, *along)
+    content = ArrayKey(samples.rows, coupled, *along)
     return content, _terms(content, points)[1:], *_joined(content, points // len(along[0]))
 
 
