@@ -62,15 +62,7 @@ class Motion:
 
 
 def interpolate(a: Motion, b: Motion, t: float) -> Motion:
-    """The motion at t between two instants: cubic in the displacement, linear in accelerations.
-
-    Parameters
-    ----------
-    a, b
-        The instants.
-    t
-        The time.
-    """
+    """The motion at t between two instants: cubic in the displacement, linear in accelerations."""
     h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
     du = b.u - a.u
     u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
@@ -84,22 +76,7 @@ def interpolate(a: Motion, b: Motion, t: float) -> Motion:
 
 
 def stored(arrays: dict[str, Any], name: str, like: Any) -> Any:
-    """An array of a checkpoint.
-
-    Parameters
-    ----------
-    arrays
-        Arrays of any shapes (...,) by name.
-    name
-        Which.
-    like
-        An array or a number whose shape and kind it has.
-
-    Raises
-    ------
-    CheckpointError
-        If it is missing, or of another shape or kind.
-    """
+    """An array of a checkpoint."""
     found, like = np.asarray(arrays.get(name)), np.asarray(like)
     if found.shape != like.shape or found.dtype.kind != like.dtype.kind:
         raise CheckpointError(f"{name!r} should have the shape {like.shape} and the kind "

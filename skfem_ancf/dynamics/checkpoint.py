@@ -43,13 +43,6 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
 
     Forces of each part at a displacement and a velocity that are as good as random, and functions
     of time at a few times: that tells most scenes that differ.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    t_start, t_end
-        Times of start and end of the motion.
     """
     times, rng = np.linspace(t_start, t_end, TIMES), np.random.default_rng(0)
     u, v = 1e-3 * rng.standard_normal((2, system.N)) * np.concatenate(
@@ -98,13 +91,7 @@ def _of_element(system, element, u, v, times):
 
 
 def differences(now: dict[str, Array], then: dict[str, Array]) -> list[str]:
-    """Names of the parts by which two scenes differ, arrays (...) of :func:`description`.
-
-    Parameters
-    ----------
-    now, then
-        Of the scenes.
-    """
+    """Names of the parts by which two scenes differ, arrays (...) of :func:`description`."""
     def same(x, y):
         return y is not None and x.shape == y.shape and y.dtype.kind in "biuf" and np.allclose(
             x, y, rtol=0, atol=1e-12 * np.abs(x).max(initial=0.0), equal_nan=True)
@@ -114,15 +101,7 @@ def differences(now: dict[str, Array], then: dict[str, Array]) -> list[str]:
 
 
 def same_problem(system: System, start: State, t: float) -> bool:
-    """True if a State's accelerations and multipliers are those of the system at a time.
-
-    Parameters
-    ----------
-    system, t
-        The :class:`~skfem_ancf.equations.system.System`, and the time.
-    start
-        An instant of a motion.
-    """
+    """True if a State's accelerations and multipliers are those of the system at a time."""
     other, u = start.system, start.u
     if other is system and t == start.t:
         return True
@@ -216,17 +195,7 @@ def _named(folder, arrays):
 
 
 class Checkpoint:
-    """Writes a Run to a file now and then.
-
-    Parameters
-    ----------
-    path
-        Name of the file, ``.npz`` or ``.h5``.
-    every
-        Steps between two files, or None: by time.
-    run
-        The Run.
-    """
+    """Writes a Run to a file now and then."""
 
     def __init__(self, path: StrPath, every: int | None, run: Run) -> None:
         self.path, self.run = _path(path), run
@@ -293,24 +262,7 @@ class Checkpoint:
 
 def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
            sensors: Sequence[tuple[str, Sensor]] = ()) -> tuple[Run, Checkpoint]:
-    """The Run of a checkpoint, and the Checkpoint that goes on writing it.
-
-    Parameters
-    ----------
-    system
-        The :class:`~skfem_ancf.equations.system.System`.
-    path
-        Name of the file.
-    scheme
-        The scheme, if it is one of the caller's own.
-    sensors
-        Those of the scene, pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
-
-    Raises
-    ------
-    CheckpointError
-        If the file cannot be read, is damaged, or of another scene.
-    """
+    """The Run of a checkpoint, and the Checkpoint that goes on writing it."""
     arrays = read(path)
     try:
         said = {"dt": "auto", "tol": None, "t_eval": None, **_under(arrays, "task.")}

@@ -23,11 +23,6 @@ NEAR = 3e-3
 class _Tableau:
     """The numbers of a method of collocation.
 
-    Parameters
-    ----------
-    points
-        c, shape (n,).
-
     Attributes
     ----------
     method

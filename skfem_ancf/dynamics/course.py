@@ -57,13 +57,7 @@ class Given(NamedTuple):
 
 
 def rate_weights(at: Array, samples: Array) -> Array:
-    """What makes first and second derivatives at p places of values at k others, (2, p, k).
-
-    Parameters
-    ----------
-    at, samples
-        The places, in [0, 1], shapes (p,) and (k,).
-    """
+    """What makes first and second derivatives at p places of values at k others, (2, p, k)."""
     k = len(samples)
     fit = np.linalg.inv(chebvander(2.0 * samples - 1.0, k - 1))
     return np.array([2.0**order * chebval(2.0 * at - 1.0, chebder(np.eye(k), order)).T @ fit
@@ -72,16 +66,7 @@ def rate_weights(at: Array, samples: Array) -> Array:
 
 def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
           limit: float) -> Array:
-    """First and second rate at one time, of a function of times (n,) that returns (n, k): (2, k).
-
-    Parameters
-    ----------
-    function
-        The function.
-    t, dt, ahead
-        The start of a step of this size, or its end.
-    limit
-        Time beyond which the function is not asked.
+    """First and second rate, (2, k), of a function of times (n,) at the start or end t of a step.
     """
     values = function(np.minimum((t if ahead else t - dt) + dt * SAMPLES, limit))
     first, second = rate_weights(np.array([0.0 if ahead else 1.0]), SAMPLES)[:, 0]
@@ -91,14 +76,8 @@ def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
 class Course:
     """Samples the functions of time of a system in steps of one size.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    at
-        Instants of a step at which values and rates are wanted, as parts of it, shape (p,).
-    samples
-        Those of which the rates are made, shape (k,).
+    ``at`` (p,) are the instants, as parts of a step, at which values and rates are wanted;
+    ``samples`` (k,) those of which the rates are made.
     """
 
     def __init__(self, system: System, at: Array, samples: Array) -> None:
@@ -108,17 +87,10 @@ class Course:
 
     def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
            block: tuple[int, int] | None = None) -> Given:
-        """What is given in some steps.
+        """What is given in the steps ``range(*steps)``, of which the first of all is at ``start``.
 
-        Parameters
-        ----------
-        start, dt, steps
-            The steps of the numbers ``range(*steps)``, of which 0 begins at ``start``.
-        limit
-            Time beyond which no function is asked.
-        block
-            Numbers of steps in which functions are asked at once, so that what they return does
-            not depend on ``steps``; these by default.
+        Functions are asked at once in a block of steps, so that what they return does not depend on
+        ``steps``, and not beyond the time ``limit``.
         """
         first, last = block = block or steps
         key = start, dt, first, last, limit
@@ -160,15 +132,7 @@ class Course:
 
 
 class Lookahead:
-    """Functions of time of a whole motion, so that no step passes over an event.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    t_start, t_end
-        Times of start and end.
-    """
+    """Functions of time of a whole motion, so that no step passes over an event."""
 
     def __init__(self, system: System, t_start: float, t_end: float) -> None:
         self._times = np.linspace(t_start, t_end, AHEAD + 1)
@@ -186,11 +150,6 @@ class Lookahead:
         """A step size, at most dt, in which no function of time does what is not seen.
 
         It is not seen if it is no parabola within the step: a blow that begins and ends there.
-
-        Parameters
-        ----------
-        t, dt
-            Start of the step, and its largest size.
         """
         while self._values.shape[1]:
             i, j = np.searchsorted(self._times, (t, t + dt))

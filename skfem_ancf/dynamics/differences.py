@@ -16,26 +16,12 @@ GROWTH = 2.0
 
 
 def difference(x: Array, a: Array) -> Array:
-    """The derivative of the highest order of a polynomial, shape (N,).
-
-    Parameters
-    ----------
-    x
-        Where it is known, shape (n,).
-    a
-        Its values there, shape (n, N).
-    """
+    """The derivative of the highest order of a polynomial, shape (N,)."""
     return difference_row(x) @ a
 
 
 def difference_row(x: Array) -> Array:
-    """What makes the derivative of the highest order of a polynomial of its values, shape (n,).
-
-    Parameters
-    ----------
-    x
-        Where they are, shape (n,).
-    """
+    """What makes the derivative of the highest order of a polynomial of its values, shape (n,)."""
     if len(x) < 3:
         return np.ones(1) if len(x) == 1 else np.array([1.0, -1.0]) / (x[0] - x[1])
     gaps = x[:, None] - x
@@ -45,24 +31,7 @@ def difference_row(x: Array) -> Array:
 
 def derivative(old: Motion, new: Motion, t: float, value: Array,
                order: int) -> tuple[int, Array, Array | None]:
-    """Derivatives of a function of time from its value in a step and those in steps before.
-
-    Parameters
-    ----------
-    old, new
-        Start and end of the step. What the next step takes is written into the memory of new.
-    t, value
-        When the function has this value in the step, shape (N,).
-    order
-        The derivative wanted.
-
-    Returns
-    -------
-    k : int
-        The derivative's order: that wanted, or what the steps since the start allow.
-    high, lower : ndarray
-        The derivatives of the orders k and k - 1, shape (N,); None for k = 0.
-    """
+    """Derivatives of a function of time from its value in a step and those in steps before."""
     before = old.memory or {}
     values = np.concatenate([value[None], before.get("values", value[None][:0])])[:order + 1]
     times = np.append(t, before.get("times", ()))[:order + 1]
@@ -72,15 +41,7 @@ def derivative(old: Motion, new: Motion, t: float, value: Array,
 
 
 def grown(size: Array, lower: Array, missing: int) -> Array:
-    """A derivative times a power of the step, grown by those that are missing as from the last.
-
-    Parameters
-    ----------
-    size, lower
-        It and the one before, each times its power of the size of the step, shape (N,).
-    missing
-        By how many orders.
-    """
+    """A derivative times a power of the step, grown by those that are missing as from the last."""
     if not missing:
         return size
     least = np.linalg.norm(lower)

@@ -154,17 +154,6 @@ class Integrator:
         """The Motion at the start, with consistent velocity, acceleration and multipliers.
 
         Where motions are given as functions of time, their rates are those in a step dt ahead.
-
-        Parameters
-        ----------
-        u, v
-            Displacement and velocity, shape (N,).
-        t, dt
-            Time, and the step in which functions of time are asked.
-        ahead
-            The step begins there; False where it ends.
-        contacts
-            What points remember of obstacles there, shape (k,); None: nothing.
         """
         s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
         given = self._instants[not ahead].of(t if ahead else t - dt, dt, (0, 1), self.limit)
@@ -236,21 +225,9 @@ class Integrator:
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> list[Motion]:
-        """Up to ``n`` steps from the Motion ``y``; fewer where one fails.
+        """Up to ``n`` steps from the Motion ``y`` at ``start + first dt``; fewer where one fails.
 
-        Parameters
-        ----------
-        y, dt, n
-            Where the motion is, and size and number of the steps.
-        start, first
-            ``y`` is at ``start + first dt``.
-        block
-            Numbers of steps between which functions of time are asked at once: these steps by
-            default.
-
-        Returns
-        -------
-        Those that were done.
+        Functions of time are sampled at once in the steps ``range(*block)``, these by default.
         """
         s, contacts = self.system, self.system.forces.contacts
         begun = y.t if start is None else start
@@ -299,28 +276,14 @@ class Integrator:
         return self.system.machine
 
     def take(self, y: Motion, dt: float) -> Motion:
-        """One step of dt from the Motion ``y``; raises StepFailed.
-
-        Parameters
-        ----------
-        y, dt
-            Where the motion is, and the size of the step.
-        """
+        """One step of dt from the Motion ``y``; raises StepFailed."""
         taken = self.run(y, dt, 1)
         if not taken:
             raise StepFailed(self.failure)
         return taken[0]
 
     def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
-        """One step of the scheme; raises StepFailed.
-
-        Parameters
-        ----------
-        y, dt
-            Where the motion is, and the size of the step.
-        again
-            By new factors where those of other steps fail.
-        """
+        """One step of the scheme; raises StepFailed."""
         while True:
             fresh = not self.ready or dt != self.dt
             try:
@@ -335,15 +298,7 @@ class Integrator:
             return new
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:
-        """One step, in two halves where it does not converge; raises StepFailed.
-
-        Parameters
-        ----------
-        y, dt
-            Where the motion is, and the size of the step.
-        depth
-            How often it is halved already.
-        """
+        """One step, in two halves where it does not converge; raises StepFailed."""
         try:
             return self.attempt(y, dt, depth == 0)
         except StepFailed as failure:
@@ -362,11 +317,6 @@ class Integrator:
         As where all bars of a linkage are in line: steps that end there do not converge, and
         shorter ones end there too. Collocation takes one direction of each joint for a whole step,
         and has none near there: it is a step of the energy-momentum scheme then.
-
-        Parameters
-        ----------
-        y, dt
-            Where the motion is, and the size of a step that has failed.
         """
         if not self.m or self.system.forces.contacts.obstacles:
             return None

@@ -17,19 +17,7 @@ if TYPE_CHECKING:
 
 
 class Joined:
-    """The joints at a displacement and a time.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    motion
-        What of its joints depends on time, at that time.
-    u
-        Displacement, shape (N,).
-    instant
-        t, dt, ahead and limit of :func:`~skfem_ancf.dynamics.course.rates`.
-    """
+    """The joints at a displacement and a time."""
 
     def __init__(self, system: System, motion: JointMotion, u: Array,
                  instant: tuple[float, float, bool, float]) -> None:
@@ -58,25 +46,13 @@ class Joined:
         return J
 
     def rate(self, v: Array) -> Array:
-        """That of Phi, shape (m,).
-
-        Parameters
-        ----------
-        v
-            Velocity, shape (N,).
-        """
+        """That of Phi, shape (m,)."""
         out, (t, dt, *_) = np.empty(self._system.constraints.m), self._instant
         drive_rate(self._tables, self._motion, t, dt, self._u, out)
         return out + self.J @ v
 
     def bend(self, v: Array, a: Array) -> Array:
-        """The second rate of Phi, shape (m,).
-
-        Parameters
-        ----------
-        v, a
-            Velocity and acceleration, shape (N,).
-        """
+        """The second rate of Phi, shape (m,)."""
         s, out, (t, dt, *_) = self._system, np.empty(self._system.constraints.m), self._instant
         acceleration_of_joints(self._tables, self._motion, t, dt, self._u, v, out)
         if self._tables.own and s.constraints.drives:

@@ -81,18 +81,7 @@ class Task:
 
 def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
             breakpoints: Any) -> Task:
-    """What is asked for, checked: arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`.
-
-    Parameters
-    ----------
-    t_start, t_end, dt, t_eval, tol, rtol, breakpoints
-        As for that function; ``t_eval`` and ``breakpoints`` of shape (n,).
-
-    Raises
-    ------
-    InputError
-        If they do not fit.
-    """
+    """What is asked for, checked: arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`."""
     t_start = require_finite_scalar("t_start", t_start)
     t_end = require_finite_scalar("t_end", t_end)
     span = require_positive("t_end - t_start", t_end - t_start)
@@ -134,29 +123,12 @@ def _require_step(t_start, t_end, step):
 
 
 def integrator_of(system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
-    """What takes the steps of a scheme.
-
-    Parameters
-    ----------
-    system, scheme, tol
-        As of :class:`~skfem_ancf.dynamics.integrator.Integrator`.
-    """
+    """What takes the steps of a scheme."""
     return (StageIntegrator if scheme.collocates else Integrator)(system, scheme, tol)
 
 
 class Run:
     """The loop over steps, so that it can stop after any of them and go on.
-
-    Parameters
-    ----------
-    system, scheme
-        What is integrated, and how.
-    task : Task
-        From when to when, and what to store.
-    sensors
-        Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
-    until
-        A function of a State whose change of sign ends the motion, or None.
 
     Attributes
     ----------
@@ -197,17 +169,7 @@ class Run:
 
     def begin(self, u: Array, v: Array, contacts: Array | None = None,
               turns: Array | None = None) -> None:
-        """Begin with a displacement and a velocity.
-
-        Parameters
-        ----------
-        u, v
-            Of the degrees of freedom, shape (N,).
-        contacts
-            What points remember of obstacles there, shape (k,), or None.
-        turns
-            Angles there, those of another motion of this scene, shape (k,), or None.
-        """
+        """Begin with a displacement and a velocity."""
         self._sample(u, v, self.task.t_start, True)
         self.y = self._start(u, v, contacts)
         if turns is None or len(turns) != self._turns.number:
@@ -216,13 +178,7 @@ class Run:
         self._store_start()
 
     def go_on(self, y: Motion, arrays: dict[str, Any] | None = None) -> None:
-        """Begin where another run of the same scene was.
-
-        Parameters
-        ----------
-        y, arrays
-            Its Motion there, and what its :meth:`arrays` gave, or None.
-        """
+        """Begin where another run of the same scene was."""
         self.y = replace(y, t=self.task.t_start)
         if arrays is not None:
             self.integrator.load(arrays)
@@ -491,15 +447,7 @@ class Run:
         return found
 
     def load(self, y: Motion, arrays: dict[str, Any], columns: dict[str, Array]) -> None:
-        """Go on with what a run had that was stopped.
-
-        Parameters
-        ----------
-        y, arrays
-            Where it was, and what its :meth:`arrays` gave.
-        columns
-            What it has stored, arrays (nt, ...) by name.
-        """
+        """Go on with what a run had that was stopped."""
         self.y = y
         self._stored = list(zip(*(columns[name] for name in COLUMNS)))
         self.integrator.load(arrays)

@@ -73,65 +73,13 @@ class Sensor(Immutable):
         """True if it is read of the coordinates of many steps at once."""
         return self.what in MOVING
 
-    def read_steps(self, at: Located, steps: Sequence[Motion]) -> Array:
-        """Of one that is :attr:`moving`, the values at some steps, shape (n, ...).
-
-        Parameters
-        ----------
-        at
-            What :func:`locate` returns.
-        steps
-            Motions.
-        """
-        u = np.array([y.u for y in steps])
-        if self.what == "velocity":
-            return at.velocity(u, np.array([y.v for y in steps]))
-        if self.what == "acceleration":
-            return at.displacement(np.array([y.acceleration for y in steps]))
-        found = at.displacement(u)
-        return found + at.start if self.what == "position" else found
-
-    def read(self, at: Located | None, state: State) -> Any:
-        """Of another one, the value at a State: a number or an array.
-
-        Parameters
-        ----------
-        at
-            What :func:`locate` returns.
-        state
-            The State.
-        """
-        what: Any = self.what
-        if callable(what):
-            return ask_array("the function of a sensor", None, what, state)
-        if what == "joint_force":
-            return state.joint_force(self.at)
-        if what in ("strain", "stress"):
-            return getattr(state, what)(at, recover=self.recover)
-        if what in SECTION:
-            return getattr(state.resultants(at, recover=self.recover), what)
-        return state.field(find_field(what), at, recover=self.recover)
-
     def __repr__(self) -> str:
         where = "" if self.at is None else f" at {shown(self.at)}"
         return f"<Sensor of {shown(self.what)}{where}>"
 
 
 def locate(sensor: Sensor, system: System) -> Located | None:
-    """The points of a sensor in a scene; None if it has none.
-
-    Parameters
-    ----------
-    sensor
-        The Sensor.
-    system
-        The :class:`~skfem_ancf.equations.system.System` of the scene.
-
-    Raises
-    ------
-    MeshError, InputError
-        If it cannot be read there.
-    """
+    """The points of a sensor in a scene; None if it has none."""
     if callable(sensor.what) or sensor.what == "joint_force":
         return None
     found = system.points.find(sensor.at, sensor.beam, sensor.line, sensor.what not in MOVING)
@@ -142,6 +90,31 @@ def locate(sensor: Sensor, system: System) -> Located | None:
         raise InputError("the acceleration of a cable is known on its axis: off it sections "
                          "turn with the tangent; put the sensor on the axis")
     return found
+
+
+def _read_steps(sensor, at, steps):
+    """Of one that is read of many steps at once, the values at them, shape (n, ...)."""
+    u = np.array([y.u for y in steps])
+    if sensor.what == "velocity":
+        return at.velocity(u, np.array([y.v for y in steps]))
+    if sensor.what == "acceleration":
+        return at.displacement(np.array([y.acceleration for y in steps]))
+    found = at.displacement(u)
+    return found + at.start if sensor.what == "position" else found
+
+
+def _read(sensor, at, state):
+    """Of another one, the value at a State: a number or an array."""
+    what: Any = sensor.what
+    if callable(what):
+        return ask_array("the function of a sensor", None, what, state)
+    if what == "joint_force":
+        return state.joint_force(sensor.at)
+    if what in ("strain", "stress"):
+        return getattr(state, what)(at, recover=sensor.recover)
+    if what in SECTION:
+        return getattr(state.resultants(at, recover=sensor.recover), what)
+    return state.field(find_field(what), at, recover=sensor.recover)
 
 
 class Readings(dict[str, "Array"]):
@@ -167,17 +140,7 @@ class Readings(dict[str, "Array"]):
 
 
 class Recorder:
-    """Reads the sensors of a run.
-
-    Parameters
-    ----------
-    sensors
-        Pairs of name and :class:`Sensor`.
-    system
-        What is integrated.
-    state_of
-        Makes a State of a Motion.
-    """
+    """Reads the sensors of a run."""
 
     def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
                  state_of: Callable[[Motion], State]) -> None:
@@ -192,10 +155,10 @@ class Recorder:
             return
         others = [(sensor, at) for (_, sensor), at in zip(self.sensors, self._located)
                   if not sensor.moving]
-        rows = [[sensor.read(at, state) for sensor, at in others]
+        rows = [[_read(sensor, at, state) for sensor, at in others]
                 for state in map(self._state_of, steps)] if others else []
         columns = iter(zip(*rows))
-        found = [sensor.read_steps(at, steps) if sensor.moving else np.array(next(columns))
+        found = [_read_steps(sensor, at, steps) if sensor.moving else np.array(next(columns))
                  for (_, sensor), at in zip(self.sensors, self._located)]
         self._t.append(np.array([y.t for y in steps]))
         for read, one in zip(self._read, found):

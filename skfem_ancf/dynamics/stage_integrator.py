@@ -91,13 +91,7 @@ class StageIntegrator(Integrator):
         return x
 
     def damped(self, du: Array, time: float) -> Array:
-        """The mean of what is left of a change of the displacement while it is damped.
-
-        Parameters
-        ----------
-        du, time
-            The change, shape (N,), and for how long.
-        """
+        """The mean of what is left of a change of the displacement while it is damped."""
         s, M = self.system, self.system.mass.band
         A = M._replace(flat=M.flat + 0.5 * time * self._work.D.flat, pivots=M.pivots.copy())
         fix(A, s.constraints.fixed)

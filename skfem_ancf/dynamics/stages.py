@@ -166,18 +166,7 @@ class Points(NamedTuple):
 
 def room_for_points(method: Method, N: int, m: int, rows: int, stresses: int, gradients: int,
                     D: Band) -> Points:
-    """The Points of a method.
-
-    Parameters
-    ----------
-    method
-        Its numbers.
-    N, m, rows, stresses, gradients
-        Numbers of coordinates, of equations of joints, of other rows beside the band, of stresses,
-        and of their gradients.
-    D
-        A band matrix of its own.
-    """
+    """The Points of a method."""
     n, k, ld, b = method.points.size, method.values.shape[1], D.width + 1 + SPARE, m + rows
     real = Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0)
     return Points._make([
@@ -190,25 +179,11 @@ def room_for_points(method: Method, N: int, m: int, rows: int, stresses: int, gr
 
 @source
 def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows):
-    """Take steps from ``w.y`` and ``w.first`` on.
+    """Take steps from ``w.y`` and ``w.first`` on; returns how many were done.
 
-    Parameters
-    ----------
-    e, matrices, rule
-        :class:`~skfem_ancf.equations.Equations` with as many copies as there are points,
-        :class:`~skfem_ancf.dynamics.steps.Matrices`, :class:`~skfem_ancf.dynamics.steps.Rule`.
-    s, w
-        As above; of w ``y`` and ``first``, with what was before, or ``guess``.
-    state
-        As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
-    memories, rows, stages, multiplier_rows
-        Written: of each step the work of damping up to there and what obstacles keep, (s, 1 + k),
-        k zero where that is nothing, u, v and the acceleration, (s, 3, N), the displacements of its
-        points, (s, n, N), and the multipliers of these and at the end, (s, n + 1, m).
-
-    Returns
-    -------
-    The number of steps done; one that fails is the last.
+    Written are of each step the work of damping up to its end and what obstacles keep, (s, 1 + k),
+    u, v and the acceleration, (s, 3, N), the displacements of its points, (s, n, N), and the
+    multipliers of these and at the end, (s, n + 1, m).
     """
     s, state, method = borrowed(s), borrowed(state), w.method
     contacts, taken = e.forces.contacts, np.empty(1)

@@ -280,17 +280,7 @@ class Work(NamedTuple):
 
 
 def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
-    """The :class:`Work` of steps.
-
-    Parameters
-    ----------
-    N, m
-        Numbers of coordinates and of equations of joints.
-    stresses
-        Number of the stresses of all beams.
-    dense
-        Number of equations in dense matrices: m, or 0 where they are eliminated.
-    """
+    """The :class:`Work` of steps."""
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
     return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((4, dense, N)),
                 np.zeros((dense, dense)), np.zeros((7, stresses)))
@@ -298,26 +288,11 @@ def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
 
 @source
 def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, works):
-    """Take steps from ``w.y`` and the multipliers in ``w.m`` on.
+    """Take steps from ``w.y`` and the multipliers in ``w.m`` on; returns how many were done.
 
-    Parameters
-    ----------
-    e
-        :class:`~skfem_ancf.equations.Equations`.
-    matrices, rule, course
-        As above.
-    state
-        What is kept from step to step, shape (12,).
-    w
-        :class:`Work`.
-    memories, rows, multiplier_rows, works
-        Written: of each step what obstacles keep, (n, k), k zero where that is nothing, u, v, the
-        acceleration and the scheme's acceleration w, shape (n, 4, N), the multipliers at its end
-        and where it took them, (n, 2, m), and the work of damping up to its end, (n,).
-
-    Returns
-    -------
-    The number of steps done; one that fails is the last.
+    Written are of each step what obstacles keep, (n, k), u, v, the acceleration and the scheme's
+    acceleration, (n, 4, N), the multipliers at its end and where it took them, (n, 2, m), and the
+    work of damping up to its end, (n,).
     """
     course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
@@ -394,17 +369,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
 
 @source
 def judge(state, wanted, rough, reused):
-    """What the size of a correction tells: of factors that are kept as long as it contracts.
-
-    Parameters
-    ----------
-    state
-        With FRESH, SIZE and LAST_SIZE; RATE, READY and FAILURE are written.
-    wanted, rough
-        A size that is small enough, and its round-off.
-    reused
-        Contraction up to which factors are kept.
-    """
+    """What the size of a correction tells: of factors that are kept as long as it contracts."""
     size, before = state[SIZE], state[LAST_SIZE]
     if not size < 1e300:
         state[FAILURE] = NOT_FINITE
@@ -426,17 +391,7 @@ def judge(state, wanted, rough, reused):
 
 @source
 def judged(state, wanted, rough, reused, carried, later):
-    """What a correction tells, of iterations with carried stresses too.
-
-    Parameters
-    ----------
-    state, wanted, rough, reused
-        As for :func:`judge`; MIXED may be written.
-    carried
-        Contraction up to which factors are kept where stresses are carried.
-    later
-        True if those of the step before serve for two corrections then, else for one.
-    """
+    """What a correction tells, of iterations with carried stresses too."""
     fresh = state[FRESH] > 0.0
     if state[MIXED] > 0.0:
         told = judge(state, wanted, rough, carried)

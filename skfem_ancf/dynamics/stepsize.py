@@ -43,20 +43,6 @@ class StepSize:
       in which they turn: after the time T a vibration of the frequency w has lost the phase
       C w^3 dt^2 T, so W = (C dt^2 T)^(1 / 3) / 2. Steps of higher order are longer than W.
 
-    Parameters
-    ----------
-    system, scheme
-        What is integrated, and how.
-    rtol
-        Largest error of the displacement of a point, relative to the size of the scene.
-    t_start, t_end
-        Times of start and end.
-
-    Raises
-    ------
-    InputError
-        If the scheme does not estimate its error.
-
     References
     ----------
     Error per unit step: Hairer, Norsett, Wanner: "Solving ordinary differential equations I",
@@ -80,22 +66,7 @@ class StepSize:
                 / (self.system.size * self.rtol))
 
     def error(self, integrator: Integrator, old: Motion, new: Motion, dt: float) -> float:
-        """What a step adds to the error, over what it may add.
-
-        Parameters
-        ----------
-        integrator
-            It has the factors of the last iteration matrix, if any.
-        old, new
-            Start and end of the step.
-        dt
-            Its size.
-
-        Returns
-        -------
-        float
-            Above 1 it adds more than its share.
-        """
+        """What a step adds to the error, over what it may add."""
         de = self.scheme.local_error(old, new, dt) * self.system.constraints.free
         for _ in range(self.scheme.filtered):
             de = self.scheme.resolved(integrator, de)
@@ -124,17 +95,7 @@ class StepSize:
         self._averages = np.zeros_like(self._averages)
 
     def next(self, error: float, dt: float, size: float) -> tuple[float, bool]:
-        """Size of the next step after one of dt, and whether this one is to be kept.
-
-        Parameters
-        ----------
-        error
-            That of :meth:`error`.
-        dt
-            Size of the step that was taken.
-        size
-            The size wished for, of which dt may be a part.
-        """
+        """Size of the next step after one of dt, and whether this one is to be kept."""
         factor = 0.9 * max(error, 1e-300) ** (-1.0 / self.scheme.order)
         if error > REJECTED and dt > 1e-9 * self.span:
             return dt * max(0.2, min(0.8, factor)), False
