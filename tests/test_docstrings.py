@@ -70,9 +70,9 @@ def section(text, *names):
 
 
 def described(text):
-    """From the name of an argument to what a Parameters or Attributes section says of it."""
+    """From the name of an argument to what sections with arguments say of it."""
     out, names = {}, []
-    for line in section(text, "Parameters", "Attributes").splitlines():
+    for line in section(text, "Parameters", "Other Parameters", "Attributes").splitlines():
         if line and not line.startswith(" "):
             names = [n.strip().lstrip("*") for n in line.split(" : ")[0].split(",")]
             out.update(dict.fromkeys(names, ""))
@@ -83,12 +83,13 @@ def described(text):
 
 
 def documents(function, owner):
-    """Docstrings that may describe the arguments: its own, those it overrides, its class's."""
+    """Docstrings that may describe the arguments: its own, those it overrides, its class's.
+
+    A class says under Other Parameters what many of its methods take.
+    """
     texts = [function.__doc__]
     for base in owner.__mro__ if owner else ():
-        texts.append(getattr(vars(base).get(function.__name__), "__doc__", None))
-        if function.__name__ == "__init__":
-            texts.append(base.__doc__)
+        texts += [getattr(vars(base).get(function.__name__), "__doc__", None), base.__doc__]
     return [inspect.cleandoc(text) for text in texts if text]
 
 

@@ -167,9 +167,8 @@ def test_points_that_are_changed_in_place_are_other_points():
 @pytest.mark.parametrize("what, error, message", [
     (np.zeros((5, 2)), MeshError, r"shape \(2, n\).*got \(5, 2\); give its transpose"),
     (np.zeros((3, 4)), MeshError, r"got \(3, 4\)$"),
-    ([(0, 1, 2), (3, 4, 5)], MeshError,
-     "each material point of a list is a pair.*an array of shape"),
-    ([(0, 1), (0, (1, 2))], MeshError, "is a pair"),
+    ([(0, 1, 2), (3, 4, 5)], MeshError, r"two coordinates.*got \(0, 1, 2\)"),
+    ([(0, 1), (0, (1, 2))], MeshError, "two coordinates"),
     ([(0.1, 0), (np.nan, 0)], InputError, "NaN"),
     (np.array([[0.1], [np.inf]]), InputError, "infinite"),
     ([(True, 0.0)], MeshError, "two coordinates"),

@@ -100,6 +100,15 @@ class Beam(Immutable):
     section
         A :class:`~skfem_ancf.Section` in place of the width.
 
+    Other Parameters
+    ----------------
+    u
+        Displacement of the degrees of freedom, shape (N,).
+    X
+        Reference points, (2, npoints) or (2, nelements, npoints).
+    tind
+        Elements, shape (nelements,), or None for all.
+
     Raises
     ------
     InputError
@@ -329,15 +338,6 @@ class Beam(Immutable):
     def gradients(self, u: Array, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
         """Displacement gradient in the beam's frame and the frame.
 
-        Parameters
-        ----------
-        u
-            Displacement of the degrees of freedom, shape (N,).
-        X
-            Reference points, (2, npoints) or (2, nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
-
         Returns
         -------
         H, frame
@@ -346,40 +346,21 @@ class Beam(Immutable):
         return kinematics.gradients(self, *self._checked(u, X, tind))
 
     def displacements(self, u: Array, X: Array, tind: Array | None = None) -> Array:
-        """Displacement at reference points, shape (2, nelements, npoints).
-
-        Parameters
-        ----------
-        u, X, tind
-            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
-        """
+        """Displacement at reference points, shape (2, nelements, npoints)."""
         return kinematics.displacements(self, *self._checked(u, X, tind))
 
     def strain(self, u: Array, X: Array, tind: Array | None = None) -> Array:
-        """Green-Lagrange strain of the formulation, shape (3, nelements, npoints).
+        """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) of the formulation.
 
-        Its components are (eps_xx, eps_yy, 2 eps_xy).
-
-        Parameters
-        ----------
-        u, X, tind
-            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
+        Shape (3, nelements, npoints).
         """
         u, X, tind = self._checked(u, X, tind)
         return on_grid(strain_at, self, u, X, tind)
 
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:
-        """Second Piola-Kirchhoff stress, shape (3, nelements, npoints).
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), force per undeformed area.
 
-        Its components are (S_xx, S_yy, S_xy), force per area of the reference configuration.
-
-        Parameters
-        ----------
-        u, X, tind
-            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
+        Shape (3, nelements, npoints).
         """
         u, X, tind = self._checked(u, X, tind)
         return on_grid(stress_at, self, u, X, tind)

@@ -58,15 +58,7 @@ def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
         hint = "; give its transpose, or a list" if points.shape[1] == 2 else ""
         raise MeshError("an array of points has shape (2, n), the x in its first row and the y in "
                         f"its second, got {points.shape}{hint}")
-    if any(np.shape(p) != (2,) for p in points if not _ragged(p)) or any(map(_ragged, points)):
-        hint = "; an array of shape (2, n) is one too" if len(points) == 2 else ""
-        raise MeshError(f"each material point of a list is a pair (x, y), got "
-                        f"{shown(points)}{hint}")
-    return np.array([as_point(p, mesh) for p in points]).T
-
-
-def _ragged(p):
-    return not isinstance(p, np.ndarray) and any(np.ndim(x) for x in p if not isinstance(x, str))
+    return np.array([as_point(p) for p in points]).T
 
 
 class Points:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import (InputError, NameUnknown, require_finite, require_finite_scalar,
+from ..core.errors import (InputError, require_finite, require_finite_scalar,
                            require_label, require_names, require_positive, shown)
-from ..core.immutable import Immutable, read_only
+from ..core.immutable import Immutable, read_only, rebuilt
 from ..core.linear import angle_of
 from ..mesh.places import as_point
 
@@ -52,6 +52,11 @@ class RigidBody(Immutable):
         array of shape (n, 2), or (2, n) as the attribute has it. For pictures and files, and to
         find which body a point is in. By default the square whose plate of constant thickness has
         this mass and inertia.
+
+    Other Parameters
+    ----------------
+    u, v
+        Displacement of the degrees of freedom and its rate, shape (4,) or (..., 4).
 
     Raises
     ------
@@ -103,23 +108,8 @@ class RigidBody(Immutable):
                 f"({self.position[0]:g}, {self.position[1]:g})>")
 
     def replace(self, **changes: Any) -> RigidBody:
-        """The same body with some arguments of its constructor changed.
-
-        Parameters
-        ----------
-        **changes
-            Arguments of :class:`RigidBody`, as ``mass=2.0``.
-
-        Raises
-        ------
-        NameUnknown
-            If an argument is not known.
-        """
-        known = ("mass", "inertia", "position", "angle", "name", "outline")
-        for name in changes:
-            if name not in known:
-                raise NameUnknown("argument of RigidBody", name, known)
-        return type(self)(**{**{name: getattr(self, name) for name in known}, **changes})
+        """The same body with some arguments of its constructor changed, as ``mass=2.0``."""
+        return rebuilt(self, changes)
 
     # what a scene asks of a beam, too
 
@@ -257,13 +247,7 @@ class RigidBody(Immutable):
         return self.angle + angle_of(d[..., 0, 0], d[..., 1, 0])
 
     def angular_velocity(self, u: Array, v: Array) -> Array:
-        """The angular velocity, counterclockwise.
-
-        Parameters
-        ----------
-        u, v
-            Displacement of the degrees of freedom and its rate, shapes (..., 4).
-        """
+        """The angular velocity, counterclockwise, of displacements and their rates (..., 4)."""
         d = self.q0[2:] + u[..., 2:]
         return d[..., 0] * v[..., 3] - d[..., 1] * v[..., 2]
 

@@ -81,6 +81,15 @@ class ElementBeam(Immutable, Element):
     welded
         Those of ``names`` that a welded face fixes: the position of every point of it.
 
+    Other Parameters
+    ----------------
+    mapping
+        The mapping of a MeshBeam.
+    X
+        Reference points, shape (2, npoints) or (2, nelements, npoints).
+    tind
+        Elements, shape (nelements,), or None for all.
+
     Attributes
     ----------
     functionals : tuple of (float, int, int)
@@ -199,8 +208,6 @@ class ElementBeam(Immutable, Element):
 
         Parameters
         ----------
-        X
-            Reference points, shape (2, npoints) or (2, nelements, npoints).
         h
             Height of the section; of a tapered one at each point, shape X.shape[1:], or of each
             element at the same points, shape (nelements, npoints).
@@ -265,18 +272,12 @@ class ElementBeam(Immutable, Element):
 
     def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                 i: slice = slice(None)) -> list[Array]:
-        """Local functions of elements of a mesh, and their derivatives by xi and eta.
+        """Local functions and their derivatives by xi and eta, (n, nelements, npoints) each.
 
         Parameters
         ----------
-        mapping, X, tind, i
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,); a slice of the functions.
-
-        Returns
-        -------
-        value, d_xi, d_eta
-            Shape (n, nelements, npoints) each.
+        i
+            Some of the functions.
         """
         h, rate = mapping.height(X[0], tind) if self.section.number else (1.0, 0.0)
         *found, slope = self.local(X, h, i, rate)
@@ -290,14 +291,8 @@ class ElementBeam(Immutable, Element):
 
         Parameters
         ----------
-        mapping
-            The mapping of a MeshBeam.
-        X
-            Reference points, shape (2, npoints) or (2, nelements, npoints).
         i
             Number of the local function, 0 to 2 nodal_dofs - 1.
-        tind
-            Elements, shape (nelements,), or None for all.
 
         Returns
         -------
@@ -311,13 +306,12 @@ class ElementBeam(Immutable, Element):
 
     def functions(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                   which: slice = slice(None)) -> tuple[Array, Array]:
-        """Local functions on the body, (n, nelements, npoints), with their gradients, (n, 2, ...).
+        """Local functions, (n, nelements, npoints), and their gradients, (n, 2, ...).
 
         Parameters
         ----------
-        mapping, X, tind, which
-            As for :meth:`of_mesh`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
+        which
+            Some of them.
         """
         value, d_xi, d_eta = self.of_mesh(mapping, X, tind, which)
         invDF = mapping.invDF(X, tind)
@@ -326,12 +320,6 @@ class ElementBeam(Immutable, Element):
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
         """Derivatives of all local functions along the axis and across it, and the beam's frame.
-
-        Parameters
-        ----------
-        mapping, X, tind
-            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
-            (nelements,).
 
         Returns
         -------

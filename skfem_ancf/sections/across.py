@@ -74,9 +74,7 @@ class LayerPoints:
 class Across(Immutable):
     """A :class:`~skfem_ancf.sections.Section` on a mesh.
 
-    Points X are reference points (2, npoints) or (2, nelements, npoints), of elements ``tind``
-    (nelements,) or, if that is None, of all. What is returned at points has the shape (nelements,
-    npoints), or is a number.
+    What is returned at points has the shape (nelements, npoints), or is a number.
 
     Parameters
     ----------
@@ -87,10 +85,25 @@ class Across(Immutable):
     material
         That of the beam; None if the section has its own.
 
+    Other Parameters
+    ----------------
+    layer
+        One of :attr:`layers`, of which the points are.
+    X
+        Reference points, shape (2, npoints) or (2, nelements, npoints).
+    xi
+        Places along elements, shape (npoints,) or (nelements, npoints).
+    tind
+        Elements, shape (nelements,), or None for all.
+    whole
+        The points stand for their sections.
+    times
+        "grade" or "density" for the integrals of these; "" for volumes.
+
     Attributes
     ----------
     layers
-        The layers of the section, a tuple of :class:`~skfem_ancf.sections.section.Layer`.
+        From the bottom to the top, a tuple of :class:`~skfem_ancf.sections.section.Layer`.
     plain, simple : bool
         A rectangle of one width and one material; and that on a mesh of one height.
     constant, uniform : bool
@@ -155,26 +168,14 @@ class Across(Immutable):
     # points
 
     def coordinates(self, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-        """Material coordinates x, the parameter of the axis, and y, the distance from it.
-
-        Parameters
-        ----------
-        X, tind
-            Points, shape (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
-        """
+        """Material coordinates x, the parameter of the axis, and y, the distance from it."""
         s, t = self.mesh.parameters, self.mesh.t if tind is None else self.mesh.t[:, tind]
         a, b = s[t][:, :, None]
         x = a + np.asarray(X[0]) * (b - a)
         return x, np.broadcast_to(self.mesh.mapping().offset(X, tind), x.shape)
 
     def heights(self, xi: Array, tind: Array | None = None) -> Array:
-        """Heights at places xi along elements.
-
-        Parameters
-        ----------
-        xi, tind
-            Shape (npoints,) or (nelements, npoints), and (nelements,).
-        """
+        """Heights at places xi along elements."""
         return self.mesh.mapping().height(xi, tind)[0]
 
     def _ends(self, layer, xi):
@@ -182,12 +183,9 @@ class Across(Immutable):
         return layer.measure.ends(self.heights(xi)) if self.moving else layer.measure.highest
 
     def which(self, X: Array, tind: Array | None = None) -> Array:
-        """The number of the layer at each point; one between two layers is in the upper.
+        """The number of the layer at each of points (2, ...); between two layers of the upper.
 
-        Parameters
-        ----------
-        X, tind
-            Points, shape (2, ...), and elements, (nelements,), which only count where layers move.
+        Elements only count where layers move.
         """
         if self.moving:
             h = self.heights(X[0], tind)
@@ -202,8 +200,6 @@ class Across(Immutable):
 
         Parameters
         ----------
-        X, tind
-            Points, shape (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
         like
             An array of the shape of the field, (..., nelements, npoints).
         values
@@ -224,13 +220,7 @@ class Across(Immutable):
         return out
 
     def at(self, layer: Layer, X: Array, tind: Array | None = None) -> LayerPoints:
-        """Points of a layer, as its measure takes them.
-
-        Parameters
-        ----------
-        layer, X, tind
-            The layer, its points (2, npoints) or (2, nelements, npoints), elements (nelements,).
-        """
+        """Points of a layer, as its measure takes them."""
         return LayerPoints(self, layer, X, tind)
 
     def volume(self, layer: Layer, X: Array, W: Array, tind: Array | None = None,
@@ -239,14 +229,8 @@ class Across(Immutable):
 
         Parameters
         ----------
-        layer, tind
-            The layer, and elements, (nelements,).
-        X, W
-            Points (2, npoints) and weights (npoints,) of the rule on the reference cell.
-        whole
-            The points stand for their sections.
-        times
-            "grade" or "density" for the integrals of these; "" for volumes.
+        W
+            Weights of the points on the reference cell, (npoints,).
         full
             Of the body whose sections have their height between nodes too, see
             :meth:`~skfem_ancf.mesh.mapping.MappingBeam.full_volume`.
@@ -260,55 +244,28 @@ class Across(Immutable):
 
     def breadth(self, layer: Layer, X: Array, tind: Array | None = None, whole: bool = False,
                 times: str = "") -> Any:
-        """What the weights of a layer's rules, whose sum is 1, stand for: area over height.
-
-        Parameters
-        ----------
-        layer, X, tind, whole, times
-            As for :meth:`volume`, X of shape (2, npoints) or (2, nelements, npoints), tind of
-            shape (nelements,).
-        """
+        """What the weights of rules, whose sum is 1, stand for: area over height."""
         return layer.measure.breadth(self.at(layer, X, tind), whole, times)
 
     def width(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
-        """The width at points of a layer, that of its piece there.
-
-        Parameters
-        ----------
-        layer, X, tind
-            As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
-        """
+        """The width at points of a layer, that of its piece there."""
         return layer.measure.width(self.at(layer, X, tind))
 
     def grade(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
-        """The factor on the energy of a layer at points.
-
-        Parameters
-        ----------
-        layer, X, tind
-            As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
-        """
+        """The factor on the energy of a layer at points."""
         return self.at(layer, X, tind).factor("grade")
 
     def density(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
-        """Mass per volume of a layer at points; raises InputError if its material has none.
-
-        Parameters
-        ----------
-        layer, X, tind
-            As for :meth:`volume`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
-        """
+        """Mass per volume of a layer at points; raises InputError if its material has none."""
         return self.at(layer, X, tind).factor("density")
 
     def face(self, side: int, X: Array, tind: Array | None = None) -> Any:
-        """The width of the bottom (0) or the top (1); raises InputError of a circle.
+        """The width of the bottom or the top at points on it; raises InputError of a circle.
 
         Parameters
         ----------
         side
-            Which.
-        X, tind
-            Points on it, (2, npoints) or (2, nelements, npoints), and elements, (nelements,).
+            0 for the bottom, 1 for the top.
         """
         layer = self.layers[-side]
         if layer.face is None:
@@ -319,13 +276,7 @@ class Across(Immutable):
         return layer.face[side]
 
     def outline(self, X: Array, tind: Array | None = None) -> Any:
-        """The largest width of sections, of a function that on the axis.
-
-        Parameters
-        ----------
-        X, tind
-            Points of the axis, (2, npoints) or (2, nelements, npoints), elements, (nelements,).
-        """
+        """The largest width of sections at points of the axis; of a function the width there."""
         widths = (s.measure.outline(self.at(s, X, tind)) for s in self.layers)
         return reduce(np.maximum, widths, 0.0 * X[0])
 
@@ -356,8 +307,8 @@ class Across(Immutable):
 
         Parameters
         ----------
-        layer, e, xi
-            The layer, elements and places along them, shapes (nsections,).
+        e, xi
+            Elements and places along them, shapes (nsections,).
         n
             Number of points, at least.
         """
@@ -443,22 +394,13 @@ class Across(Immutable):
     # integrals over the section
 
     def moments(self, xi: Array, tind: Array | None = None, what: str = "stiffness") -> Array:
-        """Integrals over the section of a quantity times 1, Y and Y^2: as (EA, ES, EI).
+        """Integrals over the section of a quantity times 1, Y and Y^2, (3, nelements, npoints).
 
         Parameters
         ----------
-        xi
-            Places along the elements, shape (npoints,) or (nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
         what
-            "stiffness" for the axial modulus, "E" for Young's, "mass" for the density, "area" for
-            1.
-
-        Returns
-        -------
-        ndarray
-            Shape (3, nelements, npoints).
+            "stiffness" for the axial modulus, which gives (EA, ES, EI), "E" for Young's, "mass" for
+            the density, "area" for 1.
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
         mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
