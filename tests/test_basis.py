@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eigh
-from scipy.sparse import csr_matrix, identity
-from skfem import (Basis, BilinearForm, CellBasis, ElementVector, FacetBasis, Functional,
+from scipy.sparse import csr_matrix
+from skfem import (Basis, BilinearForm, ElementVector, FacetBasis, Functional,
                    InteriorFacetBasis, LinearForm, condense, enforce, mpc, penalize, solve)
-from skfem.helpers import ddot, div, dot, eye, grad, sym_grad, trace
+from skfem.helpers import ddot, div, dot, eye, sym_grad, trace
 from skfem.models.poisson import laplace, mass, unit_load
 
-from conftest import MESHES, quarter_arc
-from skfem_ancf import ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError
+from conftest import MESHES
+from skfem_ancf import ElementBeamANCF, InputError, MeshBeam, MeshError
 from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 
@@ -67,27 +67,6 @@ def test_dofs_of_an_end(beam, name, node):
     assert_array_equal(beam.get_dofs(name, skip=["r^1"]).all(), beam.nodal_dofs[1:, node])
 
 
-def test_dofs_of_other_sets(beam):
-    assert_array_equal(beam.get_dofs(), np.arange(40))  # every node is on the boundary
-    assert_array_equal(beam.get_dofs("top"), np.arange(40))
-    assert_array_equal(beam.get_dofs({"left", "right"}),
-                       np.sort(np.r_[beam.get_dofs("left"), beam.get_dofs("right")]))
-    assert_array_equal(beam.get_dofs(("left", "right")), beam.get_dofs(["left", "right"]))
-    assert_array_equal(beam.get_dofs(1), np.arange(10, 20))  # facet 1 is the section of node 1
-    assert_array_equal(beam.get_dofs(np.array([1, 2])), np.arange(10, 30))
-    assert_array_equal(beam.get_dofs(lambda x: np.isclose(x[0], 1.0)), np.arange(20, 30))
-    assert_array_equal(beam.get_dofs(elements="tip"), np.arange(20, 40))
-    assert_array_equal(beam.get_dofs(elements=[0]), np.arange(20))
-    assert_array_equal(beam.get_dofs(elements=lambda x: x[0] > 1.0), np.arange(20, 40))
-    assert_array_equal(beam.get_dofs(nodes=np.array([2])), np.arange(20, 30))
-    assert_array_equal(beam.get_dofs(nodes=(1.5, 0.0)), np.arange(30, 40))
-    assert_array_equal(beam.get_dofs(nodes=lambda x: x[0] < 0.1).all("r^2"), [1])
-    assert_array_equal(beam.complement_dofs(beam.get_dofs("left"), np.array([39])),
-                       np.arange(10, 39))
-    x = beam.doflocs[0, beam.get_dofs("top").sort(lambda x: -x[0])]
-    assert np.all(np.diff(x) <= 0)
-
-
 @pytest.mark.parametrize("kwargs, message", [
     (dict(facets="root"), "unknown boundary 'root'; known: 'left', 'right', 'bottom', 'top'"),
     (dict(facets={"left", "root"}), "unknown boundary 'root'"),
@@ -96,15 +75,6 @@ def test_dofs_of_other_sets(beam):
 def test_unknown_dofs(beam, kwargs, message):
     with pytest.raises(InputError, match=message):
         beam.get_dofs(**kwargs)
-
-
-def test_split(beam):
-    x = np.arange(40.0)
-    (u, bu), (v, bv) = beam.split(x)
-    assert_array_equal(u, x[::2])
-    assert_array_equal(v, x[1::2])
-    for part, basis, k in ((u, bu, 0), (v, bv, 1)):
-        assert_allclose(basis.interpolate(part), beam.interpolate(x)[k], atol=1e-12)
 
 
 # functions of the space
@@ -138,13 +108,6 @@ def test_projection_is_exact_in_the_space(element, name):
     assert_allclose((q - exact)[basis.nodal_dofs].T * size, 0, atol=atol)
 
 
-def test_projection_of_a_vector_field(beam):
-    q = beam.project(lambda x: np.array([in_the_space(x), x[0] ** 3 - x[0] * x[1] ** 3]))
-    x = beam.global_coordinates()
-    expected = [in_the_space(x), x[0] ** 3 - x[0] * x[1] ** 3]
-    assert_allclose(beam.interpolate(q), expected, atol=1e-11)
-
-
 def test_projection_converges():
     """Cubic along the axis: fourth order, for a function of X alone."""
     errors = []
@@ -156,16 +119,6 @@ def test_projection_converges():
             basis, u=u - np.sin(basis.global_coordinates()[0])) / 0.1))
     assert errors[-1] < 2e-6
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
-
-
-def test_projection_across_the_section_converges_with_the_order():
-    def error(n):
-        basis = Basis(MeshBeam.init_line([0, 1], 2.0), ElementBeamANCF(n), intorder=40)
-        u = basis.interpolate(basis.project(lambda x: np.exp(x[1])))
-        return np.max(np.abs(u - np.exp(basis.global_coordinates()[1])))
-    errors = [error(n) for n in range(1, 9)]
-    assert errors[-1] < 1e-6
-    assert np.all(np.divide(errors[:-1], errors[1:]) > 3)
 
 
 @pytest.mark.parametrize("name", ["unequal", "inclined", "s-curve"])
@@ -193,16 +146,6 @@ def test_probes_outside(beam):
         beam.probes(np.array([[0.2, 0.7], [0.0, 0.11]]))
 
 
-def test_interpolation_between_meshes():
-    """A finer mesh takes over a function exactly."""
-    coarse = Basis(MESHES["unequal"](), ElementBeamANCF(2))
-    q = np.random.default_rng(0).random(coarse.N)
-    fine = Basis(coarse.mesh.refined(), ElementBeamANCF(2))
-    taken = fine.project(coarse.interpolator(q))
-    x = fine.global_coordinates()
-    assert_allclose(fine.interpolate(taken), coarse.interpolator(q)(np.asarray(x)), atol=1e-11)
-
-
 # kinds of bases
 
 def test_parts_of_the_mesh(element, mesh):
@@ -215,25 +158,6 @@ def test_parts_of_the_mesh(element, mesh):
     assert_allclose(last.dx, whole.dx[-1:])
     q = np.random.default_rng(1).random(whole.N)
     assert_allclose(last.interpolate(q), whole.interpolate(q)[-1:], atol=1e-14)
-
-
-def test_part_by_name_or_place(beam):
-    for elements in ("tip", lambda x: x[0] > 1, [2], np.array([2])):
-        assert_array_equal(Basis(beam.mesh, beam.elem, elements=elements).tind, [2])
-    q = beam.with_elements("tip").project(lambda x: np.array([x[0], x[1]]))
-    assert np.all(q[:20] == 0)
-    assert_allclose(beam.interpolate(q)[0][2], beam.global_coordinates()[0][2], atol=1e-12)
-
-
-def test_with_element(beam):
-    other = beam.with_element(ElementBeamPatelShabana())
-    assert type(other) is CellBasis and other.mesh is beam.mesh
-    assert_array_equal(other.X, beam.X)
-    assert_array_equal(other.dx, beam.dx)
-    assert other.N == 4 * 4
-    facet = beam.boundary("top").with_element(ElementBeamP1())
-    assert type(facet) is FacetBasis and facet.N == 4
-    assert_array_equal(facet.find, beam.mesh.boundaries["top"])
 
 
 def test_boundary(beam):
@@ -276,28 +200,6 @@ def test_fields_are_continuous_across_sections(element, name):
     assert_allclose(a, b, atol=1e-12)
     along = np.einsum("iep,ie->ep", a.grad - b.grad, mesh.p_Y[:, 1:-1])
     assert_allclose(along, 0, atol=1e-9)
-
-
-def test_oriented_basis():
-    """Orientation picks the side, and with it the sign of the normal."""
-    m = MESHES["straight"]()
-    for normal in ([1.0, 0.0], [-1.0, 0.0]):
-        f = m.facets_satisfying(lambda x: np.isclose(x[0], 0.5), normal=normal)
-        fb = FacetBasis(m, ElementBeamP1(), facets=f)
-        assert_allclose(fb.normals[:, 0, 0], normal, atol=1e-14)
-        assert_array_equal(fb.tind, [0 if normal[0] > 0 else 1])
-
-
-def test_surface_load_on_an_arc():
-    """Uniform pressure on the inner surface: its resultant is that on the chord."""
-    h, p, errors = 0.3, 5.0, []
-    for n in (4, 8, 16):
-        m = quarter_arc(n, h)
-        basis = Basis(m, ElementVector(ElementBeamANCF(2)), intorder=4)
-        f = LinearForm(lambda v, w: -p * dot(w.n, v)).assemble(basis.boundary("top", intorder=10))
-        total = [f[basis.nodal_dofs[i]].sum() for i in (0, 1)]
-        errors.append(np.max(np.abs(np.array(total) - p * (1 - h / 2))))
-    assert errors[-1] < 1e-12  # the end points lie on the circle, whatever runs between
 
 
 # forms and solvers
@@ -346,35 +248,6 @@ def test_poisson_in_the_space(element, how):
     error = poisson(MESHES["unequal"](), element, lambda x: -6 * x[0],
                     lambda x: x[0] ** 3 - 2 * x[0], how)
     assert error < (1e-11 if how != "penalize" else 1e-5)
-
-
-def test_poisson_converges():
-    errors = [poisson(MeshBeam.init_line(np.linspace(0, 3, n + 1), 0.1), ElementBeamANCF(2),
-                      lambda x: np.sin(x[0]), lambda x: np.sin(x[0])) for n in (4, 8, 16)]
-    assert errors[-1] < 2e-6
-    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
-
-
-@pytest.mark.parametrize("order", [2, 3])
-def test_poisson_on_an_arc_converges(order):
-    """u = angle is harmonic, with no flux through the curved surfaces."""
-    errors = [poisson(quarter_arc(n, 0.2), ElementBeamANCF(order), lambda x: 0 * x[0],
-                      lambda x: np.arctan2(x[1], x[0])) for n in (2, 4, 8)]
-    assert errors[-1] < 1e-4
-    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 1.9)
-
-
-def test_mpc_periodic():
-    """The right end tied to the left: the pure Fourier mode 1 of a ring, cut open."""
-    basis = Basis(MeshBeam.init_line(np.linspace(0, 2 * np.pi, 13), 0.1), ElementBeamANCF(1))
-    A = laplace.assemble(basis) + mass.assemble(basis)
-    b = LinearForm(lambda v, w: 2 * np.cos(w.x[0] - 0.3) * v).assemble(basis)
-    S, M = basis.get_dofs("right").all(), basis.get_dofs("left").all()
-    add = identity(basis.N, format="lil")
-    add[M, S] = 1.0  # stock mpc drops the equations of S: they belong to those of M
-    y = solve(*mpc(add.tocsr() @ A, add @ b, S=S, M=M))
-    assert_allclose(y[basis.nodal_dofs[0]], np.cos(basis.mesh.p[0] - 0.3), atol=2e-4)
-    assert_allclose(y[basis.get_dofs("left")], y[basis.get_dofs("right")], atol=1e-14)
 
 
 def elasticity(E, nu):
@@ -431,50 +304,6 @@ def test_scalar_element(mesh):
     assert_allclose(got, q[mesh.t[0]][:, None] * (1 - xi[0]) + q[mesh.t[1]][:, None] * xi[0],
                     atol=1e-11)
     assert_array_equal(basis.get_dofs("right"), [mesh.nvertices - 1])
-
-
-def test_heat_along_a_beam():
-    """Temperatures 1 and 4 at the ends: linear between, and they load a beam form as a field."""
-    m = MESHES["unequal"]()
-    scalar = Basis(m, ElementBeamP1(), intorder=8)
-    x = scalar.zeros()
-    x[0], x[-1] = 1.0, 4.0
-    T = solve(*condense(laplace.assemble(scalar), x=x, D=scalar.get_dofs(["left", "right"])))
-    assert_allclose(T, 1 + 3 * (m.p[0] + 1) / 2.7, atol=1e-13)
-    basis = scalar.with_element(ElementBeamANCF(1))
-    load = LinearForm(lambda v, w: w["T"] * v).assemble(basis, T=scalar.interpolate(T))
-    one = basis.zeros()
-    one[basis.nodal_dofs[0]] = 1.0
-    assert_allclose(load @ one, 2.5 * 2.7 * m.height, rtol=1e-13)
-
-
-def test_composite_with_a_scalar_field():
-    """Position and a scalar field in one element."""
-    m = MESHES["arc"]()
-    e = ElementVector(ElementBeamANCF(2)) * ElementBeamP1()
-    basis = Basis(m, e)
-    assert basis.N == (8 + 1) * m.nvertices
-    q = np.arange(float(basis.N))
-    (u, ub), (T, Tb) = basis.split(q)
-    assert (len(u), len(T)) == (8 * m.nvertices, m.nvertices)
-    both = basis.interpolate(q)
-    assert_allclose(both[0], ub.interpolate(u), atol=1e-11)
-    assert_allclose(both[1], Tb.interpolate(T), atol=1e-12)
-
-
-def test_projection_on_an_arc_converges():
-    """Sections are linear along the axis: second order, and first order for the gradient."""
-    errors = []
-    for n in (8, 16, 32):
-        basis = Basis(quarter_arc(n, 0.2), ElementBeamANCF(3), intorder=10)
-        u = basis.interpolate(basis.project(lambda x: np.sin(2 * x[0]) * x[1]))
-        x = basis.global_coordinates()
-        exact = np.array([2 * np.cos(2 * x[0]) * x[1], np.sin(2 * x[0])])
-        errors.append([np.max(np.abs(u - np.sin(2 * x[0]) * x[1])),
-                       np.max(np.abs(grad(u) - exact))])
-    rates = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert np.all(np.less(errors[-1], [2e-4, 0.03]))
-    assert np.all(rates[:, 0] > 1.9) and np.all(np.abs(rates[:, 1] - 1) < 0.15)
 
 
 def test_scikit_fem_draws_a_beam_or_says_what_does():

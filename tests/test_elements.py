@@ -1,13 +1,12 @@
 """The beam elements: their space, their coordinates, and what they represent exactly."""
 
-from copy import deepcopy
 from math import factorial
 
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial, chebyshev
 from numpy.testing import assert_allclose, assert_array_equal
-from skfem import Basis, ElementTriP1, ElementVector, FacetBasis, Functional, MeshTri
+from skfem import Basis, ElementVector, Functional
 from skfem.models.poisson import mass
 
 from conftest import MESHES
@@ -118,11 +117,6 @@ def test_gauss_lobatto_points_are_the_roots(n):
         assert_allclose(w @ x**k, 2 / (k + 1) if k % 2 == 0 else 0.0, atol=1e-14)
 
 
-def test_gauss_lobatto_points():
-    assert_allclose(ElementBeamANCF(4, "gauss-lobatto").section_points * 2,
-                    [-1, -1 / np.sqrt(5), 1 / np.sqrt(5), 1], atol=1e-15)
-
-
 # the space and its coordinates
 
 @pytest.mark.parametrize("L, h", SIZES)
@@ -157,26 +151,6 @@ def test_functions_are_dual_to_the_coordinates(element, name):
         assert_allclose(matrix * size / size[:, None], np.eye(len(matrix)), atol=1e-10)
 
 
-@pytest.mark.parametrize("L, h", SIZES)
-def test_duality_does_not_depend_on_units(element, L, h):
-    matrix = functionals(element, one_element(L, h), L, h)[0]
-    size = units(element, L, h)
-    assert_allclose(matrix * size / size[:, None], np.eye(len(size)), atol=1e-10)
-
-
-@pytest.mark.parametrize("spoil", ["point", "length", "height"])
-def test_the_duality_test_can_fail(spoil):
-    element, mesh = ElementBeamANCF(3), one_element(0.7, 0.3)
-    if spoil == "point":
-        first, second, (eta, *rest), *others = element.functionals
-        vars(element)["functionals"] = first, second, (eta + 0.01, *rest), *others
-    elif spoil == "length":
-        vars(mesh)["lengths"] = mesh.lengths * 1.01
-    else:
-        vars(mesh)["height"] *= 1.01
-    assert np.max(np.abs(functionals(element, mesh, 0.7, 0.3) - np.eye(10))) > 1e-3
-
-
 def test_gradients_are_those_of_the_values(element, mesh):
     X = POINTS[:, :7]
     for axis in (0, 1):
@@ -193,31 +167,6 @@ def test_partition_of_unity(element, mesh):
     position = [0, element.nodal_dofs]
     assert_allclose(values[position].sum(0), 1.0, atol=1e-14)
     assert_allclose(gradients[position].sum(0), 0.0, atol=1e-12)
-
-
-def test_functions_scale_with_length_and_height(element):
-    value, grad = tabulate(element, one_element(1.0, 1.0))
-    L, h = 0.37, 2.9
-    scaled, scaled_grad = tabulate(element, one_element(L, h))
-    for i, (_, mx, my) in enumerate(2 * element.functionals):
-        assert_allclose(scaled[i], L ** mx * h ** my * value[i], rtol=1e-12, atol=1e-14)
-        for axis, size in enumerate((L, h)):
-            assert_allclose(scaled_grad[i, axis], L ** mx * h ** my / size * grad[i, axis],
-                            rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize("shape", ["same points", "other points", "points per element"])
-def test_one_element_on_several_meshes(element, shape):
-    """Nothing may be remembered from the last mesh or points."""
-    fresh = deepcopy(element)
-    first, second = MESHES["unequal"](), MESHES["arc"](height=0.11)
-    X = {"same points": POINTS, "other points": POINTS[::-1].copy(),
-         "points per element": np.random.default_rng(1).random((2, second.nelements, 5))}[shape]
-    tabulate(element, first)
-    tabulate(element, first, X)
-    for got, expected in zip(tabulate(element, second, X), tabulate(fresh, second, X)):
-        assert_array_equal(got, expected)
-    assert np.max(np.abs(tabulate(element, second)[0] - tabulate(element, first)[0])) > 1e-3
 
 
 def test_points_per_element_and_subsets(element, arc):
@@ -247,24 +196,6 @@ def test_patel_shabana_is_order_two_in_other_coordinates():
     assert_allclose(M_ps, T.T @ M @ T, atol=1e-15)
 
 
-@pytest.mark.parametrize("family", POINT_FAMILIES)
-def test_families_span_the_same_space(family):
-    ours, other = ElementBeamANCF(6), ElementBeamANCF(6, points=family)
-    T = np.array([ours.section(other.section_points, k)[1] for k in range(6)])
-    for k in range(6):
-        eta = np.linspace(-0.5, 0.5, 11)
-        combined = sum(T[k, j] * other.section(eta, j)[0] for j in range(6))
-        assert_allclose(ours.section(eta, k)[0], combined, atol=1e-14)
-
-
-@pytest.mark.parametrize("order", range(1, 10))
-def test_spaces_are_nested(order):
-    low, high = (tabulate(ElementBeamANCF(n), one_element())[0][:, 0] for n in (order, order + 1))
-    _, residual, rank, _ = np.linalg.lstsq(high.T, low.T, rcond=None)
-    assert rank == len(high) and np.max(residual) < 1e-24
-    assert np.max(np.linalg.lstsq(low.T, high.T, rcond=None)[1]) > 1e-9
-
-
 # the stress-free state
 
 def test_stress_free_state_and_rigid_motion_are_exact(element, mesh):
@@ -282,15 +213,6 @@ def test_stress_free_state_and_rigid_motion_are_exact(element, mesh):
         expected = np.einsum("ij,jep->iep", Q, x) + np.array(shift)[:, None, None]
         assert_allclose(field, expected, atol=1e-13)
         assert_allclose(field.grad, Q[:, :, None, None] + 0 * field.grad, atol=2e-11)
-
-
-def test_stress_free_state_on_the_surface(element, mesh):
-    mesh = mesh.with_sections(element.sections)
-    _, q = reference_state(element, mesh)
-    surface = FacetBasis(mesh, ElementVector(element), facets=["top", "bottom", "left", "right"])
-    field = surface.interpolate(q)
-    assert_allclose(field, surface.global_coordinates(), atol=1e-12)
-    assert_allclose(field.grad, np.eye(2)[:, :, None, None] + 0 * field.grad, atol=5e-11)
 
 
 @pytest.mark.parametrize("sections", ["linear", "cubic"])
@@ -338,40 +260,10 @@ def test_default_quadrature_is_exact(element):
     assert_allclose(M, exact, atol=1e-14)
 
 
-def test_composite_is_vector(element, arc):
-    """ElementComposite and ElementVector have the same functions, in another order."""
-    n = range(2 * len(element.doflocs))
-    composite = [element_pair(element * element, arc, i) for i in n]
-    vector = [element_pair(ElementVector(element), arc, i) for i in n]
-    assert_array_equal(np.unique(composite, axis=0), np.unique(vector, axis=0))
-    assert len(np.unique(vector, axis=0)) == len(n)
-
-
-def element_pair(element, mesh, i):
-    """Values and gradients of both components of function i, in one row."""
-    fields = element.gbasis(mesh.mapping(), POINTS, i)
-    if len(fields) == 2:
-        both = [np.array([*fields]), np.array([f.grad for f in fields])]
-    else:
-        both = [np.asarray(fields[0]), fields[0].grad]
-    return np.concatenate([b.ravel() for b in both])
-
-
-def test_foreign_meshes_and_elements_are_refused(element):
-    with pytest.raises(ValueError, match="Incompatible"):
-        Basis(MeshTri(), element)
-    with pytest.raises(ValueError, match="Incompatible"):
-        Basis(one_element(), ElementTriP1())
-
-
 @pytest.mark.parametrize("order", [0, -1, 2.0, 1.5, True, "3", None, np.nan])
 def test_bad_order(order):
     with pytest.raises(InputError, match="integer from 1 to 64"):
         ElementBeamANCF(order)
-
-
-def test_numpy_order():
-    assert ElementBeamANCF(np.int64(3)).order == 3
 
 
 @pytest.mark.parametrize("points", ["gauss", "Chebyshev", None, [0.0]])

@@ -1,6 +1,5 @@
 """A family of elements from outside: one class, and the default formulation fits it."""
 
-from functools import cached_property
 
 import numpy as np
 import pytest
@@ -92,16 +91,6 @@ def test_held_are_the_modes_that_the_samples_miss(name):
     for mode in element.stabilised:  # and none is held in vain
         both = [mode.weights @ part for part in (kernel[0::2], kernel[1::2])]
         assert np.max(np.abs(both)) > 1e-6 * s[0]
-
-
-@pytest.mark.parametrize("element, k", [(ElementBeamANCF(3), 1.0), (ElementBeamANCFCubic(2), 10.0)])
-def test_held_of_a_cubic_axis_is_the_mean_slope_less_the_chord(element, k):
-    mode, nb = element.stabilised[0], element.nodal_dofs
-    expected = np.zeros(2 * nb)
-    expected[[0, 1, nb, nb + 1]] = 1.0, 0.5, -1.0, 0.5
-    assert_allclose(mode.weights, expected, atol=1e-15)
-    assert mode.size == k and mode.per == ("element" if element.sections == "linear"
-                                           and element.order else "beam")
 
 
 @pytest.mark.parametrize("p, s", [(3, 1), (3, 3), (5, 1), (5, 3), (5, 5), (7, 5)])
@@ -233,37 +222,6 @@ def test_the_error_does_not_depend_on_the_slenderness(name, error, plane):
     assert np.all(np.abs(found[3:]) < error)
     assert abs(found[2] - found[4]) < 1e-5  # what a beam that is not inextensible adds
     assert abs(found[3] - found[4]) < 1e-6
-
-
-class OneSampleMore(Quintic):
-    """As many samples of eps_xy as of eps_yy: nothing is left to bend with."""
-
-    @cached_property
-    def sampling(self):
-        sampling = super().sampling
-        return sampling._replace(samples={**sampling.samples, "xy": sampling.samples["yy"]})
-
-
-def test_one_sample_more_locks(monkeypatch):
-    monkeypatch.setitem(OWN, "locking", OneSampleMore)
-    spread = [np.ptp([cantilever(name, 16, slenderness, "stress").displacement((1, 0))[1]
-                      for slenderness in (1e4, 1e5, 1e6)]) for name in ("quintic", "locking")]
-    assert spread[0] < 2e-7
-    assert spread[1] > 5e-6
-
-
-@pytest.mark.parametrize("name", OWN)
-def test_thick(name):
-    """L/h = 10 under a small load: Timoshenko's beam, to what the order of the section lacks."""
-    mesh, E, nu, P = line(8, 0.1), 2e8, 0.3, 1e-3
-    material = StVenantKirchhoff(E, nu)
-    beam = Beam(mesh, OWN[name](), material, WIDTH)
-    scene = Scene(beam).clamp("left", thickness="free").point_force((0, -P), at=(1, 0))
-    state = scene.solve_static()
-    I, GA = WIDTH * 0.1**3 / 12, material.shear_factor(beam.element) * material.G * WIDTH * 0.1
-    expected = -P / (3 * E * I) - P / GA
-    assert state.iterations <= 4
-    assert state.displacement((1, 0))[1] == pytest.approx(expected, rel=1e-3)
 
 
 def test_high_order():

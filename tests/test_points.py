@@ -2,19 +2,28 @@
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from conftest import quarter_arc, s_curve
 from test_io import affine
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, InputError, MeshBeam, MeshError, NameUnknown,
-                        Scene, StVenantKirchhoff)
+                        InputError, MeshBeam, MeshError, NameUnknown, NeoHookean, Scene, Section,
+                        StVenantKirchhoff)
 from skfem_ancf.mesh import location as finder
-from skfem_ancf.beam.points import as_points
+from skfem_ancf.beam.strains import strain_at
 
 STEEL = StVenantKirchhoff(E=1e6, nu=0.3, density=10.0)
 LINE = MeshBeam.init_line([0, 0.3, 1.0], height=0.1)
 METHODS = ("displacement", "position", "velocity", "strain", "stress")
+MESHES = {"straight": lambda: MeshBeam.init_line([-1.0, -0.4, 0.3, 1.2], 0.1, angle=0.7),
+          "arc": lambda: quarter_arc(height=0.1), "s-curve": lambda: s_curve(0.1)}
+TAPERS = {True: lambda: MeshBeam.init_line([0.0, 0.5, 1.2], height=lambda x: 0.1 - 0.05 * x),
+          False: lambda: MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                                             [0.0, 0.5, 1.2], height=lambda s: 0.1 - 0.05 * s)}
+SETTINGS = dict(max_examples=60, deadline=None, database=None, derandomize=True)
+PART = st.floats(0.0, 1.0)
 
 
 def inside(mesh, n=40, seed=0):
@@ -31,23 +40,46 @@ def bent(mesh, element):
         (2, -3), at=mesh.p[:, -1]).solve_static()
 
 
-@pytest.mark.parametrize("element", [
-    ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamPatelShabana(),
-    ElementBeamCable(), ElementBeamCable(5)], ids=repr)
-@pytest.mark.parametrize("mesh", [LINE, quarter_arc(height=0.1)], ids=["straight", "arc"])
-def test_many_points_are_as_many_single_ones(mesh, element):
-    state = bent(mesh, element)
-    x = inside(mesh)[2]
-    for name in METHODS:
-        many = getattr(state, name)(x)
-        one = np.array([getattr(state, name)(tuple(p)) for p in x.T]).T
-        assert many.shape == one.shape
-        assert_allclose(many, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
-        assert_array_equal(getattr(state, name)([tuple(p) for p in x.T]), many)
-    for name in METHODS[3:]:
-        raw = getattr(state, name)(x, recover=False)
-        one = np.array([getattr(state, name)(p, recover=False) for p in x.T]).T
-        assert_allclose(raw, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+def agree(state, x, tol=1e-13, names=METHODS, beam=None):
+    """All that is known at points, one by one and together."""
+    for name in names:
+        for options in ({}, {"recover": False}) if name in ("strain", "stress") else ({},):
+            ask = getattr(state, name)
+            many = ask(x, beam, **options)
+            one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
+            assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(),
+                            err_msg=f"{name} {options}")
+
+
+def loaded(beam):
+    end = beam.mesh.p[:, -1]
+    return Scene(beam).clamp("left").point_force((0.5, -1.5), at=end).solve_static()
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+def test_every_element(mesh, element):
+    """On faces, between elements, on the axis, and anywhere; at rest."""
+    state = loaded(Beam(MESHES[mesh](), element, STEEL, 0.1))
+    agree(state, inside(state.beams[0].mesh)[2])
+
+
+@pytest.mark.parametrize("mesh", ["straight", "arc"])
+@pytest.mark.parametrize("kind", ["taper", "profile", "layers", "law", "tapered profile",
+                                  "tapered layers"])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
+def test_other_sections_and_laws(kind, element, mesh):
+    mesh, material, section = MESHES[mesh](), STEEL, None
+    if "taper" in kind:
+        mesh = TAPERS[mesh.is_straight]()
+    if "profile" in kind:
+        section = Section.profile("I", width=0.1, web=0.04, flange=0.01)
+    elif "layers" in kind:
+        material, section = None, Section.layers(
+            (0.02, STEEL), (None if "taper" in kind else 0.08, STEEL.replace(E=3e6)), width=0.1)
+    elif kind == "law" and element.order:
+        material = NeoHookean(1e6, 0.3)
+    beam = Beam(mesh, element, material, None if section else 0.1, section=section)
+    agree(loaded(beam), inside(mesh, 30)[2])
 
 
 @pytest.mark.parametrize("mesh", [LINE, s_curve(), quarter_arc()], ids=["line", "s-curve", "arc"])
@@ -157,13 +189,6 @@ def test_no_points_and_one_of_many():
     assert state.strain(np.zeros((2, 1))).shape == (3, 1)
 
 
-def test_points_that_are_changed_in_place_are_other_points():
-    state, x = bent(LINE, ElementBeamANCF(2)), inside(LINE)[2]
-    first = state.displacement(x)
-    x[0] *= 0.5
-    assert np.abs(state.displacement(x) - first).max() > 1e-3
-
-
 @pytest.mark.parametrize("what, error, message", [
     (np.zeros((5, 2)), MeshError, r"shape \(2, n\).*got \(5, 2\); give its transpose"),
     (np.zeros((3, 4)), MeshError, r"got \(3, 4\)$"),
@@ -172,6 +197,7 @@ def test_points_that_are_changed_in_place_are_other_points():
     ([(0.1, 0), (np.nan, 0)], InputError, "NaN"),
     (np.array([[0.1], [np.inf]]), InputError, "infinite"),
     ([(True, 0.0)], MeshError, "two coordinates"),
+    ((True, 0.0), MeshError, "two coordinates"),
     ([], MeshError, "two coordinates"),
     ("lef", MeshError, "name of an end"),
 ])
@@ -180,12 +206,6 @@ def test_what_is_no_point(what, error, message):
     for name in METHODS:
         with pytest.raises(error, match=message):
             getattr(state, name)(what)
-
-
-def test_true_is_not_one():
-    state = bent(LINE, ElementBeamANCF(2))
-    with pytest.raises(MeshError, match="two coordinates"):
-        state.displacement((True, 0.0))
 
 
 def test_two_numbers_are_not_a_point_and_a_beam():
@@ -204,12 +224,6 @@ def test_points_outside_name_the_extent_of_the_body():
         state.displacement((1e200, 0.0))
     with pytest.raises(MeshError, match=r"outside the body \(2 of 3 points are\)"):
         state.displacement(np.array([[0.5, 2.0, 3.0], [0.0, 0.0, 0.0]]))
-
-
-def test_forms_of_points():
-    assert_array_equal(as_points([(1, 2), (3, 4)]), [[1, 3], [2, 4]])
-    assert_array_equal(as_points(np.array([[1, 2], [3, 4]])), [[1, 2], [3, 4]])
-    assert as_points([1, 2]).shape == (2,)
 
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])
@@ -248,3 +262,64 @@ def test_points_far_from_the_origin_are_found_on_curves(offset):
     assert_array_equal(found, e)
     assert np.all(outside == 0)
     assert_allclose(at, X, atol=1e-11 + 1e-14 * offset)
+
+
+@settings(**SETTINGS)
+@given(xi=PART, eta=PART, bend=st.floats(-1.2, 1.2), height=st.floats(1e-3, 0.4),
+       n=st.integers(1, 6), offset=st.sampled_from([0.0, 100.0]))
+@example(xi=0.0, eta=0.0, bend=1.0, height=0.3, n=3, offset=0.0)
+@example(xi=1.0, eta=1.0, bend=0.0, height=0.3, n=1, offset=0.0)
+def test_a_point_of_a_parabola_is_found(xi, eta, bend, height, n, offset):
+    """At the place that it was made from."""
+    nodes = np.linspace(-0.5, 0.5, n + 1)
+    mesh = MeshBeam.init_curve(lambda s: np.array([s + offset, bend * s * s]), nodes, height)
+    find, e = finder.Finder(mesh), (n - 1) // 2
+    x = mesh.mapping().F(np.array([[xi], [eta]]), np.array([e]))[:, 0]
+    found, X, (outside,) = find(x)
+    assert outside == 0
+    at = mesh.mapping().F(X, found)[:, 0]
+    assert_allclose(at, x, atol=1e-14 + 1e-15 * offset)
+
+
+@pytest.mark.parametrize("mesh", [quarter_arc(1, height=0.4), s_curve(0.4),
+                                  MeshBeam.init_line([0.0, 3.0], 0.4, angle=0.3)], ids=repr)
+def test_what_is_in_the_body_is_in_its_box(mesh):
+    x0, x1, y0, y1 = finder.Finder(mesh).box
+    x, y = inside(mesh, 500)[2]
+    assert x0 < x.min() and x.max() < x1 and y0 < y.min() and y.max() < y1
+
+
+@pytest.mark.parametrize("straight", [True, False])
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFCubic(2)], ids=repr)
+def test_strain_of_a_tapered_beam_is_that_of_its_displacement_gradient(element, straight):
+    beam = Beam(TAPERS[straight](), element, STEEL, 0.1, "continuum")
+    u = 0.05 * np.random.default_rng(2).standard_normal(beam.N)
+    e, X, _ = inside(beam.mesh)
+    H, frame = beam.gradients(u, X[:, :, None], e)
+    F = (H + frame)[..., 0]
+    C = np.einsum("iJn,iKn->JKn", F, F)
+    assert_allclose(strain_at(beam, u, e, X),
+                    [0.5 * (C[0, 0] - 1.0), 0.5 * (C[1, 1] - 1.0), C[0, 1]],
+                    atol=1e-12 * np.abs(C).max())
+
+
+@pytest.mark.parametrize("degree", [3, 5, 7])
+def test_points_of_the_exact_curve_are_points_of_a_cable(degree):
+    """A force, a spring, a hinge between nodes at the place that the curve's function says; the
+    elements of the mesh are cubics beside it."""
+    def arc(s):
+        return np.array([np.sin(s), 1 - np.cos(s)])
+
+    mesh = MeshBeam.init_curve(arc, np.linspace(0, 1, 9), height=0.02)
+    beam = Beam(mesh, ElementBeamCable(degree), StVenantKirchhoff(2e9, 0.3, 1000), width=0.02)
+    at = tuple(arc(0.546875))
+    force = np.array([0.03, -0.04])
+    scene = Scene(beam).clamp("left").point_force(force, at)
+    state = scene.solve_static(tol=1e-12)
+    reaction = state.reactions("left")
+    arm = state.position(at)
+    assert np.allclose(reaction.force, -force, rtol=0, atol=1e-10)
+    assert reaction.moment == pytest.approx(arm[1] * force[0] - arm[0] * force[1], rel=2e-5)
+    Scene(beam).clamp("left").spring(1.0, between=((beam, at), ("ground", (0.5, 1.0)))).system
+    with pytest.raises(InputError, match="off the axis"):
+        Scene(beam).clamp("left").point_force(force, tuple(arc(0.546875) + [-1e-4, 1e-4]))

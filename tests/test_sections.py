@@ -390,29 +390,6 @@ def test_a_cable_says_that_it_does_not_shear():
         Beam(mesh, ElementBeamCable(5), section=Section.numbers(EA=1e6, EI=EI, GA=GA))
 
 
-def test_modes_of_a_tube_and_of_a_bimetal_strip():
-    """First frequency of a slender cantilever: 3.516 sqrt(EI / rho A) / L^2."""
-    L = 10.0
-    section, area, second = PROFILES["tube"]
-    EA, ES, EI = composite(BIMETAL)
-    mass = 0.02 * (0.04 * 7800 + 0.06 * 8500)
-    for beam, ratio in (
-            (Beam(line(24, L=L), ElementBeamANCFCubic(2), PLAIN, section=section),
-             2e8 * second / (7800 * area)),
-            (Beam(line(24, L=L), ElementBeamCable(5), section=BIMETAL), (EI - ES**2 / EA) / mass)):
-        modes = Scene(beam).clamp("left").modes(2)
-        assert modes.frequencies[0] == pytest.approx(
-            1.8751040687**2 * np.sqrt(ratio) / L**2, rel=1e-3)
-
-
-def test_motion_conserves_energy():
-    for section, material in ((SANDWICH, None), (PROFILES["I"][0], STEEL)):
-        beam = Beam(line(4), ElementBeamANCF(2), material, section=section)
-        history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(
-            t_end=0.05, dt=1e-3, scheme="energy-momentum")
-        assert np.ptp(history.total_energy) < 1e-9 * max(np.ptp(history.kinetic_energy), 1e-3)
-
-
 @pytest.mark.parametrize("make, kind, words", [
     (lambda: Section.profile("J", width=1), NameUnknown, "profile"),
     (lambda: Section.profile("I", width=1), CallError, "web"),
@@ -455,34 +432,6 @@ def test_beams_with_sections_are_replaced_pickled_and_refined():
     assert plain.width == 0.02
     profile = plain.replace(section=PROFILES["I"][0])
     assert profile.width is None and profile.replace(material=BRASS).material is BRASS
-
-
-def test_a_bimetal_beam_bends_as_the_plane_body_and_each_layer_has_its_stress():
-    P, L = 1e-2, 0.5
-    pieces, y = [], -0.05
-    for thickness, law, b in BIMETAL.parts:
-        pieces.append((y, y + thickness, law, b))
-        y += thickness
-    _, basis, u = plane(pieces, L, (0.0, -P), n=(100, 4))
-    wanted = axis_tip(basis, u, L)
-    state = cantilever(Beam(line(40, L=L), ElementBeamANCFCubic(5), section=BIMETAL), (0.0, -P))
-    assert_allclose(state.displacement((L, 0.0))[1], wanted[1], rtol=3e-3)
-    Y = np.array([-0.0499, -0.03, -0.0101, -0.0099, 0.02, 0.0499])
-    x = np.array([0.25 + 0.0 * Y, Y])
-    exact = plane_stress(basis, u, x, pieces)[0]
-    assert_allclose(state.stress(x, recover=False)[0], exact, atol=5e-3 * np.abs(exact).max())
-
-
-def test_the_plan_lists_sections_and_strains():
-    scene = Scene(Beam(line(), ElementBeamANCF(2), section=BIMETAL)).clamp("left").eigenstrain(0.1)
-    reasons = {item.term: item.reason for item in scene.plan()}
-    assert "2 laws" in reasons["sections"] and "matrix" in reasons["stress-free strain"]
-    mesh = MeshBeam.init_line([0, 1], height=lambda x: 0.1 - 0.05 * x)
-    terms = {item.term: item.reason for item in Scene(
-        Beam(mesh, ElementBeamANCF(2), STEEL, width=0.1)).plan()}
-    assert "0.05 to 0.1" in terms["sections"]
-    assert "sections" not in {item.term for item in Scene(
-        Beam(line(), ElementBeamANCF(2), STEEL, width=0.1)).plan()}
 
 
 @pytest.mark.parametrize("height", [0.01, 0.1])
