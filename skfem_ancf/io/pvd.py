@@ -27,9 +27,8 @@ LISTED = 64
 class PvdWriter:
     """Writes one .vtu a frame, and a .pvd that lists them with their times.
 
-    Both files are complete after every :meth:`add`, so ParaView can follow a run, and what was
-    written before an interruption can be opened. Frames are called ``stem_00000.vtu``, and so on,
-    and lie beside the .pvd; outlines of obstacles are a second part of it.
+    Both are complete after every :meth:`add`, so that ParaView can follow a run. Frames are called
+    ``stem_00000.vtu`` and so on and lie beside the .pvd; outlines of obstacles are a second part.
 
     Parameters
     ----------
@@ -38,11 +37,6 @@ class PvdWriter:
         frame.
     **options
         Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
-
-    Raises
-    ------
-    InputError
-        If the file name does not end with .pvd.
 
     Examples
     --------
@@ -79,7 +73,7 @@ class PvdWriter:
             logger.info("wrote %s: %d frames", self.path, len(self.frames))
 
     def add(self, state: Any, t: float) -> Path:
-        """Write a frame.
+        """Write a frame, and return its file.
 
         Parameters
         ----------
@@ -87,11 +81,6 @@ class PvdWriter:
             A State, or anything with its ``beams`` and ``u_of``.
         t
             Its time, later than that of the frame before.
-
-        Returns
-        -------
-        pathlib.Path
-            The frame's file.
         """
         frame = self._frame(state, t)
         self._list()

@@ -42,8 +42,6 @@ class VtkHdfWriter:
 
     Raises
     ------
-    InputError
-        If the file name does not end with .vtkhdf.
     FileError
         If the file cannot be written; what was there stays.
     MissingExtra
@@ -124,7 +122,7 @@ class VtkHdfWriter:
             done()
 
     def add(self, state: Any, t: float) -> Path:
-        """Append a frame.
+        """Append a frame, and return the file that there will be.
 
         Parameters
         ----------
@@ -132,11 +130,6 @@ class VtkHdfWriter:
             A State, or anything with its ``beams`` and ``u_of``.
         t
             Its time, later than that of the frame before.
-
-        Returns
-        -------
-        pathlib.Path
-            The file that there will be.
         """
         t = require_next(state, t, self.times[-1] if self.times else None)
         body = body_fields(state, **self.options)

@@ -37,7 +37,7 @@ class BodyFields(NamedTuple):
     points
         Positions, shape (n, 3); elements do not share points.
     cells
-        For each beam its cell type and its cells, as rows of point numbers; for each rigid body its
+        For each beam its cell type and its cells, as rows of point numbers; of each rigid body its
         outline.
     point_data
         Fields by name, shape (n,) or (n, 3): vectors have a third component of zero, tensors
@@ -54,30 +54,22 @@ class BodyFields(NamedTuple):
 
 def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
                 undeformed: bool = False, recover: bool = True, fields: Any = None) -> BodyFields:
-    """The body of a state on points.
+    """The body of a state on points, with the arguments of :func:`save_vtu`.
 
     Parameters
     ----------
     state, subdivide, lagrange, undeformed, recover, fields
         As for :func:`save_vtu`.
 
-    Returns
-    -------
-    BodyFields
-
     Examples
     --------
-    >>> import numpy as np
+    >>> import meshio, numpy as np
     >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
     >>> from skfem_ancf.io import body_fields
     >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
     ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
-    >>> body = body_fields(state, subdivide=(8, 4))
-    >>> body.points.shape, body.cells[0][0], body.cells[0][1].shape  # 4 elements, 9 x 5 points
-    ((180, 3), 'quad', (128, 4))
-    >>> sorted(body.point_data)[:4]
-    ['S_xx', 'S_xy', 'S_yy', 'displacement']
+    >>> meshio.Mesh(*body_fields(Scene(beam).state())).points.shape  # 4 elements, 9 x 5 points
+    (180, 3)
     """
     found, wanted = grids(state, subdivide, lagrange, recover), find_fields(fields)
     undeformed = require_flag("undeformed", undeformed)
@@ -116,26 +108,23 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              fields: Any = None, precision: str = "double", encoding: Any = None) -> Path:
     """Write the deformed body of a state for ParaView.
 
-    All beams go into one file. Points belong to one element each, since strains and stresses
-    may jump between elements. The file replaces an older one of the same name only once it is
-    complete.
+    All beams go into one file, which replaces an older one only once it is complete. Points belong
+    to one element each, since strains and stresses may jump between elements.
 
     =============================  ==========================================================
     on points                      meaning
     =============================  ==========================================================
-    displacement                   from the stress-free state, 3 components, the last zero
+    displacement                   from the reference configuration, 3 components
     eps_xx, eps_yy, eps_xy         Green-Lagrange strain in the beam's own frame: x along the
-                                   axis, y across the section of the stress-free beam
+                                   axis, y across the section of the undeformed beam
     S_xx, S_yy, S_xy               second Piola-Kirchhoff stress in the same frame
-    sigma_xx, sigma_yy, sigma_xy   Cauchy stress F S F^T / J along the global axes; J holds the
-                                   change of thickness in plane stress. NaN where the material
-                                   has no thickness left, or a user-defined law does not say it.
+    sigma_xx, sigma_yy, sigma_xy   Cauchy stress along the global axes; NaN where the material
+                                   has no thickness left, or a law does not say it
     =============================  ==========================================================
 
     ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
     outline, numbered behind the beams, without strain and stress (NaN). The outlines of obstacles
-    about the body go into a file of lines beside it, ``name_obstacles``, with their numbers in
-    ``obstacle``.
+    go into a file of lines beside it, ``name_obstacles``, with their numbers in ``obstacle``.
 
     Parameters
     ----------
@@ -146,19 +135,17 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     subdivide
         Number of straight quads along and across each element.
     lagrange
-        Write each element as one VTK_LAGRANGE_QUADRILATERAL in place of straight quads. Its
-        degree is that of the axis, or N if that is larger, so the deformed geometry is exact up
-        to degree 10; beyond it, and for cables, whose sections follow the unit normal, it is
-        interpolated.
+        Write each element as one VTK_LAGRANGE_QUADRILATERAL of the degree of the axis, or N if that
+        is larger: the deformed geometry is exact up to degree 10, the largest that VTK evaluates,
+        but for cables, whose sections follow the unit normal.
     undeformed
-        Put the points at their stress-free places. ParaView's filter "Warp By Vector" then moves
+        Put the points at their undeformed places. ParaView's filter "Warp By Vector" then moves
         them by any multiple of ``displacement``.
     recover
-        Recovered strain and stress (:mod:`skfem_ancf.recovery.recovered`) where the state has them;
-        False for those of the elements at the points.
+        Recovered strain and stress where the state has them; False for those of the elements.
     fields
-        Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields, see
-        :mod:`skfem_ancf.recovery.fields`; those of the table by default.
+        Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; those of the table
+        by default.
     precision
         "double", or "single" for files of half the size.
     encoding
@@ -168,12 +155,6 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     -------
     pathlib.Path
         The file.
-
-    Raises
-    ------
-    InputError
-        If the file name ends otherwise, ``subdivide`` is not two positive integers, or a Lagrange
-        cell would exceed degree 10, the largest that VTK evaluates.
 
     Examples
     --------
@@ -198,16 +179,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
 
 
 def save_obstacles(walls: list[Array], path: Path, dtype: Any = np.float64) -> None:
-    """Write the outlines of obstacles into a file beside that of the body, if there are any.
-
-    Parameters
-    ----------
-    walls
-        For each obstacle the ends of its straight pieces, shape (m, 2, 2).
-    path
-        The file of the body.
-    dtype
-        Of the points.
+    """Write the outlines of obstacles, ends (m, 2, 2) of their straight pieces, into a file beside
+    that of the body, if there are any.
     """
     if not walls:
         return
@@ -228,17 +201,7 @@ def _write(path, body, dtype):
 
 
 def require_next(state: Any, t: Any, before: float | None) -> float:
-    """The time of the next frame of a series, or raise :class:`InputError`.
-
-    Parameters
-    ----------
-    state
-        The frame.
-    t
-        Its time.
-    before
-        That of the frame before, or None.
-    """
+    """The time of the next frame of a series after that of the one before, which may be None."""
     require_like("state", state, "State", "beams", "u_of")
     t = require_finite_scalar("t", t)
     if before is not None and t <= before:

@@ -116,7 +116,7 @@ class Field:
 
 
 class Values(Mapping):
-    """Everything that is known at points of one beam, computed when it is asked for.
+    """Everything that is known at n points of a beam, computed when it is asked for.
 
     A mapping from the names of :data:`FIELDS` to arrays (n,), or (components, n). Of a linear
     solution strain and S are linear, F is one and the displacement gradient of the elements, and
@@ -125,7 +125,7 @@ class Values(Mapping):
     Parameters
     ----------
     part
-        The :class:`~skfem_ancf.beam.interpolation.BeamPoints` with the points.
+        The :class:`~skfem_ancf.beam.interpolation.Part` with the points.
     u
         Displacement of the coordinates that the part is numbered by, shape (N,); of a linear
         solution the :func:`~skfem_ancf.core.linear.step` from its base.
@@ -136,16 +136,11 @@ class Values(Mapping):
 
     Attributes
     ----------
-    beam
-        The beam.
-    n : int
-        Number of points.
     x, u
         Reference positions, and their displacements, (2, n).
-    strain
-        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) in the beam's frame, (3, n).
-    elastic
-        The strain less the eigenstrain, (3, n).
+    strain, elastic
+        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) in the beam's frame, (3, n), and that less
+        the eigenstrain.
     S
         Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3, n).
     F
@@ -395,23 +390,9 @@ DRAWN = tuple(name for name, f in FIELDS.items() if f.components == 1 or name ==
 
 def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, ...] | None = None,
                ) -> Field:
-    """The Field meant by a name, a function or a Field.
+    """The Field meant by a name, a function of :class:`Values` or a Field.
 
-    Parameters
-    ----------
-    field
-        A name of :data:`FIELDS`, a function of :class:`Values`, or a :class:`Field`.
-    known
-        The names that are allowed; all by default.
-
-    Returns
-    -------
-    Field
-
-    Raises
-    ------
-    NameUnknown
-        If the name is not known; the message says the nearest.
+    Raises NameUnknown with the nearest of the ``known`` names, by default all of :data:`FIELDS`.
     """
     if isinstance(field, Field):
         return field
@@ -430,13 +411,7 @@ def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, .
 
 
 def find_fields(fields: Any) -> list[Field]:
-    """The Fields meant by one or several names, functions or Fields; None for the usual ones.
-
-    Raises
-    ------
-    InputError
-        If two have one name.
-    """
+    """The Fields meant by one or several names, functions or Fields; None for the usual ones."""
     if fields is None:
         fields = DEFAULT
     if isinstance(fields, (str, Field)) or callable(fields):
@@ -451,23 +426,11 @@ def find_fields(fields: Any) -> list[Field]:
 
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
-    """Values at reference points of every element of a beam.
+    """Values at reference points of all elements of a beam, (nelements, npoints) flattened.
 
-    Parameters
-    ----------
-    state
-        A :class:`~skfem_ancf.results.State`, or anything with its ``u_of``.
-    beam
-        One of its beams.
-    X
-        Reference points (xi, eta) in [0, 1], shape (2, npoints) or (2, nelements, npoints).
-    recover
-        Recovered strain and stress, where the state has them.
-
-    Returns
-    -------
-    Values
-        Its points are (nelements, npoints), flattened.
+    Points (xi, eta) in [0, 1] have the shape (2, npoints) or (2, nelements, npoints); ``state`` is
+    a :class:`~skfem_ancf.results.State`, or anything with its ``u_of``; with ``recover`` strain and
+    stress are recovered where the state has them.
     """
     ne = beam.mesh.nelements
     part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),

@@ -59,18 +59,8 @@ class Grid(NamedTuple):
 
 def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
           recover: bool = True) -> list[Grid]:
-    """The :class:`Grid` of each beam and rigid body of a state.
-
-    Parameters
-    ----------
-    state
-        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
-    subdivide
-        Quads along and across each element.
-    lagrange
-        One Lagrange cell for each element instead.
-    recover
-        Recovered strain and stress, where the state has them.
+    """The :class:`Grid` of each beam and rigid body of a state, or of anything with its ``beams``
+    and ``u_of``; ``subdivide`` says how many quads an element has, or it is one Lagrange cell.
     """
     require_like("state", state, "State", "beams", "u_of")
     m, n = subdivision(subdivide)
@@ -117,44 +107,23 @@ def in_space(x: Array) -> Array:
 
 
 def grid(m: int, n: int) -> Array:
-    """A grid of (m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints).
-
-    Parameters
-    ----------
-    m, n
-        Intervals along and across.
-    """
+    """A grid of (m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints)."""
     xi, eta = np.linspace(0, 1, m + 1), np.linspace(0, 1, n + 1)
     return tensor((xi, xi), (eta, eta))[0]
 
 
 def quads(m: int, n: int) -> Array:
-    """The m n quads of :func:`grid` as rows of 4 points, counterclockwise.
-
-    Parameters
-    ----------
-    m, n
-        Intervals along and across.
-    """
+    """The m n quads of :func:`grid` as rows of 4 points, counterclockwise."""
     k = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
     return np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1).reshape(-1, 4)
 
 
 def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
-    """Points and quads of an element; where fields jump across it has points on both sides.
+    """Points and quads of an element with m and n intervals along and across.
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    m, n
-        Intervals along and across, of these at least one for each piece of the section.
-
-    Returns
-    -------
-    X, quads
-        Points of the reference cell, shape (2, npoints), or (2, nelements, npoints) where pieces
-        have other parts of the height from place to place, and rows of 4 points.
+    There is at least one interval for each piece of the section; where fields jump across it there
+    are points on both sides. Points have the shape (2, npoints), or (2, nelements, npoints) where
+    pieces are other parts of the height from place to place.
     """
     sizes = np.diff(beam.across.ends())
     if len(sizes) == 1:

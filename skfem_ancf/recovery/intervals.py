@@ -22,17 +22,10 @@ ACROSS, MORE, FEW, ROUND = 7, 2, 5, 17
 
 
 class Interval(NamedTuple):
-    """A part of the section, on which fields are polynomials of a coordinate s on [0, 1].
+    """A part of the section from ``low`` to ``high`` (eta) with nodes of a coordinate s on [0, 1].
 
-    Attributes
-    ----------
-    low, high
-        Its ends, places eta.
-    curved
-        ``eta = middle - half cos(pi s)``, in which widths with square roots at the ends are smooth;
-        else s is linear in eta.
-    nodes
-        Points s, shape (n,).
+    Fields are polynomials of s. If it is curved, ``eta = middle - half cos(pi s)``, in which widths
+    with square roots at the ends are smooth; else s is linear in eta.
     """
 
     low: float
@@ -91,32 +84,24 @@ class Points(NamedTuple):
 
 
 class Intervals:
-    """Points across a section, with integrals and values of fields given there.
+    """Points across a section of given slabs, with integrals and values of fields given there.
 
-    The intervals of some tapered sections are other parts of the height from place to place. Their
-    points are then given where the section is highest; :meth:`points` has them elsewhere.
-
-    Parameters
-    ----------
-    layers
-        Of the section.
-    order
-        N of the element.
+    The intervals of some tapered sections are other parts of the height from place to place
+    (``moves``). Their points are then given where the section is highest; :meth:`points` has them
+    elsewhere.
 
     Attributes
     ----------
     eta
         The points, shape (m,); those of several intervals are inside of them.
-    layers
-        For each layer the columns of its points.
+    slabs
+        For each slab the columns of its points.
     width
-        Width of a layer at the points over its mean, area by height, shape (m,).
+        Width of a slab at the points over its mean, area by height, shape (m,).
     from_bottom, whole
         From values to the integrals over eta from 0 to the points, (m, m), and to 1, (m,).
     bottom, top
         From values to those at the lowest and the highest place, shape (m,).
-    moves : bool
-        The intervals are other parts of the height from place to place.
     """
 
     def __init__(self, layers: Sequence[Layer], order: int) -> None:

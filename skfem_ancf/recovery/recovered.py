@@ -56,25 +56,10 @@ CHUNK = 2048
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
-    """The strain of a given stress, by Newton's method.
+    """The strain of a given stress under a law, by Newton's method; both (3, ...).
 
-    Parameters
-    ----------
-    law
-        With ``stress`` and ``moduli``.
-    stress
-        Shape (3, ...); only the components ``unknown`` are used.
-    strain
-        To start from, shape (3, ...); components not in ``unknown`` keep their values.
-    unknown
-        Components to find, neighbours.
-    tol
-        Largest difference of the stress, relative to its largest value.
-
-    Raises
-    ------
-    NotRecovered
-        If there is no such strain.
+    Neighbouring components ``unknown`` are found, the others stay as they are in ``strain``;
+    ``tol`` is relative to the largest stress. Raises NotRecovered if there is no such strain.
     """
     k = list(unknown)
     strain = np.array(strain, dtype=np.result_type(strain, stress, float))
@@ -108,14 +93,7 @@ def _axial(law, strain):
 
 
 class Recovery:
-    """The recovered field of one beam.
-
-    Parameters
-    ----------
-    forces
-        The :class:`~skfem_ancf.recovery.section_forces.SectionForces` of the beam.
-    u
-        Displacement of its coordinates, shape (N,).
+    """The recovered field of one beam; raises NotRecovered if there is none.
 
     Attributes
     ----------
@@ -123,11 +101,6 @@ class Recovery:
         Why there are section forces, but no fields; "" if there are.
     segments
         The :class:`~skfem_ancf.recovery.segments.Segment` between each two cuts.
-
-    Raises
-    ------
-    NotRecovered
-        If the fields cannot be recovered.
     """
 
     def __init__(self, forces: SectionForces, u: Array) -> None:
@@ -200,12 +173,7 @@ class Recovery:
     def segment_of(self, e: Array, xi: Array, after: Any = False) -> Array:
         """The number of the segment of each section, (n,); a node at a cut is in its own element's.
 
-        Parameters
-        ----------
-        e, xi
-            Elements and places along them, shapes (n,).
-        after
-            True of sections at a cut inside of an element that are on its right, shape (n,).
+        ``after`` is True for sections at a cut inside of an element that are on its right.
         """
         cuts = self.forces.cuts
         at_node = np.minimum(xi, 1.0 - xi) < SNAP
@@ -220,19 +188,9 @@ class Recovery:
         return np.clip(found, 0, len(self.segments) - 1)
 
     def fields(self, X: Array, tind: Array | None = None) -> tuple[Array, Array, Array]:
-        """Strain (eps_xx, eps_yy, 2 eps_xy), stress (S_xx, S_yy, S_xy) and angle of the fibres.
-
-        Parameters
-        ----------
-        X
-            Reference points, (2, npoints) or (2, nelements, npoints).
-        tind
-            Elements, shape (nelements,), or None for all.
-
-        Returns
-        -------
-        strain, stress, angle
-            Shapes (3, ne, np), (3, ne, np) and (ne, np).
+        """Strain (eps_xx, eps_yy, 2 eps_xy), stress (S_xx, S_yy, S_xy), (3, ne, np), and angle of
+        the fibres (ne, np), at reference points (2, np) or (2, ne, np) of the elements ``tind``
+        (ne,).
         """
         e = np.arange(self.beam.mesh.nelements) if tind is None else np.asarray(tind)
         shape = (len(e), X.shape[-1])
@@ -241,14 +199,8 @@ class Recovery:
         return values[:3], values[3:6], values[6]
 
     def at(self, e: Array, X: Array, rows: slice = slice(7)) -> Array:
-        """Rows of strain, stress and angle (7 in all) at points of elements; (rows, n).
-
-        Parameters
-        ----------
-        e, X
-            Elements (n,) and reference points (2, n).
-        rows
-            A slice of the seven rows.
+        """Rows of strain, stress and angle (7 in all) at reference points X (2, n) of elements;
+        (rows, n).
         """
         xi, eta = X
         if self.intervals.moves:
@@ -265,17 +217,11 @@ class Recovery:
 
     @staticmethod
     def gradient(strain: Array, angle: Array) -> Array:
-        """The deformation gradient, (2, 2, ...).
+        """The deformation gradient, (2, 2, ...), of (eps_xx, eps_yy, 2 eps_xy) and the fibres'
+        angle.
 
         ``F[:, 0]`` and ``F[:, 1]`` are the derivatives of the position along the axis and across
         the section, in global components.
-
-        Parameters
-        ----------
-        strain
-            (eps_xx, eps_yy, 2 eps_xy), shape (3, ...).
-        angle
-            Angle of the fibres, in radians, shape (...).
         """
         lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
         across = angle + np.arccos(strain[2] / (lam_x * lam_y))

@@ -109,22 +109,11 @@ def over_time(instants: list[Resultants]) -> Resultants:
 def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
                eigen: Sequence[tuple[Any, Any]] = (), at: tuple[Array, Array] | None = None,
                chain: int | None = None) -> Resultants:
-    """The Resultants of a beam.
+    """The Resultants of a beam for a displacement ``u`` (N,), which may be a step.
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u
-        Displacement of its coordinates, shape (N,), or a :func:`~skfem_ancf.core.linear.step`.
-    recovery
-        Its Recovery; None for the stress of the elements.
-    eigen
-        Factors and loads of eigenstrains.
-    at
-        Elements of sections and places along them, shapes (n,); None for all elements.
-    chain
-        The chain of elements of all sections where none are given; None for all.
+    They follow from the recovery, or without one from the stress of the elements; ``eigen`` are
+    factors and loads of eigenstrains. Sections are at places and elements ``at``, (n,) each, or all
+    along the beam, or along one chain of its elements.
     """
     if at is None:
         e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts)

@@ -48,12 +48,8 @@ class NotRecovered(AncfError):
 
 
 class ArcLength:
-    """Arc length along the reference axis of a beam.
-
-    Attributes
-    ----------
-    nodes
-        That of the ends of the elements, shape (ne + 1,).
+    """Arc length along the reference axis of a beam; ``nodes`` (ne + 1,) at the ends of
+    elements.
     """
 
     def __init__(self, beam: Beam) -> None:
@@ -70,21 +66,12 @@ class ArcLength:
 
 
 class Sections:
-    """Geometry of points across sections, and what the shape functions are there.
+    """Points across sections: their geometry, and what the shape functions are there.
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    e, xi
-        Element of each section and its place there, shapes (n,).
-    eta
-        Points across each section, shape (k,) or (n, k); those of the axis by default.
-    lifted
-        Points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as its
-        :class:`~skfem_ancf.beam.masses.Masses` has them. If False, all are on the axis.
-    mapping
-        From the reference cell to the body; by default that of the mesh.
+    Sections are at places ``xi`` (n,) of elements ``e`` (n,), points at ``eta``, (k,) or (n, k).
+    With ``lifted`` points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as its
+    :class:`~skfem_ancf.beam.inertia.Inertia` has them; else all are on the axis. ``mapping`` is
+    from the reference cell to the body, by default that of the mesh.
     """
 
     def __init__(self, beam: Beam, e: Array, xi: Array, eta: Any = 0.5,
@@ -136,16 +123,14 @@ class Sections:
 
 
 class SectionForces:
-    """Force and moment in the sections of one beam.
+    """Force and moment in the sections of one beam, for a displacement ``u`` (N,).
+
+    Of linear solutions ``u`` is a :func:`~skfem_ancf.core.linear.step` from the reference
+    configuration, as are the factors of loads; then all results are one. Raises NotRecovered if
+    the state is no equilibrium.
 
     Parameters
     ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u
-        Displacement of its coordinates, shape (N,). Of linear solutions a
-        :func:`~skfem_ancf.core.linear.step` from the reference configuration, as are the factors
-        of loads; then all results are one.
     loads
         Pairs of a factor and a :class:`~skfem_ancf.beam.distribution.Spread`, or None for a load
         whose spread is not known.
@@ -162,11 +147,6 @@ class SectionForces:
     ----------
     cuts
         Axial coordinates, ends included, between which the section force is continuous.
-
-    Raises
-    ------
-    NotRecovered
-        If the spread of a load is not known, or the state is no equilibrium.
     """
 
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
@@ -285,13 +265,8 @@ class SectionForces:
     def at(self, e: Array, xi: Array, side: Any) -> tuple[Array, Array]:
         """Force (2, n) and moment (n,) about the axis: of the right part of the beam on the left.
 
-        Parameters
-        ----------
-        e, xi
-            Sections, shapes (n,).
-        side
-            End of the element from which the equilibrium is followed: 0, 1, or 0.5 for the mean
-            of both; shape (n,).
+        ``side`` is the end of the element from which the equilibrium is followed: 0, 1, or 0.5 for
+        the mean of both.
         """
         x, w = gauss(ALONG)
         inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
@@ -395,14 +370,7 @@ def _moments(q, force):
 def viscous_forces(beam: Beam, u: Array, v: Array, time: float) -> Array:
     """Forces of the elements of a beam that resist the rate of the strain, shape (ne, nb, 2).
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u, v
-        Displacement of its coordinates and its rate, shape (N,).
-    time
-        The retardation time.
+    They are those of a displacement ``u`` (N,), its rate ``v`` (N,) and a retardation time.
     """
     kernel = beam.kernel
     u, v = kernel.gather(u).ravel(), kernel.gather(v).ravel()

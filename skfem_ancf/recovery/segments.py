@@ -39,14 +39,7 @@ INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 def smoothed(s: Array, values: Array, length: float) -> Array:
     """The solution f of ``f - length^2 f'' = values`` with f' = 0 at both ends.
 
-    Parameters
-    ----------
-    s
-        Places, increasing, shape (n,).
-    values
-        Shape (..., n, m).
-    length
-        Length below which waves are damped.
+    Places ``s`` (n,) increase; values and f are (..., n, m).
     """
     d = np.diff(s)
     w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
@@ -60,14 +53,7 @@ def smoothed(s: Array, values: Array, length: float) -> Array:
 
 
 class Segment:
-    """The field between two cuts: at n sections, ends and middles of the elements, of m points.
-
-    Parameters
-    ----------
-    recovery
-        The :class:`~skfem_ancf.recovery.recovered.Recovery` of which it is a part.
-    start, end
-        Axial coordinates, element + xi, of both cuts.
+    """The field between two cuts, at n sections (ends and middles of elements) of m points.
 
     Attributes
     ----------
@@ -193,11 +179,8 @@ class Segment:
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """The integral from the axis of the derivative along it, at the same distance from it.
 
-        Parameters
-        ----------
-        values, d_ds
-            Values and their derivative, of points at the same parts of the height or of their
-            interval, shape (..., n, m).
+        Values (..., n, m) and their derivative ``d_ds`` are those of points at the same parts of
+        their interval.
         """
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]

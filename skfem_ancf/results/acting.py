@@ -43,20 +43,7 @@ def stations(state: Any) -> list[list[float]]:
 
 
 def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[float]]:
-    """Densities of force elements that act all along a beam, and the stations of other parts.
-
-    Parameters
-    ----------
-    state, unit
-        As for :func:`recover`.
-    beam
-        The beam.
-
-    Raises
-    ------
-    NotRecovered
-        If a force element does not say where it acts.
-    """
+    """Densities of force elements that act all along a beam, and the stations of other parts."""
     system = state.system
     sampled: list[Sampled] = []
     places: list[float] = []
@@ -85,21 +72,11 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
 
 def recover(state: Any, number: int, at: list[float], u: Array,
             unit: Any) -> Recovery | NotRecovered:
-    """The recovered field of one beam, or why there is none.
+    """The recovered field of a beam, which may have a step for its displacement ``u`` (N,), or why
+    there is none.
 
-    Parameters
-    ----------
-    state
-        The state.
-    number
-        The number of the beam.
-    at
-        Its :func:`stations`.
-    u
-        Displacement of its coordinates, shape (N,): of a linear solution a step.
-    unit
-        What factors of loads are times: a step where all is linear about the reference
-        configuration, else 1.
+    Supports and joints are at its :func:`stations`; ``unit`` is what factors of loads are times: a
+    step where all is linear about the reference configuration, else 1.
     """
     beam, system = state.beams[number], state.system
     if state.base is not None and not np.iscomplexobj(unit):

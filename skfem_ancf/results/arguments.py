@@ -18,14 +18,10 @@ _GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths", "heights")
 
 
 def difference(a: Beam, b: Beam) -> str | None:
-    """Why coordinates of one beam mean something else on another, in words; None if they do not.
+    """Why coordinates of one beam mean something else on another, that of the scene; None if they
+    do not.
 
     Materials, widths and loads do not matter: a displacement is one of the body.
-
-    Parameters
-    ----------
-    a, b
-        Beams; the message calls the second that of the scene.
     """
     if a is b or (a.mesh is b.mesh and a.element is b.element):
         return None
@@ -50,21 +46,10 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
-    """The displacement of a State, for the equations of a scene: a new array, shape (N,).
+    """The displacement (N,) of a State for the equations of a scene; ``name`` is what messages call
+    it.
 
-    Parameters
-    ----------
-    system
-        The :class:`~skfem_ancf.equations.system.System`.
-    state
-        A State of the same scene, or of one whose beams have equal meshes and elements.
-    name
-        What messages call it.
-
-    Raises
-    ------
-    InputError
-        If it is not a State, or one of another mesh, or not finite.
+    Raises InputError if it is no State, or one of other meshes and elements, or not finite.
     """
     if not isinstance(state, State):
         raise InputError(f"{name} is a State, as solve_static returns it, got "
@@ -92,17 +77,7 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
 def configuration(system: System, state: State) -> State:
     """A State with its multipliers, as one of the equations of a scene.
 
-    Parameters
-    ----------
-    system
-        The :class:`~skfem_ancf.equations.system.System`.
-    state
-        A State, as for :func:`displacement`.
-
-    Raises
-    ------
-    InputError
-        As :func:`displacement`, and if the state has multipliers of other joints.
+    Raises InputError as :func:`displacement`, and if it has multipliers of other joints.
     """
     u = displacement(system, state, "state")
     if state.system is system:

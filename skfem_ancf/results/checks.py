@@ -186,14 +186,7 @@ def _is_linear(beam):
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
     """Largest angle by which the axis turns over an element, by its tangents at the nodes.
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u
-        Displacement of its coordinates, shape (N,).
-    base
-        That about which it is linearised, shape (N,), or None.
+    For a displacement (N,), linear about a base if there is one.
     """
     left, right = beam.mesh.t
     if base is not None:
@@ -211,20 +204,7 @@ def _turns(beam, u, base=None):
 
 
 def tangents(beam: Beam, u: Array | float) -> Array:
-    """The axis' derivative r_X at the nodes, as complex numbers.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u
-        Displacement of its coordinates, shape (N,), or 0.
-
-    Returns
-    -------
-    ndarray
-        Shape (nvertices,), complex.
-    """
+    """The axis' derivative r_X at the nodes, as complex numbers, for a displacement (N,) or 0."""
     return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
 
 
@@ -234,13 +214,5 @@ def turning_limit(beam: Beam) -> float:
 
 
 def shortest(beam: Beam, u: Array) -> float:
-    """Smallest stretch of the fibres along the axis at the integration points.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u
-        Displacement of its coordinates, shape (N,).
-    """
+    """Smallest stretch of the fibres along the axis at the integration points."""
     return kinematics.shortest(beam, u)

@@ -28,17 +28,15 @@ class CriticalPoint:
     ----------
     kind : str
         "limit", where the load turns, or "bifurcation", where another path crosses.
-    load
-        Load factor.
-    arc
-        Arc length along the path.
+    load, arc
+        Load factor, and arc length along the path.
     state : State
         The equilibrium.
     mode
         The null vector of the tangent stiffness, shape (N,); at a limit point the direction of
         the path.
     change
-        By how many the number of negative eigenvalues changes there; None if it is not known.
+        Change of the number of negative eigenvalues; None if it is not known.
     critical
         What the solver found, from which ``scene.continuation(branch=...)`` goes on.
     """
@@ -67,16 +65,13 @@ class Path:
 
     Attributes
     ----------
-    load
-        Load factors, shape (n,).
-    u
-        Displacements of the coordinates, shape (n, N).
+    load, u
+        Load factors (n,), and displacements of the coordinates (n, N).
     arc
         Arc length along the path, shape (n,).
-    stable
-        Whether each equilibrium is stable; None where the loads have no potential.
-    negative
-        Number of negative eigenvalues of the tangent stiffness of each, or None.
+    stable, negative
+        Whether each equilibrium is stable, and the number of negative eigenvalues of its tangent;
+        None where the loads have no potential.
     error
         Size of the last correction of each point in the energy norm, relative to the work done,
         shape (n,): all of them are equilibria to this accuracy, however long the steps.
@@ -122,20 +117,13 @@ class Path:
         return self._state(p, f"point {k}", p.iterations)
 
     def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
-        """Displacement of material points along the path.
+        """Displacement of material points along the path, (n, 2), or (n, 2, m) of many.
 
         Parameters
         ----------
-        point
-            Its place (x, y) in the stress-free body, or those of many: an array (2, m), or a list
-            of points.
-        beam
-            The beam, its name or its number; found if it is not given.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, 2), or (n, 2, m) for many points.
+        point, beam
+            One point, shape (2,), or many, as for :meth:`State.displacement
+            <skfem_ancf.results.State.displacement>`.
         """
         return self.system.points.find(point, beam).displacement(self.u)
 
@@ -156,18 +144,14 @@ class Path:
 
     def plot(self, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
              **options: Any) -> Any:
-        """Draw load against a displacement.
+        """Draw load against a displacement; see :func:`skfem_ancf.visuals.matplotlib.plot_path`.
 
         Parameters
         ----------
-        point
-            A material point: its place (x, y) in the stress-free body.
-        component
-            0 or 1: of the displacement.
-        beam
-            The beam, its name or its number; found if it is not given.
+        point, component, beam
+            A material point, shape (2,), the component 0 or 1 of its displacement, and its beam.
         **options
-            Those of :func:`skfem_ancf.visuals.matplotlib.plot_path`.
+            Those of that function.
         """
         from ..visuals.matplotlib import plot_path
 

@@ -327,22 +327,18 @@ class State(Immutable, MaterialPoints):
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
-        """Any field at material points.
+        """Any field at material points, () or (n,); vectors and tensors have their components
+        first.
 
         Parameters
         ----------
         field
             A name of :data:`skfem_ancf.recovery.fields.FIELDS`, as "von_mises", or a function or
-            Field of your own, see :mod:`skfem_ancf.recovery.fields`.
+            Field of your own.
         point
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam, recover, line
             As for :meth:`strain`.
-
-        Returns
-        -------
-        ndarray
-            Shape () or (n,); vectors and tensors have their 2 or 3 components first.
 
         Examples
         --------
@@ -368,10 +364,8 @@ class State(Immutable, MaterialPoints):
 
         Parameters
         ----------
-        beam
-            One of the beams.
-        part
-            The points, numbered by the coordinates of the beam alone.
+        beam, part
+            One of the beams, and points numbered by its coordinates alone.
         recover
             As for :meth:`strain`.
         """
@@ -411,7 +405,7 @@ class State(Immutable, MaterialPoints):
     def recovered(self) -> dict[Any, str]:
         """For each beam, by name or number, "" if its fields are recovered, else why not: dict.
 
-        Recovered fields need an equilibrium (of statics or of a motion) under loads of which it is
+        Recovered fields need an equilibrium, of statics or of a motion, under loads of which it is
         known where they act. Elsewhere strain and stress are those of the elements.
         """
         out = {}
@@ -446,12 +440,6 @@ class State(Immutable, MaterialPoints):
             The number of the line, of a frame; found from ``at`` if it is not given: a section is
             one of the line whose axis is nearest to the point. Without ``at`` all sections of it.
 
-        Returns
-        -------
-        Resultants
-            With ``s``, ``N``, ``Q``, ``M``, ``curvature``, ``stretch``, ``shear``, ``angle`` and
-            ``force``, see :class:`~skfem_ancf.recovery.resultants.Resultants` for their signs.
-
         Raises
         ------
         InputError
@@ -464,9 +452,8 @@ class State(Immutable, MaterialPoints):
         >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamANCF(2),
         ...             StVenantKirchhoff(E=2e11, nu=0.3), width=0.01)
         >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
-        >>> sections = state.resultants([(0, 0), (0.5, 0)])
-        >>> sections.M.round(4).tolist(), sections.Q.round(4).tolist()
-        ([-1.0, -0.5], [-1.0, -1.0])
+        >>> state.resultants([(0, 0), (0.5, 0)]).M.round(4).tolist()
+        [-1.0, -0.5]
         """
         recover, chain, places, one = require_flag("recover", recover), None, None, False
         if at is not None:
@@ -489,23 +476,8 @@ class State(Immutable, MaterialPoints):
     # of the whole
 
     def contact(self, obstacle: int | None = None) -> Contact:
-        """Where the body touches obstacles, and how hard.
-
-        Parameters
-        ----------
-        obstacle
-            The number of an obstacle, in the order in which they were given; None for all.
-
-        Returns
-        -------
-        Contact
-            With ``points``, ``force``, ``pressure``, ``gap``, ``total`` and ``penetration``, see
-            :class:`~skfem_ancf.actions.obstacles.Contact`.
-
-        Raises
-        ------
-        InputError
-            If there are no obstacles, or none of that number.
+        """Where the body touches an obstacle, by its number, or all, and how hard; raises
+        InputError if there is none.
         """
         with self._contact_memory():
             return contact_of(self, obstacle)
@@ -544,12 +516,7 @@ class State(Immutable, MaterialPoints):
             A boundary name, or anything else scikit-fem takes for facets; of a frame nodes, see
             :meth:`Frame.nodes <skfem_ancf.scene.frame.Frame.nodes>`.
         beam
-            The beam, its name or its number, in a scene of several.
-
-        Raises
-        ------
-        InputError
-            If a beam of a frame is named that no support holds there: clamps and pins hold nodes.
+            The beam, its name or its number, in a scene of several; of a frame not needed.
         """
         system, frame = self.system, self.system.constraints.frame
         if frame is not None and beam is None:
@@ -598,7 +565,8 @@ class State(Immutable, MaterialPoints):
         return state_html(self)
 
     def save(self, filename: StrPath, **options: Any) -> Path:
-        """Write the deformed body for ParaView; see :func:`skfem_ancf.io.vtu.save_vtu`.
+        """Write the deformed body for ParaView, as :func:`skfem_ancf.io.vtu.save_vtu`; returns the
+        file.
 
         Parameters
         ----------
@@ -606,11 +574,6 @@ class State(Immutable, MaterialPoints):
             Path that ends with .vtu.
         **options
             Those of that function.
-
-        Returns
-        -------
-        pathlib.Path
-            The file.
         """
         from ..io.vtu import save_vtu
 

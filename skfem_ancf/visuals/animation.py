@@ -32,7 +32,7 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
             thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,
             limits: Any = None, unit: str | None = None, subdivide: tuple[int, int] = (8, 4),
             recover: bool = True, size: tuple[int, int] = (800, 600)) -> Path:
-    """Write a film of a motion, coloured by a field.
+    """Write a film of a motion, coloured by a field; returns its file.
 
     The colours have one range and the section one factor of thickness in all frames.
 
@@ -43,30 +43,16 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
     filename
         Ends with .gif, or .mp4 (which needs imageio and imageio-ffmpeg); missing folders are made
         before anything is drawn.
-    field
-        As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     frames
         How many instants, evenly chosen; all by default, up to 100.
     fps
         Frames per second; by default as fast as the motion, between 5 and 50.
     backend
         Deprecated: matplotlib draws the frames.
-    thickness, undeformed, cmap, limits, unit, subdivide, recover
+    field, thickness, undeformed, cmap, limits, unit, subdivide, recover
         Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     size
         Width and height of the film in pixels, shape (2,).
-
-    Returns
-    -------
-    pathlib.Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If the file name ends otherwise, or the history has no instants.
-    MissingExtra
-        If what is needed is not installed.
     """
     require_like("history", history, "History", "states", "t")
     path, undeformed = _file(filename), require_flag("undeformed", undeformed)
@@ -88,15 +74,7 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
 
 
 def pixels(name: str, size: Any) -> tuple[int, int]:
-    """Width and height of a picture in pixels.
-
-    Parameters
-    ----------
-    name
-        Of the argument, for the message.
-    size
-        Two integers, shape (2,).
-    """
+    """Width and height of a picture in pixels; ``name`` is that of the argument."""
     try:
         width, height = (require_integer(name, k, *PIXELS) for k in size)
     except (TypeError, ValueError):

@@ -31,33 +31,14 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *,
         The beam, its name or its number; all beams of the scene by default.
     axes
         Three matplotlib Axes to draw on; a new figure by default, which needs no display.
-    title
-        Title of the picture.
+    title, filename, dpi
+        As for :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
     recover
         As for :meth:`State.resultants <skfem_ancf.results.State.resultants>`.
-    filename
-        Write the picture here too (.png, .pdf, .svg); missing folders are made.
-    dpi
-        Resolution of the file.
 
     Returns
     -------
     list of three matplotlib.axes.Axes
-
-    Raises
-    ------
-    MissingExtra
-        If matplotlib is not installed.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
-    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
-    >>> [ax.get_ylabel() for ax in state.plot_resultants()]
-    ['normal force $N$', 'shear force $Q$', 'bending moment $M$']
     """
     Figure = figure_class()
     require_like("state", state, "State", "beams", "resultants")

@@ -39,8 +39,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     ----------
     state
         A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``; or a list
-        of them, drawn over each other with one range of colours and the stress-free body of the
-        first.
+        of them, drawn over each other with one range of colours.
     field
         A name of :data:`skfem_ancf.recovery.fields.FIELDS` with one component, as "S_xx",
         "von_mises" or "eps_1"; "displacement" for its magnitude; or a function or Field of your
@@ -49,10 +48,10 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         matplotlib Axes to draw in; a new figure by default, which needs no display.
     thickness
         Factor by which the section is drawn thicker than it is, for slender beams; the picture
-        says so. Colours stay those of the material points. "auto": the whole number that makes
-        the section about 1/25 of the picture, less where bends would fold, at least 1.
+        says so. "auto": the whole number that makes the section about 1/25 of the picture, less
+        where bends would fold, at least 1.
     undeformed
-        Draw the stress-free body in grey behind.
+        Draw the reference configuration of the first state in grey behind.
     colorbar
         Draw a colour bar.
     cmap
@@ -67,24 +66,15 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         For the colour bar, as "Pa".
     subdivide
         Patches along and across each element.
-    filename
-        Write the picture here too (.png, .pdf, .svg); missing folders are made.
-    dpi
-        Resolution of the file.
+    filename, dpi
+        Write the picture here too (.png, .pdf, .svg), with this resolution; missing folders are
+        made.
     recover
-        Recovered strain and stress (:mod:`skfem_ancf.recovery`) where the state has them; False for
-        those of the elements at the points.
+        Recovered strain and stress where the state has them; False for those of the elements.
 
     Returns
     -------
     matplotlib.axes.Axes
-
-    Raises
-    ------
-    MissingExtra
-        If matplotlib is not installed.
-    NameUnknown
-        If the field is not known; the message lists the known ones.
 
     Examples
     --------
@@ -93,8 +83,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
     ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
     >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
-    >>> ax = state.plot("S_xx")
-    >>> ax.get_title(loc="left")
+    >>> state.plot("S_xx").get_title(loc="left")
     'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
     """
     Figure, states, cmap = figure_class(), _states(state), colormap(cmap)
@@ -118,15 +107,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
 
 
 def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any) -> tuple[Any, list[Any]]:
-    """Draw frames over each other; returns the coloured image, or None, and all artists.
-
-    Parameters
-    ----------
-    ax, scenery, frames
-        The Axes, what is drawn, and the numbers of the frames.
-    cmap
-        A colour map, or None for one that fits the field.
-    """
+    """Draw frames over each other; returns the coloured image, or None, and all artists."""
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
@@ -167,7 +148,7 @@ def _states(state):
 
 
 def colour_bar(ax: Any, image: Any, extend: str, label: str) -> None:
-    """A bar as high as the picture, or below a flat one; extend and label are those of the bar."""
+    """A bar as high as the picture, or below a flat one."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     flat = (y1 - y0) < 0.35 * (x1 - x0)
     place: dict[str, Any] = (dict(ax=ax, location="bottom", shrink=0.6, aspect=45, pad=0.06)
@@ -199,39 +180,17 @@ def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam =
 
     Parameters
     ----------
-    point
-        The material point: its place (x, y) in the stress-free body.
     path
         A :class:`~skfem_ancf.results.path.Path`.
-    component, beam
-        Its displacement's component (0 or 1), and the beam it belongs to.
-    ax
-        Axes to draw on; a new figure by default.
-    title
-        Title of the picture.
-    filename, dpi
-        Where to save it, and its resolution.
+    point, component, beam
+        The material point, its place (x, y), shape (2,); the component (0 or 1) of its
+        displacement, and the beam it belongs to.
+    ax, title, filename, dpi
+        As for :func:`plot_state`.
 
     Returns
     -------
     matplotlib.axes.Axes
-
-    Raises
-    ------
-    InputError
-        If the component is not 0 or 1.
-    MissingExtra
-        If matplotlib is not installed.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamCable(),
-    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> path = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).continuation(steps=3)
-    >>> path.plot((1, 0)).get_ylabel()
-    'load factor'
     """
     Figure = figure_class()
     component = require_integer("component", component, 0, 1)
@@ -272,13 +231,7 @@ def colormap(cmap: Any) -> Any:
 
 
 def page(ax: Any, title: str | None, filename: Any, dpi: float) -> tuple[Any, float]:
-    """The file, or None, and its resolution; what is wrong is said before anything is drawn.
-
-    Parameters
-    ----------
-    ax, title, filename, dpi
-        Those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
-    """
+    """The file, or None, and its resolution; what is wrong is said before anything is drawn."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     if ax is not None:
@@ -294,15 +247,7 @@ def page(ax: Any, title: str | None, filename: Any, dpi: float) -> tuple[Any, fl
 
 
 def save(ax: Any, filename: Any, **options: Any) -> None:
-    """Write the figure of some Axes.
-
-    Parameters
-    ----------
-    ax, filename
-        The Axes, and the file, or None for none.
-    **options
-        Those of matplotlib's ``savefig``.
-    """
+    """Write the figure of some Axes; None for no file."""
     if filename is not None:
         with output_file(filename) as temporary:
             ax.figure.savefig(temporary, **options)
@@ -318,13 +263,7 @@ def plain(ax: Any) -> None:
 
 
 def dress(ax: Any, title: str | None, note: str = "") -> None:
-    """Title, axes and labels of a picture.
-
-    Parameters
-    ----------
-    ax, title, note
-        The Axes, and what is above them, or None, and a small text there.
-    """
+    """Title, or None, axes and labels of a picture, and a small note above it."""
     if title:
         ax.set_title(title, loc="left", fontsize=10, color=INK, pad=18 if note else 6)
     plain(ax)

@@ -145,13 +145,7 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
     Returns
     -------
     pyvista.UnstructuredGrid, or pyvista.MultiBlock
-        Of one beam, or of several and of the outlines of rigid bodies and obstacles by their
-        names.
-
-    Raises
-    ------
-    MissingExtra
-        If pyvista is not installed.
+        Of one beam, or of several and of the outlines of rigid bodies and obstacles by name.
     """
     pv, found = _pyvista(), grids(state, subdivide, lagrange, recover)
     wanted = list(FIELDS.values()) if fields is None else find_fields(fields)
@@ -188,16 +182,10 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
 
     Parameters
     ----------
-    state
-        A :class:`~skfem_ancf.results.State`.
-    field
-        As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+    state, field, thickness, undeformed, cmap, limits, unit, subdivide, recover
+        Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     plotter
         A ``pyvista.Plotter`` to draw in; a new one by default.
-    thickness, undeformed, cmap, limits, subdivide, recover
-        Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
-    unit
-        For the colour bar, as "Pa"; what the field says by default.
     off_screen
         Without a window; by default where there is neither a display nor a notebook.
     window_size
@@ -209,11 +197,6 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
     -------
     pyvista.Plotter
         Call its ``show()``, or ``screenshot(...)``.
-
-    Raises
-    ------
-    MissingExtra
-        If pyvista is not installed.
     """
     pv = _pyvista()
     require_like("state", state, "State", "beams", "u_of")

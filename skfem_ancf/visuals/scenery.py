@@ -95,21 +95,14 @@ def _limits(limits, values, field):
 
 
 class Scenery:
-    """Bodies of one or more instants with one factor of thickness and one range of colours.
+    """States of the same beams with one factor of thickness and one range of colours.
 
-    Parameters
-    ----------
-    states
-        States of the same beams.
-    field, thickness, undeformed, limits, subdivide, recover
-        Those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
+    Arguments are those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
 
     Attributes
     ----------
-    beams
-        Those of all frames.
-    rigid
-        For each frame the grids of its rigid bodies.
+    frames, rigid
+        For each state its beams, and the grids of its rigid bodies.
     found
         Values of all beams, shape (n,).
     factor, low, high
