@@ -343,7 +343,7 @@ def test_many_bodies_are_solved_by_sparse_factors():
     for link in links:
         scene.torsional_spring(0.1, link)
     scene.point_force((40.0, 0.0), (0, -30), links[-1])
-    assert not scene.system.constraints.bordered
+    assert not scene.system.constraints.few
     state = scene.solve_static()
     assert_allclose(state.joint_force(joints[0])[1], -29 * G, rtol=1e-8)
     # without the springs each link has tan(angle) = 40 / (weight below)

@@ -281,7 +281,6 @@ def test_same_statics_with_every_joint(name):
             scene.joint(name, **(JOINED[name] | (slow if name == "position" else {})))
         results.append((scene, scene.solve_static()))
     (_, a), (scene, b) = results
-    assert len(scene.system.constraints.stiff[1]) == 4
     assert a.iterations == b.iterations and np.abs(b.u).max() > 1e-4
     assert_allclose(b.u, a.u, rtol=0, atol=1e-10)
     assert_allclose(b.multipliers, a.multipliers, rtol=1e-8,

@@ -268,7 +268,6 @@ def test_supports_hold_in_any_unit_of_length(unit):
     apart = Scene(beam).fix("left", ["r"]).fix("right", ["r_X^2"])  # the same, seen from the tip
     apart.point_force((0, -0.01), at=(unit, 0))
     assert apart.solve_linear().displacement((unit, 0))[1] / unit == pytest.approx(tip, rel=1e-6)
-    assert len(apart.system.constraints.stiff[1]) == 0
     two = [Beam(line(4, 0.1 * unit, L=unit, origin=(k * unit, 0)), ElementBeamCable(),
                 StVenantKirchhoff(1e6 / unit**2, 0.3), 0.1 * unit) for k in (0, 1)]
     joined = Scene(*two).clamp("left", beam=0)
@@ -276,7 +275,6 @@ def test_supports_hold_in_any_unit_of_length(unit):
     joined.point_force((0, -0.01), at=(2 * unit, 0), beam=1)
     tip = joined.solve_linear().displacement((2 * unit, 0), 1)[1] / unit
     assert tip == pytest.approx(-8 * 4e-4, rel=0.05)
-    assert len(joined.system.constraints.stiff[1]) == 4  # on the beam that only the joint holds
 
 
 def guided(tilt, gap=0.0):

@@ -70,7 +70,7 @@ def factorized(system, u, multipliers=None):
 @pytest.mark.parametrize("border", [0, 96], ids=["sparse", "bordered"])
 @pytest.mark.parametrize("kind", SUPPORTS)
 def test_inertia_is_that_of_the_dense_matrix_on_the_tangent_space(kind, border, monkeypatch):
-    monkeypatch.setattr(constraints, "WIDE_BORDER", border)
+    monkeypatch.setattr(constraints, "FEW", border)
     rng = np.random.default_rng(SUPPORTS.index(kind))
     seen = set()
     for k in range(12):

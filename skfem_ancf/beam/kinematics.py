@@ -17,7 +17,6 @@ from ..core.quadrature import gauss
 from .strains import cable_axis, fibres
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
     from ..core.types import Array
 
@@ -162,36 +161,3 @@ def folded(beam: Any, u: Array) -> bool:
     left, right = beam.mesh.t
     chord = x[:, right] - x[:, left]
     return bool(min(np.min(np.sum(chord * tangent[:, end], axis=0)) for end in (left, right)) < 0.0)
-
-
-def clamps_direction(beam: Any, fixed: Sequence[int], sums: Sequence[Any] = ()) -> bool:
-    """True if a node is fixed, and the direction of the axis there or its normal.
-
-    Parameters
-    ----------
-    beam
-        A beam; False of a rigid body.
-    fixed
-        Numbers of its fixed degrees of freedom.
-    sums
-        Sums of them that are fixed, too: for each their numbers and factors, in pairs.
-    """
-    if not hasattr(beam, "mesh"):
-        return False
-    every, tangents = set(fixed), {(1, 0): beam.mesh.p_X, (0, 1): beam.mesh.p_Y}
-    for one in [*([(dof, 1.0)] for dof in fixed), *sums]:
-        node = one[0][0] // beam.nd if one else 0
-        first, turn, size = node * beam.nd, 0.0, 0.0
-        if first not in every or first + 1 not in every:
-            continue
-        for dof, factor in one:
-            k = dof - first
-            of = beam.element.functionals[k // 2][1:] if 1 < k < beam.nd else None
-            if of not in tangents:
-                break
-            way = tangents[of][1 - k % 2, node]
-            turn, size = turn + factor * (way if k % 2 else -way), size + abs(factor)
-        else:
-            if abs(turn) > 1e-3 * size:
-                return True  # it would change as the section turns
-    return False

@@ -273,6 +273,12 @@ class BandMatrix:
             return bool(np.minimum.reduce(self._flat[::self._ld]) > 0.0)
         return self._factor[0] == "pb"
 
+    def pivots(self) -> Array:
+        """The pivots of the factors of a symmetric matrix, that of Cholesky squared; (n,)."""
+        if self._factor[0] == "pb":
+            return self._factor[1][0] ** 2
+        return self._flat[::self._ld].copy()
+
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of a symmetric matrix, from its factors.
 
@@ -295,7 +301,7 @@ class BandMatrix:
         if self._factor is None:
             self.factorize()
         diagonal = self.diagonal()
-        if self.positive_definite and np.all(self._factor[1][0] ** 2 > SMALL * diagonal):
+        if self.positive_definite and np.all(self.pivots() > SMALL * diagonal):
             return Inertia(0, False)
         return beside_zero(lambda shift: self.shifted(shift).negative())
 

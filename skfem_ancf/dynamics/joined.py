@@ -39,7 +39,7 @@ class Joined:
     def J(self) -> Any:
         """The derivative of Phi, shape (m, N), as of ``full_jacobian``."""
         s = self._system
-        if not s.constraints.bordered:
+        if not s.constraints.few:
             return s.constraints.sparse_jacobian(self._u, self._instant[0])
         J = np.empty((s.constraints.m, s.N))
         joint_directions(self._tables, self._motion.g[0], self._instant[0], self._u, J)

@@ -150,6 +150,10 @@ class Condensed:
         """True if there are factors."""
         return self._nodes is not None
 
+    def forget(self) -> None:
+        """Have no factors."""
+        self._parts, self._nodes = [], None
+
     def _unknown(self):
         """Whether x, y and the rotation of a node are unknown, (number, 3)."""
         out = ~self.nodes.held

@@ -1,4 +1,4 @@
-"""What holds a scene: fixed coordinates, and equations of joints with multipliers."""
+"""Supports and joints: fixed degrees of freedom, and equations with multipliers."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from ..beam.kinematics import clamps_direction
 from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..actions.joints.base import Joint
 from ..actions.joints.director import UnitDirector
-from ..actions.joints.nodes import Nodes, chain_ends
+from ..actions.joints.nodes import Nodes
 from ..actions.joints.part import Part
 from ..actions.joints.settlements import HELD
+from .mobility import advice, free_rigid_motions, who
 from .redundancy import repeated, shared
-from .signature import DENSE, FREE, first_dependent, null_space, row_sizes, unit_rows
+from .signature import DENSE, FREE, first_dependent
 from ..beam.rigid import RigidBody
+from ..core.origin import ours
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -27,12 +28,12 @@ if TYPE_CHECKING:
     from ..beam.beam import Beam
     from ..core.types import Array
 
-#: Columns of a border above which sparse LU is faster.
-WIDE_BORDER = 96
+#: Multipliers whose derivatives are dense matrices, at most.
+FEW = 96
 #: By how much equations left out may be open, over their sizes.
 OPENED = 1e-5
 #: What is kept of the joints, and changes where equations are left out.
-KEPT_OF_JOINTS = "slopes", "_at_rest", "frame", "_limited", "stiff", "_held_alone"
+KEPT_OF_JOINTS = "slopes", "seconds", "tabled", "_still", "_at_rest", "frame", "_limited"
 #: No rows, columns and values.
 _NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
@@ -62,7 +63,7 @@ class Constraints:
     all_joints, joints : list
         The joints, and those with multipliers.
     N, m : int
-        Number of coordinates and of multipliers.
+        Number of degrees of freedom and of multipliers.
     fixed
         Numbers of the coordinates that supports and joints fix, shape (n,).
     given
@@ -164,14 +165,7 @@ class Constraints:
         b = int(np.searchsorted([s.start for s in self.slices], k, side="right")) - 1
         member, k = self.members[b], k - self.slices[b].start
         node = "" if isinstance(member, RigidBody) else f" of node {k // member.nd}"
-        return f"{member.dofnames[k % member.nd]}{node}{self._who(b)}"
-
-    def _who(self, k):
-        """Which beam or body is number k, for messages."""
-        member = self.members[k]
-        if isinstance(member, RigidBody):
-            return f" of the rigid body {member.name or k}"
-        return "" if len(self.members) == 1 else f" of beam {member.name or k}"
+        return f"{member.dofnames[k % member.nd]}{node}{who(self.members, b)}"
 
     # fixed coordinates
 
@@ -243,11 +237,71 @@ class Constraints:
         Parameters
         ----------
         u, t
-            Displacement of the coordinates, shape (N,), and time.
+            Displacement, shape (N,), and time.
+        """
+        if not self.tabled:
+            return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
+        rows, columns, values = self._slopes_at(t)
+        k, i, j, v = self.seconds
+        return (self._offset(t) + np.bincount(rows, values * u[columns], self.m)
+                + 0.5 * np.bincount(k, v * u[i] * u[j], self.m))
+
+    @cached_property
+    def seconds(self) -> tuple[Array, ...]:
+        """Second derivatives of Phi in the reference configuration: equation, row, column, value.
+
+        As :meth:`~skfem_ancf.actions.joints.Joint.second_entries` of the joints has them.
         """
         if not self.joints:
-            return np.zeros(0)
-        return np.concatenate([joint.value(u, t) for joint in self.joints])
+            return (*2 * _NO_ENTRIES[:1], *_NO_ENTRIES[1:])
+        return self.in_order([joint.second_entries(self.N) for joint in self.joints])
+
+    @cached_property
+    def tabled(self) -> bool:
+        """True if :attr:`slopes`, :attr:`seconds` and offsets give Phi and its derivatives."""
+        if all(map(ours, self.joints)):
+            return all(joint.tabled for joint in self.joints)
+        return self.quadratic_at((0.0, 0.37))
+
+    def quadratic_at(self, times: Iterable[float]) -> bool:
+        """True if Phi and its derivative are those of the tables: user-defined ones may not be.
+
+        Parameters
+        ----------
+        times
+            When random displacements are tried.
+        """
+        sizes = self.coordinate_sizes
+        of_equations, rng = self.equation_sizes(*self.slopes), np.random.default_rng(0)
+        k, i, j, v = self.seconds
+        for t in times:
+            u = 0.1 * sizes * rng.standard_normal(self.N)
+            slope = self.to_sparse(*self._slopes_at(t))
+            J = slope + self.to_sparse(k, i, v * u[j])
+            offset = np.concatenate([one.offset(np.array([t]), self.N)[0] for one in self.joints])
+            phi = np.concatenate([one.value(u, t) for one in self.joints])
+            gap = J - self.to_sparse(*self.in_order(one.entries(u, t) for one in self.joints))
+            if not (np.all(np.abs(offset + 0.5 * (J + slope) @ u - phi) <= 1e-9 * of_equations)
+                    and (abs(gap) @ sizes <= 1e-9 * (abs(J) @ sizes)).all()):
+                return False
+        return True
+
+    @cached_property
+    def _still(self):
+        """Phi in the reference configuration, and whether its derivative there never changes."""
+        offset = [joint.offset(np.zeros(1), self.N)[0] for joint in self.joints]
+        return np.concatenate([np.zeros(0), *offset]), not any(j.turning for j in self.joints)
+
+    def _offset(self, t):
+        if not self.drives:
+            return self._still[0]
+        return np.concatenate([joint.offset(np.array([t]), self.N)[0] for joint in self.joints])
+
+    def _slopes_at(self, t):
+        if self._still[1]:
+            return self.slopes
+        found = [joint.slope_entries(np.array([t]), self.N) for joint in self.joints]
+        return self.in_order((rows, columns, values[0]) for rows, columns, values in found)
 
     @property
     def drives(self) -> bool:
@@ -257,34 +311,33 @@ class Constraints:
     def full_jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
         """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
 
-        Sparse where the multipliers are too many for a border.
+        Sparse where the multipliers are many.
 
         Parameters
         ----------
         u, t
             Displacement of the coordinates, shape (N,), and time.
         """
-        return (self._dense if self.bordered else self._sparse)(*self._entries(u, t))
+        return (self.to_dense if self.few else self.to_sparse)(*self._entries(u, t))
 
-    def _dense(self, rows, columns, values):
-        """A matrix (m, N) by its entries."""
+    def to_dense(self, rows: Array, columns: Array, values: Array) -> Array:
+        """A matrix (m, N) by its entries (k,)."""
         J = np.zeros((self.m, self.N))
         np.add.at(J, (rows, columns), values)
         return J
 
-    def _sparse(self, rows, columns, values):
+    def to_sparse(self, rows: Array, columns: Array, values: Array) -> sparse.csr_array:
         """The same as a scipy.sparse array."""
         return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
 
     def sparse_jacobian(self, u: Array, t: float) -> sparse.csr_array:
-        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format.
+        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
+        return self.to_sparse(*self._entries(u, t))
 
-        Parameters
-        ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
-        """
-        return self._sparse(*self._entries(u, t))
+    def jacobian_entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        """Rows, columns and values (k,) of :meth:`jacobian`; entries of one place are summed."""
+        rows, columns, values = self._entries(u, t)
+        return rows, columns, values * self.mask[columns]
 
     @cached_property
     def slopes(self) -> tuple[Array, ...]:
@@ -298,11 +351,14 @@ class Constraints:
     @cached_property
     def _at_rest(self):
         """The matrix of :attr:`slopes`, sparse where the coordinates are many."""
-        return (self._dense if self.bordered and self.N <= DENSE else self._sparse)(*self.slopes)
+        return (self.to_dense if self.few and self.N <= DENSE else self.to_sparse)(*self.slopes)
 
     def _entries(self, u, t):
         """Rows, columns and values of :meth:`full_jacobian`."""
-        return self.in_order(joint.entries(u, t) for joint in self.joints)
+        if not self.tabled:
+            return self.in_order(joint.entries(u, t) for joint in self.joints)
+        (k, i, j, v), slopes = self.seconds, self._slopes_at(t)
+        return tuple(np.append(a, b) for a, b in zip(slopes, (k, i, v * u[j])))
 
     def in_order(self, entries: Iterable[tuple]) -> tuple[Array, ...]:
         """Tables of the joints one behind the other, their rows those of all equations.
@@ -326,13 +382,7 @@ class Constraints:
         u, t
             Displacement of the coordinates, shape (N,), and time.
         """
-        if not self.bordered:
-            rows = self.sparse_jacobian(u, t)
-            rows.data *= self.mask[rows.indices]
-            return rows
-        J = self.full_jacobian(u, t)
-        J[:, self.fixed] = 0.0
-        return J
+        return (self.to_dense if self.few else self.to_sparse)(*self.jacobian_entries(u, t))
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
         """The second derivative of :meth:`constraint` in the direction v, shape (m,).
@@ -374,6 +424,9 @@ class Constraints:
         return i, j, v * (self.free[i] & self.free[j])
 
     def _curvature(self, u, t, multipliers):
+        if self.tabled:
+            k, i, j, v = self.seconds
+            return i, j, multipliers[k] * v
         parts = [joint.curvature(u, t, part)
                  for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
         return _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
@@ -386,7 +439,7 @@ class Constraints:
         u0, u1, t
             Displacements at its ends, shape (N,), and the time in its middle.
         """
-        return self._dense(*self.in_order(joint.mean_entries(u0, u1, t) for joint in self.joints))
+        return self.to_dense(*self.in_order(joint.mean_entries(u0, u1, t) for joint in self.joints))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
@@ -553,94 +606,10 @@ class Constraints:
         return (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
                 and bool(self.free.take(columns).all()) and bool(values.all()))
 
-    @cached_property
-    def _standing(self) -> list[bool]:
-        """Of each beam and body, whether its own supports hold it."""
-        found = []
-        for beam, s in zip(self.members, self.slices):
-            held, = (~self.free[s]).nonzero()
-            if clamps_direction(beam, held.tolist()):
-                found.append(True)
-                continue
-            found.append(self._holds(beam, held, ()))
-        return found
-
-    @cached_property
-    def stiff(self) -> tuple[Array, Array]:
-        """What holds the beams which their own supports leave free: directions, and coordinates.
-
-        Directions of joints that hold a beam are those of equations whose coordinates lie in the
-        band, and whose derivative is constant: the number of the equation, the first of the
-        coordinates and the one behind the last, shape (n, 3). Of each beam which these leave free
-        to move, the positions of two nodes far apart; all coordinates of rigid bodies, which have
-        no stiffness of their own, come last.
-        """
-        standing, rows = self._held_alone
-        return np.array(rows, np.int64).reshape(-1, 3), self._springs(standing)
-
-    @cached_property
-    def _held_alone(self):
-        """Whether each is held by its own supports and joints, and what of joints is needed."""
-        standing, found = self._standing.copy(), []
-        if all(standing) or not self.m:
-            return standing, found
-        constant = [joint.constant for joint in self.joints for _ in joint.equations]
-        sums: list[list[Any]] = [[] for _ in constant]
-        for b, *entry in zip(*(x.tolist() for x in self.slopes)):
-            sums[b].append(entry)
-        for k, (beam, s) in enumerate(zip(self.members, self.slices)):
-            if standing[k] or isinstance(beam, RigidBody):
-                continue
-            rows, own = [], []
-            for b, of in enumerate(sums):
-                at = [dof for dof, _ in of if constant[b]] or [-1]
-                first, last = min(at), max(at) + 1
-                if s.start <= first and last <= min(s.stop, first + 2 * beam.nd):
-                    rows.append((b, first, last))
-                    own.append([(dof - s.start, factor) for dof, factor in of])
-            held, = (~self.free[s]).nonzero()
-            standing[k] = bool(rows) and (clamps_direction(beam, held.tolist(), own)
-                                          or self._holds(beam, held, own))
-            if standing[k]:
-                found += rows
-        return standing, found
-
-    def _holds(self, beam, held, sums):
-        """True if a beam is held by some coordinates and sums of others."""
-        if len(held) + len(sums) < 3:
-            return False
-        motions = beam.rigid_motions() / (1.0, 1.0, self.size)
-        sums = [np.array([v for _, v in of]) @ motions[[dof for dof, _ in of]] for of in sums]
-        return _has_full_rank(np.vstack([motions[held], *sums]))
-
-    def _springs(self, standing):
-        """The coordinates of :attr:`stiff`, of beams that do not stand."""
-        found: list[int] = []
-        for beam, s, stands in zip(self.members, self.slices, standing):
-            if isinstance(beam, RigidBody):
-                found += range(s.start, s.stop)
-                continue
-            if stands:
-                continue
-            p = beam.mesh.p
-            x, y = p - p[:, :1]
-            far = int((x * x + y * y).argmax())
-            found += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
-        out = np.array(found, np.int64)
-        return out[self.free[out]]
-
-    @cached_property
-    def loose(self) -> int:
-        """How many of the last coordinates of :attr:`stiff` are of rigid bodies."""
-        return sum(int(np.sum(self.free[s])) for member, s in zip(self.members, self.slices)
-                   if isinstance(member, RigidBody))
-
     @property
-    def bordered(self) -> bool:
-        """True if the multipliers are few enough for a border about the band matrix."""
-        most = self.m + 4 * len(self.members)  # springs are seldom worth asking for
-        return self.frame is None and (most <= WIDE_BORDER
-                                       or self.m + len(self.stiff[1]) <= WIDE_BORDER)
+    def few(self) -> bool:
+        """True if derivatives of the equations are dense matrices."""
+        return self.frame is None and self.m <= FEW
 
     @cached_property
     def frame(self) -> Nodes | None:
@@ -654,63 +623,7 @@ class Constraints:
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of the rigid motions that nothing holds, one string each."""
-        if self.frame is None and all(self._held_alone[0]):
-            return []
-        motions, joints, parts_of_frame = self._motions()
-        parts = [motions[self.fixed], joints]
-        if self._stiffness is not None:
-            pushed = self._stiffness() @ motions
-            size = row_sizes(pushed) * self.coordinate_sizes
-            parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
-        small = isinstance(motions, np.ndarray)
-        held = np.concatenate(parts) if small else sparse.vstack(parts)
-        if small and len(self.members) == 1 and _has_full_rank(held):
-            return []
-        free = null_space(unit_rows(held))
-        bodies = self._bodies(parts_of_frame) if len(free) else []
-        return [_describe(v, bodies) for v in free]
-
-    def _bodies(self, parts):
-        """Who, origin and size of each of those that :meth:`_motions` are of."""
-        if self.frame is None:
-            return [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
-        return [(name, self.members[0].origin, self.size) for name in self.frame.describe(parts)]
-
-    def _motions(self):
-        """Rigid motions of the bodies, those that joints hold, and of a frame which are its parts.
-
-        Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
-        columns of a body are two translations and the rotation, in units of its size; dense arrays
-        of few coordinates.
-        """
-        joints, sizes = self._at_rest, [member.size for member in self.members]
-        if self.frame is None and self.N <= DENSE:
-            dense = np.zeros((self.N, 3 * len(self.members)))
-            for k, (member, s) in enumerate(zip(self.members, self.slices)):
-                dense[s, 3 * k:3 * k + 3] = member.rigid_motions()
-                dense[s, 3 * k + 2] /= member.size
-            return dense, joints @ dense, None
-        values = np.concatenate([member.rigid_motions() for member in self.members])
-        numbers = [member.N for member in self.members]
-        of_body, number, parts = np.repeat(np.arange(len(numbers)), numbers), len(numbers), None
-        if self.frame is not None:
-            origin, size, parts = self.members[0].origin, self.size, self.frame.parts()
-            number = int(parts.max()) + 1
-            shift = np.repeat([member.origin - origin for member in self.members], numbers, axis=0)
-            values[:, 2] += shift[:, 0] * values[:, 1] - shift[:, 1] * values[:, 0]
-            of_body, first = np.zeros(self.N, dtype=int), 0
-            for beam, s in zip(self.members, self.slices):
-                ends = chain_ends(beam)
-                of = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
-                of_body[s], first = np.repeat(of, beam.nd), first + len(ends)
-            sizes = [size] * len(self.members)
-        values[:, 2] /= np.repeat(sizes, numbers)
-        motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
-                                    3 * np.arange(self.N + 1)), shape=(self.N, 3 * number))
-        if self.frame is None:
-            return motions, joints @ motions, None
-        held = self.frame.held_motions(parts, origin, size, number)
-        return motions, sparse.vstack([held, joints[len(self.frame.equations):] @ motions]), parts
+        return free_rigid_motions(self, self._at_rest, self._stiffness)
 
     def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is free, or joints are not independent."""
@@ -727,7 +640,7 @@ class Constraints:
         return ("the supports leave rigid motions free: " + "; ".join(free)
                 + (", along which the springs have no stiffness before the load"
                    if self._stiffness is not None else "")
-                + f". Add a support, for example {self._advice()}, or solve in time with "
+                + f". Add a support, for example {advice(self)}, or solve in time with "
                 "scene.integrate")
 
     @cached_property
@@ -740,58 +653,10 @@ class Constraints:
         sigma = np.linalg.svd(held, compute_uv=False)
         return len(sigma) < 2 or sigma[1] <= FREE * sigma[0]
 
-    def _advice(self):
-        """What would hold the scene, in words."""
-        if self.frame is not None:
-            points = self.frame.net.points
-            x = "({:.6g}, {:.6g})".format(*points[:, np.lexsort(points)[0]])
-            return (f"frame.clamp({x}), the name or number of a node in place of its point, or as "
-                    f"a roller frame.hold({x}, 'y')")
-        member = self.members[0]
-        if isinstance(member, RigidBody):
-            who = repr(0 if member.name is None else member.name)
-            x = "({:.6g}, {:.6g})".format(*member.position)
-            return (f"scene.clamp({x}, beam={who}) for all of a body, scene.pin({x}, beam={who}) "
-                    "for a point, or springs")
-        return ("scene.clamp('left'), scene.pin('right') or, as a roller, "
-                "scene.fix('right', 'r^2')")
-
 
 def _joined(parts):
     """Rows, columns and values of several tables, one behind the other."""
     return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts)))
-
-
-def _describe(v, bodies):
-    """A rigid motion of bodies (who, origin, size) in words."""
-    parts = []
-    for k, (who, origin, size) in enumerate(bodies):
-        a, b, c = v[3 * k:3 * k + 3]
-        if max(abs(a), abs(b), abs(c)) < 1e-8:
-            continue
-        if abs(c) < 1e-8:
-            d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
-            d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
-            parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
-        else:
-            x = origin + np.array([-b, a]) * size / c
-            x = np.where(np.abs(x) < 1e-9 * size, 0.0, x)
-            parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
-    return " with ".join(parts)
-
-
-def _has_full_rank(A):
-    """True if the smallest singular value of a matrix (n, 3) of unit rows is not zero.
-
-    Its square is the determinant of A^T A over the product of the other two eigenvalues, which is
-    at most a quarter of their sum's square.
-    """
-    A = unit_rows(A)
-    (a, b, c), (_, d, e), (_, _, f) = A.T.dot(A).tolist()
-    trace = a + d + f
-    if a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d) > 1e-10 * trace**3:
-        return True
-    return len(A) > 2 and bool(np.linalg.svd(A, compute_uv=False)[2] > 1e-9)
 
 
 def _fixes(joint, zero):

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from weakref import ref
 
 import numpy as np
-from scipy import sparse
 
 from . import compiled
 from ..core.band import Band
@@ -40,9 +39,6 @@ _NO_PUSHES = np.zeros((0, 0))
 _NO_ROWS = np.zeros((0, 3), np.int64)
 _NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0, _NO_ROWS))
 constant(NO_FORCES)
-
-#: Times at which joints are tried, whether tables give them.
-TRIED = 0.0, 0.37
 
 
 @by_place
@@ -115,7 +111,7 @@ class Tables:
         body = body_of(system.beams, system.slices)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
-                               self._border(joints),
+                               _NO_BORDER._replace(wide=int(system.solver.coupled)),
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes)
 
@@ -367,46 +363,18 @@ class Tables:
         self._slope = np.zeros((1, 0))
         if not s.constraints.joints:
             return _NO_JOINTS
-        joints = s.constraints.joints
-        k, i, j, v = s.constraints.in_order([joint.second_entries(s.N) for joint in joints])
+        k, i, j, v = s.constraints.seconds
         gk, gi, g = s.constraints.slopes
         k, i, j, gk, gi = (packed(x, np.int64) for x in (k, i, j, gk, gi))
         self._slope = packed(g)[None]
-        tables = JointTables(k, i, j, packed(v), gk, gi,
-                             s.constraints.equation_sizes(gk, gi, g), 0)
-        tabled = (all(joint.tabled for joint in joints) if all(map(ours, joints))
-                  else self.are_joints(tables))
-        return tables if tabled else tables._replace(own=self.handle)
+        return JointTables(k, i, j, packed(v), gk, gi, s.constraints.equation_sizes(gk, gi, g),
+                           0 if s.constraints.tabled else self.handle)
 
     @property
     def linear_joints(self) -> bool:
         """True if the equations of joints are linear in the coordinates, the same at all times."""
         joints = self.plain.joints
         return not (len(joints.hk) or joints.own or self.motion_varies)
-
-    def are_joints(self, tables: JointTables) -> bool:
-        """True if the tables give Phi and its derivative: joints of others may not be quadratic.
-
-        Parameters
-        ----------
-        tables
-            Of the system's joints.
-        """
-        s = self.system
-        if not s.constraints.m:
-            return True
-        k, i, j, v, gk, gi, sizes, _ = tables
-        all_sizes = s.constraints.coordinate_sizes
-        for t, x in zip(TRIED, np.random.default_rng(0).standard_normal((2, s.N))):
-            u = 0.1 * all_sizes * x
-            c, g = self.offsets(np.array([t]))[0], self.slopes(np.array([t]))[0]
-            slope = sparse.csr_array((g, (gk, gi)), shape=(s.constraints.m, s.N))
-            J = slope + sparse.csr_array((v * u[j], (k, i)), shape=slope.shape)
-            phi, gap = c + 0.5 * (J + slope) @ u, J - s.constraints.sparse_jacobian(u, t)
-            if not (np.all(np.abs(phi - s.constraints.constraint(u, t)) <= 1e-9 * sizes)
-                    and (abs(gap) @ all_sizes <= 1e-9 * (abs(J) @ all_sizes)).all()):
-                return False
-        return True
 
     def offsets(self, times: Array) -> Array:
         """c of all joints at the times, shape (n, m)."""
@@ -458,25 +426,6 @@ class Tables:
             if not self.turns:
                 g[:, :2] = self.slopes(first)
         return c, g
-
-    def _border(self, joints):
-        s, none = self.system, _NO_INTS
-        if not s.solver.coupled:
-            return _NO_BORDER
-        if not s.constraints.joints or not s.constraints.bordered or joints.own or s.forces.far:
-            return Border(none, 0, 0, none, none, none, none, int(s.solver.coupled), _NO_ROWS)
-        along, springs = s.constraints.stiff
-        i, j, ns = joints.hi, joints.hj, len(springs)
-        if not len(i):
-            return Border(springs, ns, s.constraints.loose, none, none, none, none, 0, along)
-        outside = np.abs(i - j) > s.bandwidth
-        far = np.unique(np.append(i[outside], j[outside]))
-        picked = np.append(springs, far)
-        out, = np.nonzero(outside)
-        stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
-        row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
-        return Border(picked, ns, s.constraints.loose, s.K.position(i[stored], j[stored]), stored,
-                      row * len(picked) + column, out, 0, along)
 
 
 @cache

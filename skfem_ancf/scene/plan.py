@@ -161,24 +161,17 @@ def _linear_solver(s, dynamic):
                 "for steps and for the mass with its impulses; by 'energy-momentum', "
                 "'generalized-alpha' and its kin")
     if not dynamic and s.solver.condensed is not None:
-        solver = (f"lines condensed to {s.solver.condensed.size} displacements and rotations of "
-                  "nodes, "
-                  "sparse LDL^T of these: no multiplier is unknown")
-    elif not dynamic and s.forces.far:
-        solver = "banded with a border of the points that force elements couple"
-    elif s.constraints.m and not dynamic and s.machine.tables.plain.border.wide:
-        solver = "sparse LU with the multipliers: " + (
-            "a joint is not quadratic, as a slider on a beam" if s.constraints.bordered else
-            "more is joined, held or followed by loads than the nodes" if s.constraints.frame else
-            f"too many for a border ({s.constraints.m})")
-    elif not s.symmetric:
-        solver = f"banded LU, half bandwidth {bandwidth}: a force has no potential"
-    else:
-        solver = f"banded Cholesky, half bandwidth {bandwidth}"
-    if s.constraints.m and (dynamic or s.constraints.bordered):
-        springs = 0 if dynamic else len(s.constraints.stiff[1])
-        solver += ", bordered by the multipliers" + (
-            f" and by {springs} springs on beams that joints alone hold" if springs else "")
+        return (f"lines condensed to {s.solver.condensed.size} displacements and rotations of "
+                "nodes, sparse LDL^T of these: no multiplier is unknown")
+    many = not s.constraints.few or s.forces.far or not s.symmetric
+    if not dynamic and s.solver.coupled and many:
+        return "sparse LU of the saddle-point matrix with the multipliers"
+    solver = (f"banded Cholesky, half bandwidth {bandwidth}" if s.symmetric else
+              f"banded LU, half bandwidth {bandwidth}: a force has no potential")
+    if s.constraints.m:
+        solver += ", with a Schur complement for the multipliers"
+        if not dynamic:
+            solver += "; sparse LU with these where joints hold what supports leave free"
     return solver
 
 

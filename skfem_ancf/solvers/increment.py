@@ -198,13 +198,13 @@ class Increment:
         system, options = self.system, options or self.options
         u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
         machine = machine or system.machine
-        tables, given = machine.tables, solver is not None
+        tables, given, own = machine.tables, solver is not None, system.solver
         target = self._target(tables, u)
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not given else 0)
         room = machine.room(room_for_iterations, system.constraints.m)
-        if solver is None and tables.plain.border.wide:
-            solver = system.solver
+        if solver is None and own.coupled:
+            solver = own
         while True:
             if solver is not None:
                 rules = rules._replace(solver=handle_of(solver))
@@ -214,7 +214,7 @@ class Increment:
             status, n = machine.of(equilibrium)(target, rules, x, room, residuals)
             if status != SINGULAR or solver is not None:
                 break
-            solver = system.solver  # factors with exchanges of rows, or sparse ones
+            solver = own  # factors with exchanges of rows
         self.record.iterations += n
         self.record.force_residuals += residuals[:n + 1, 0].tolist()
         self.record.energy_residuals += residuals[:n, 1].tolist()
@@ -223,11 +223,10 @@ class Increment:
             raise StepFailed("the body is turned inside out")
         if lost := system.constraints.lost(x.u):
             raise StepFailed(lost)
-        if solver is None:
-            if n:
-                system.solver.take_factors(room.factors)
-            else:
-                system.K.clear()
+        if n == 0:
+            own.forget()
+        elif solver is None:
+            own.take_factors()
         return Equilibrium(x.u, x.multipliers, x.force)
 
     def _target(self, tables, u):

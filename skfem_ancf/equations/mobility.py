@@ -1,0 +1,138 @@
+"""Rigid motions that neither supports nor joints hold, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import sparse
+
+from ..actions.joints.nodes import chain_ends
+from ..beam.rigid import RigidBody
+from .signature import DENSE, null_space, row_sizes, unit_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def who(members: Any, k: int) -> str:
+    """Which beam or body is number k, for messages.
+
+    Parameters
+    ----------
+    members
+        The beams and rigid bodies of a scene.
+    k
+        The number.
+    """
+    member = members[k]
+    if isinstance(member, RigidBody):
+        return f" of the rigid body {member.name or k}"
+    return "" if len(members) == 1 else f" of beam {member.name or k}"
+
+
+def free_rigid_motions(constraints: Any, joints: Any,
+                       stiffness: Callable[[], Any] | None) -> list[str]:
+    """Descriptions of the rigid motions that nothing holds, one string each.
+
+    Parameters
+    ----------
+    constraints
+        :class:`~skfem_ancf.equations.constraints.Constraints`.
+    joints
+        The derivative of their joints in the reference configuration, shape (m, N).
+    stiffness
+        A function that returns that of force elements there, sparse; or None.
+    """
+    c = constraints
+    motions, of_joints, bodies = _motions(c, joints)
+    parts = [motions[c.fixed], of_joints]
+    if stiffness is not None:
+        pushed = stiffness() @ motions
+        size = row_sizes(pushed) * c.coordinate_sizes
+        parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
+    dense = isinstance(motions, np.ndarray)
+    free = null_space(unit_rows(np.concatenate(parts) if dense else sparse.vstack(parts)))
+    bodies = bodies() if len(free) else []
+    return [_describe(v, bodies) for v in free]
+
+
+def _motions(c, joints):
+    """Rigid motions of the bodies, what joints hold of them, and who they are, a function.
+
+    Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
+    columns of a body are two translations and the rotation, in units of its size; dense arrays
+    of few degrees of freedom.
+    """
+    if c.frame is not None:
+        return _motions_of_frame(c, joints)
+    out = np.zeros((c.N, 3 * len(c.members))) if c.N <= DENSE else None
+    values = []
+    for k, (member, s) in enumerate(zip(c.members, c.slices)):
+        values.append(member.rigid_motions() / (1.0, 1.0, member.size))
+        if out is not None:
+            out[s, 3 * k:3 * k + 3] = values[-1]
+    if out is None:
+        out = _sparse(np.concatenate(values), np.repeat(
+            np.arange(len(values)), [member.N for member in c.members]))
+    return out, joints @ out, lambda: [(who(c.members, k), b.origin, b.size)
+                                       for k, b in enumerate(c.members)]
+
+
+def _motions_of_frame(c, joints):
+    """The same, of a frame."""
+    frame, origin = c.frame, c.members[0].origin
+    parts = frame.parts()
+    of_part, values, first = np.zeros(c.N, dtype=int), [], 0
+    for beam, s in zip(c.members, c.slices):
+        ends = chain_ends(beam)
+        of = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
+        of_part[s], first = np.repeat(of, beam.nd), first + len(ends)
+        motions, shift = beam.rigid_motions().copy(), beam.origin - origin
+        motions[:, 2] += shift[0] * motions[:, 1] - shift[1] * motions[:, 0]
+        values.append(motions / (1.0, 1.0, c.size))
+    motions, number = _sparse(np.concatenate(values), of_part), int(parts.max()) + 1
+    held = sparse.vstack([frame.held_motions(parts, origin, c.size, number),
+                          joints[len(frame.equations):] @ motions])
+    return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
+
+
+def _sparse(values, of_body):
+    """Motions (N, 3) of the bodies that degrees of freedom belong to, as a matrix."""
+    n = len(values)
+    return sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
+                             3 * np.arange(n + 1)), shape=(n, 3 * int(of_body.max() + 1)))
+
+
+def advice(constraints: Any) -> str:
+    """What would hold a scene, in words; see :func:`free_rigid_motions`."""
+    if constraints.frame is not None:
+        points = constraints.frame.net.points
+        x = "({:.6g}, {:.6g})".format(*points[:, np.lexsort(points)[0]])
+        return (f"frame.clamp({x}), the name or number of a node in place of its point, or as "
+                f"a roller frame.hold({x}, 'y')")
+    member = constraints.members[0]
+    if isinstance(member, RigidBody):
+        name = repr(0 if member.name is None else member.name)
+        x = "({:.6g}, {:.6g})".format(*member.position)
+        return (f"scene.clamp({x}, beam={name}) for all of a body, scene.pin({x}, beam={name}) "
+                "for a point, or springs")
+    return "scene.clamp('left'), scene.pin('right') or, as a roller, scene.fix('right', 'r^2')"
+
+
+def _describe(v, bodies):
+    """A rigid motion of bodies (who, origin, size) in words."""
+    parts = []
+    for k, (who, origin, size) in enumerate(bodies):
+        a, b, c = v[3 * k:3 * k + 3]
+        if max(abs(a), abs(b), abs(c)) < 1e-8:
+            continue
+        if abs(c) < 1e-8:
+            d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
+            d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
+            parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
+        else:
+            x = origin + np.array([-b, a]) * size / c
+            x = np.where(np.abs(x) < 1e-9 * size, 0.0, x)
+            parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
+    return " with ".join(parts)
