@@ -1,4 +1,4 @@
-"""What texts ask of Python objects: loads, joints and laws of one's own, wide borders, descents.
+"""What texts ask of Python objects: loads, joints and laws of one's own, joints, descents.
 
 An object is known by a handle, a positive number: compiled code can hold one, and calls back.
 """

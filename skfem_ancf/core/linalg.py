@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from .types import Array
 
-#: Relative correction of a border's solution above which sparse LU is used.
-INACCURATE = 1e-5
 #: Eigenvalue of a matrix of unit diagonal that is round-off.
 SINGULAR = 4.0 * np.finfo(float).eps
 #: What factors and eigenvalues raise: singular matrices, Arnoldi without convergence.
@@ -236,22 +234,6 @@ class BandMatrix:
             return x
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
-
-    @property
-    def factors(self) -> Band:
-        """The factors as texts take them, see :mod:`skfem_ancf.core.band`."""
-        if self._factor is None:
-            self.factorize()
-        if self._factor[0] == "ldl":
-            return self.band
-        if self._factor[0] == "pb":
-            c, lower = self._factor[1], np.zeros((self.n, self._ld))
-            lower[:, 0] = c[0] ** 2
-            lower[:, 1:len(c)] = (c[1:] / c[0]).T
-            return Band(lower.ravel(), self.band.pivots, self._ld, self.bandwidth, 0)
-        _, lu, pivots = self._factor
-        return Band(np.ascontiguousarray(lu.T).ravel(), pivots, len(lu), self.bandwidth,
-                    2 * self.bandwidth)
 
     def take_factors(self) -> None:
         """Note that the entries have been replaced by factors, of :mod:`skfem_ancf.core.band`."""

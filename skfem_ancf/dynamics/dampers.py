@@ -6,7 +6,6 @@ import numpy as np
 
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..beam.strain_energy import add_viscous_force, body_tangent
-from ..equations.border import inverse_rows
 from ..actions.forces.texts import add_resisting_force
 from ..core.source import F2, lanes, source
 
@@ -49,6 +48,16 @@ class Dampers(NamedTuple):
     mass: float
     D: Band
     modes: F2
+
+
+@source
+def inverse_rows(A, J, free, Y):
+    """Y[k] = A^-1 J[k] at free coordinates, with the factors of A."""
+    for k in range(J.shape[0]):
+        row, out = J[k], Y[k]
+        for i in lanes(free.size):
+            out[i] = row[i] * free[i]
+        solve(A, out)
 
 
 @source

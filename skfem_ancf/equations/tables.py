@@ -12,7 +12,6 @@ from . import compiled
 from ..core.band import Band
 from ..beam.strain_energy import (BEGIN, END_GRADIENTS, FlatBody, body_of, copies_of, stress_size,
                                   viscous_body_of)
-from .border import Border
 from .compiled.words import Words, constant
 from ..actions.forces.system import NO_FORCES
 from ..actions.forces.texts import ForceTables
@@ -36,8 +35,6 @@ _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)
                                   np.zeros((0, 2)), np.zeros(0), _NO_INTS))
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
 _NO_PUSHES = np.zeros((0, 0))
-_NO_ROWS = np.zeros((0, 3), np.int64)
-_NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0, _NO_ROWS))
 constant(NO_FORCES)
 
 
@@ -49,10 +46,9 @@ class Equations(NamedTuple):
     ----------
     body
         A :class:`~skfem_ancf.beam.strain_energy.Body`; a ``FlatBody`` for compiled code.
-    loads, joints, border
+    loads, joints
         :class:`~skfem_ancf.actions.tables.LoadTables`,
-        :class:`~skfem_ancf.actions.tables.JointTables`,
-        :class:`~skfem_ancf.equations.border.Border`.
+        :class:`~skfem_ancf.actions.tables.JointTables`.
     fixed, free
         Fixed coordinates, and for each one 1 or 0.
     K
@@ -75,7 +71,6 @@ class Equations(NamedTuple):
     fixed: I1
     free: F1
     K: Band
-    border: Border
     viscous: Any
     forces: ForceTables
     copies: Any
@@ -111,7 +106,6 @@ class Tables:
         body = body_of(system.beams, system.slices)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
-                               _NO_BORDER._replace(wide=int(system.solver.coupled)),
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes)
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError
-from ..core.linalg import INACCURATE
 from ..equations import stability
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
@@ -307,4 +306,4 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int,
     scales = system.scales
     # the residual sums the noise of all degrees of freedom, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, 8.0 * scales.work_noise,
-                 8.0 * scales.force_noise, INACCURATE, 0, wary)
+                 8.0 * scales.force_noise, 0, wary)

@@ -9,14 +9,12 @@ import numpy as np
 from ..core.band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
                          weighted)
 from ..beam.strain_energy import body_carry, body_force, body_tangent
-from ..equations.border import (Factors, add_curvature, factorize_bordered, mean_stiffness,
-                                new_factors, solve_bordered)
 from ..actions.forces.texts import (add_elastic_force, add_element_tangent, contact_along,
                                     contact_work)
 from ..core.callbacks import own_solve
 from ..core.source import F1, borrowed, by_place, lanes, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
-                              external_force, joint_directions)
+                              external_force)
 
 if TYPE_CHECKING:
     from ..equations.tables import Equations
@@ -75,11 +73,9 @@ class Rules(NamedTuple):
         At most.
     tol, floor, force_floor
         Tolerance of a correction, and round-off of its work and of the residual.
-    inaccurate
-        What a border's solution may be wrong by, relative.
     solver
         Handle of what solves the linear systems, see :mod:`skfem_ancf.core.callbacks`; 0 for the
-        band.
+        band alone.
     wary
         When it ends because corrections do not get smaller: 0 never, :data:`FIRST` or
         :data:`WATCHED`.
@@ -90,7 +86,6 @@ class Rules(NamedTuple):
     tol: float
     floor: float
     force_floor: float
-    inaccurate: float
     solver: int
     wary: int
 
@@ -119,7 +114,6 @@ class Work(NamedTuple):
     push: F1
     phi: F1
     dm: F1
-    factors: Factors
 
 
 def room_for_iterations(e: Equations, m: int) -> Work:
@@ -134,8 +128,7 @@ def room_for_iterations(e: Equations, m: int) -> Work:
     """
     N = e.free.size
     R, du, before, scale, load, push = np.empty((6, N))
-    return Work(R, du, before, scale, load, push, np.zeros(m), np.zeros(m),
-                new_factors(e.border, e.K, m, N))
+    return Work(R, du, before, scale, load, push, np.zeros(m), np.zeros(m))
 
 
 @source
@@ -224,6 +217,13 @@ def reference_work(force, load, u):
 def settled(work, reference, rules):
     """True if a correction's work, as a root, is as small as is asked, or round-off."""
     return work <= rules.tol * reference + rules.floor
+
+
+@source
+def mean_stiffness(diagonal, sizes):
+    """The mean of stiffnesses, each times the square of its coordinate's size; 1 of none."""
+    mean = weighted(sizes, sizes, diagonal) / sizes.size
+    return mean if mean > 0.0 else 1.0
 
 
 @source
@@ -345,20 +345,8 @@ def _solved(e, target, rules, x, w):
     """Solve for the correction; False if the matrix is singular."""
     if rules.solver > 0:
         return own_solve(rules.solver, target.at, x.u, x.multipliers, w.R, w.phi, w.du, w.dm)
-    if w.phi.size == 0:
-        copy(w.R, w.du)
-        if not factorize(e.K):
-            return False
-        solve(e.K, w.du)
-        return True
-    f = w.factors
-    joint_directions(e.joints, target.g, target.at, x.u, f.J)
-    for k in range(w.phi.size):
-        row = f.J[k]
-        for i in lanes(row.size):
-            row[i] *= e.free[i]
-    add_curvature(e.joints, e.border, x.multipliers, e.free, e.sizes, e.K, f)
-    if not factorize_bordered(f, e.border, e.free):
+    copy(w.R, w.du)
+    if not factorize(e.K):
         return False
-    error = solve_bordered(f, e.border, w.R, w.phi, w.du, w.dm)
-    return 0.0 <= error <= rules.inaccurate
+    solve(e.K, w.du)
+    return True

@@ -31,7 +31,7 @@ from .views import has_arrays
 
 #: Modules whose texts are compiled for size: their loops take less time than what they call; and
 #: texts of others.
-BRIEF = {"border", "forces.texts", "kernels.section.section_gradients", "statics.iteration"} | {
+BRIEF = {"forces.texts", "kernels.section.section_gradients", "statics.iteration"} | {
     f"forces.contact_texts.{name}" for name in (
         "_carry", "_keep_work", "_near", "_of_group", "_reach_on", "_stride", "distances",
         "levers", "press", "resist", "stick")}
