@@ -10,7 +10,6 @@ from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
                         InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.equations.constraints import Constraints
 from skfem_ancf.elements import base
 from skfem_ancf.equations.tables import Tables
 from skfem_ancf.core.errors import CallbackError, ModelWarning
