@@ -193,28 +193,6 @@ needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 
 
 @needs_fork
-def test_killed_at_random_moments(tmp_path):
-    found = in_child('''
-random.seed(5)
-kills, moments, status = 0, [], None
-while status != 0:
-    pid = child(run)
-    time.sleep(random.uniform(0.0, 0.08) * (1 + kills / 10))
-    os.kill(pid, signal.SIGKILL)
-    status = os.waitpid(pid, 0)[1]
-    assert status in (0, signal.SIGKILL), status
-    kills += status != 0
-    if os.path.exists(path):
-        moments.append(float(checkpoint.read(path)["now.t"]))  # the file is whole, always
-history = swinging(False).resume(path)
-print(json.dumps([kills, moments, same(history, whole())]))
-''', tmp_path / "run.npz")
-    kills, moments, identical = found
-    assert identical and kills >= 2
-    assert moments == sorted(moments) and moments[-1] == pytest.approx(0.1)
-
-
-@needs_fork
 def test_killed_while_writing(tmp_path):
     """After a part of the file, before it is on the disk, before and after it gets its name."""
     found = in_child('''

@@ -1,17 +1,14 @@
 """Damping: what it takes, where it leads, and that nothing is lost besides."""
 
-import pickle
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_ivp
 
-from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        EnergyMomentum, GeneralizedAlpha, InputError, KelvinVoigt, MeshBeam,
-                        NeoHookean, Newmark, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        InputError, KelvinVoigt, MeshBeam,
+                        NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES
-from skfem_ancf.core.errors import CheckpointError
 from skfem_ancf.materials import Material
 from skfem_ancf.equations.momentum import momentum
 
@@ -160,52 +157,6 @@ def test_spinning_and_flying_lose_nothing():
 # order
 
 
-def smooth(damping):
-    beam = Beam(MeshBeam.init_line([0, 1], 0.5), ElementBeamANCF(1),
-                StVenantKirchhoff(1e3, 0.3, 1000.0), 0.1, damping=KelvinVoigt(damping))
-    scene = Scene(beam).clamp("left").gravity((0, -3.0), amplitude=lambda t: np.sin(1.5 * t) ** 2)
-    return scene.damping(mass=0.3, modal=[0.1])
-
-
-@pytest.fixture(scope="module")
-def by_scipy():
-    scene = smooth(0.1)
-    s, free = scene.system, np.nonzero(scene.system.constraints.free)[0]
-    M = np.linalg.inv(s.mass.tocsc()[free][:, free].toarray())
-
-    def rate(t, y):
-        u, v = np.zeros((2, s.N))
-        u[free], v[free] = y.reshape(2, -1)
-        force = s.external_force(u, t) - s.internal_force(u) - s.damping_force(u, v)
-        return np.append(v[free], M @ force[free])
-
-    run = solve_ivp(rate, (0, 1.0), np.zeros(2 * len(free)), "DOP853", rtol=1e-10, atol=1e-12)
-    out = np.zeros((2, s.N))
-    out[:, free] = run.y[:, -1].reshape(2, -1)
-    return out
-
-
-@pytest.mark.parametrize("scheme", [EnergyMomentum(), GeneralizedAlpha(0.0), GeneralizedAlpha(0.9),
-                                    HHT(0.1), Newmark(), Newmark(0.36, 0.6)], ids=repr)
-def test_every_scheme_keeps_its_order(scheme, by_scipy):
-    runs = [smooth(0.1).integrate(1.0, 1.0 / n, scheme=scheme) for n in (80, 160)]
-    for k, exact in enumerate(by_scipy):
-        errors = [np.abs((run.u, run.v)[k][-1] - exact).max() for run in runs]
-        assert np.log2(errors[0] / errors[1]) == pytest.approx(scheme.order, abs=0.12)
-    works = [run.dissipated[-1] for run in runs]
-    assert works[1] == pytest.approx(works[0], rel=0.05)
-
-
-def test_automatic_steps_and_instants_between_them():
-    scene = hinged("sections", 1e-3)
-    history = scene.integrate(0.1, "auto", rtol=1e-5)
-    assert np.ptp(history.total_energy + history.dissipated) < 1e-11 * history.kinetic_energy.max()
-    times = np.array([0.0, 0.0333, 0.0871, 0.1])
-    some = scene.integrate(0.1, 2e-3, t_eval=times, breakpoints=[0.05])
-    assert np.ptp(some.total_energy + some.dissipated) < 1e-11 * history.kinetic_energy.max()
-    assert np.all(np.diff(some.dissipated) > 0.0)
-
-
 # theory
 
 
@@ -288,63 +239,6 @@ def test_modal_damping_does_not_count_rigid_motions(hold):
 # what there is besides
 
 
-def test_statics_and_modes_are_those_without_damping():
-    damped, plain = (Scene(beam_of(time=x, ne=8)).clamp("left") for x in (2e-3, 0.0))
-    damped.damping(1.0, 1.0, [0.1])
-    for scene in (damped, plain):
-        scene.gravity((0, -9.81))
-    assert np.array_equal(damped.solve_static().u, plain.solve_static().u)
-    assert np.array_equal(damped.modes(2).frequencies, plain.modes(2).frequencies)
-    assert damped.plan()["damping"].status == plain.plan("dynamic")["damping"].status == "skipped"
-    assert damped.plan("dynamic")["damping"].status == "computed"
-    assert plain.integrate(0.01, 1e-3).dissipated.tolist() == [0.0] * 11
-
-
-def test_damping_of_a_scene_without_damping_costs_nothing(monkeypatch):
-    from skfem_ancf.dynamics import dampers, steps
-
-    def fail(*args):
-        raise AssertionError("asked for")
-
-    for module in (dampers, steps):
-        monkeypatch.setattr(module, "damping_force", fail)
-    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "0")
-    scene = Scene(beam_of(time=0.0)).clamp("left").gravity((0, -9.81))
-    scene.integrate(0.01, 1e-3)
-    assert scene.system.machine.tables.plain.viscous is scene.system.machine.tables.plain.body
-
-
-def test_copies_files_and_other_meshes(tmp_path):
-    scene = hinged("sections", 1e-3).damping(mass=0.5, modal=[0.1])
-    history = scene.integrate(0.06, 1e-3)
-    again = pickle.loads(pickle.dumps(scene))
-    assert np.array_equal(again.integrate(0.06, 1e-3).dissipated, history.dissipated)
-    path = tmp_path / "run.npz"
-    half = scene.integrate(0.03, 1e-3)
-    rest = scene.integrate(0.06, 1e-3, start=half.state(-1))
-    assert_allclose(rest.dissipated[-1], history.dissipated[-1], rtol=1e-9)
-    scene.integrate(0.06, 1e-3, checkpoint=path, every=7)
-    assert np.array_equal(scene.resume(path).dissipated, history.dissipated)
-    other = hinged("sections", 1e-3).damping(mass=0.6, modal=[0.1])
-    with pytest.raises(CheckpointError, match="damping"):
-        other.resume(path)
-    finer = scene.replace(beams=[b.replace(mesh=b.mesh.refined()) for b in scene.beams])
-    assert finer.beams[0].damping.time == 1e-3
-    assert finer.integrate(0.06, 1e-3).dissipated[-1] == pytest.approx(history.dissipated[-1],
-                                                                      rel=0.2)
-    assert beam_of().replace(width=0.02).damping.time == 2e-3
-
-
-def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path, interrupted):
-    scene, path = hinged("cable", 1e-3), tmp_path / "run.npz"
-    whole = scene.integrate(0.03, 1e-3, scheme="generalized-alpha")
-    interrupted(lambda: scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path,
-                                        every=7))
-    again = scene.resume(path)
-    assert np.array_equal(again.u, whole.u)
-    assert np.array_equal(again.dissipated, whole.dissipated)
-
-
 @pytest.mark.parametrize("make", [
     lambda: KelvinVoigt(-1e-4), lambda: KelvinVoigt("soft"), lambda: KelvinVoigt(np.nan),
     lambda: Scene(beam_of()).damping(mass=-1.0), lambda: Scene(beam_of()).damping(stiffness=-1.0),
@@ -366,16 +260,6 @@ def test_compiled_steps_are_the_same(needs_compiled, body, monkeypatch):
     for plain, fast in zip(*runs):
         assert_allclose(fast.u, plain.u, rtol=0, atol=1e-10)
         assert_allclose(fast.dissipated, plain.dissipated, rtol=1e-7, atol=1e-15)
-
-
-@pytest.mark.parametrize("scheme", ["radau", "gauss"])
-def test_collocation_knows_dashpots(scheme):
-    """Of a section with little inertia: in halves of steps, and 19 times the iterations, else."""
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.02), ElementBeamCable(5),
-                StVenantKirchhoff(5e7, 0.3, 1200.0), 0.02)
-    scene = Scene(beam).pin("left").gravity((0.0, -9.81)).torsional_spring(2.0, "left", 0.02)
-    history = scene.integrate(0.2, 4e-3, scheme=scheme)
-    assert history.substeps == 0 and history.iterations < 3 * 14 * history.steps
 
 
 @pytest.mark.parametrize("scheme", ["radau", "gauss"])

@@ -13,12 +13,10 @@ from scipy.integrate import solve_ivp
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, NeoHookean, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.equations import mass_solver
 from skfem_ancf.core.band import Band
 from skfem_ancf.beam.strain_energy import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
-                                 Radau, get_scheme)
-from skfem_ancf.dynamics.history import COLUMNS
+                                 Radau)
 from skfem_ancf.dynamics.rates import JointMotion
 from skfem_ancf.dynamics.dampers import Dampers, Rows
 from skfem_ancf.actions.forces.system import Forces
@@ -30,7 +28,6 @@ from skfem_ancf.core.errors import (ConvergenceError, InputError, ModelWarning, 
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.actions.joints.base import rotation
 from skfem_ancf.beam.kernels.moments import MomentPack
-from skfem_ancf.core.linalg import BandMatrix
 from skfem_ancf.core.sampling import sample
 from skfem_ancf.actions.tables import JointTables, LoadTables
 
@@ -179,31 +176,6 @@ def test_radau_does_not_multiply_errors_of_the_iteration_by_the_stiffness(joined
     for name in ("acceleration", "multipliers"):
         known, found = getattr(exactly, name)[-1], getattr(roughly, name)[-1]
         assert_allclose(found, known, rtol=0, atol=1e-3 * np.abs(known).max(initial=0.0))
-
-
-def test_factors_are_made_once_where_the_first_correction_stretches_far():
-    """It has more energy than the motion: stresses are carried at once, with the factors there."""
-    beam = Beam(MeshBeam.init_line([0, 1], 0.01), ElementBeamCable(5),
-                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01)
-    scene = Scene(beam).pin("left").gravity(GRAVITY)
-    history = scene.integrate(1.0 / 13.0, 1.0 / 13.0, scheme="radau", tol=8e-3)
-    assert history.factorizations == 2 and history.iterations <= 3 * 4  # one real and one pair
-
-
-@pytest.mark.parametrize("scheme", ["radau", "generalized-alpha"])
-def test_a_motion_is_the_same_after_another(scheme):
-    """Whose work arrays it takes."""
-    scene = driven_hub()
-    first = scene.integrate(0.2, 0.02, scheme=scheme)
-    other = scene.integrate(0.1, "auto", scheme=scheme, rtol=1e-3, t_eval=[0.03, 0.1])
-    again = scene.integrate(0.2, 0.02, scheme=scheme)
-    assert len(scene.system.integrators) == 2  # one took the instants within steps
-    for name in ("u", "v", "acceleration", "multipliers"):
-        assert np.array_equal(getattr(again, name), getattr(first, name))
-    assert (again.iterations, again.factorizations) == (first.iterations, first.factorizations)
-    assert np.array_equal(scene.integrate(0.3, 0.02, scheme=scheme, start=first.state(-1)).u[-1],
-                          scene.integrate(0.3, 0.02, scheme=scheme, start=again.state(-1)).u[-1])
-    assert len(other) == 2
 
 
 def driven_hub():
@@ -417,12 +389,6 @@ def test_published_dissipation(scheme):
         assert np.log2(damping[1] / damping[0]) == pytest.approx(3, abs=0.1)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.4, 0.8])
-def test_rho_inf_is_the_radius_at_infinity(rho):
-    assert GeneralizedAlpha(rho).alpha_f == pytest.approx(rho / (1 + rho), rel=1e-14)
-    assert published_radius(GeneralizedAlpha(rho)) == pytest.approx(rho, abs=1e-14)
-
-
 @pytest.mark.parametrize("scheme, size, low, high", [
     (EnergyMomentum(), 1e-2, 1 - 1e-10, 1 + 1e-10), (Newmark(), 1e-6, 1 - 1e-5, 1 + 1e-5),
     (GeneralizedAlpha(0.8), 1e-4, 1e-9, 1e-2), (GeneralizedAlpha(0.0), 1e-4, 0.0, 1e-12)], ids=str)
@@ -495,41 +461,6 @@ def test_other_schemes_do_not_conserve():
 
 
 # what is computed once, and the start
-
-
-def test_mass_is_assembled_and_factorised_once(monkeypatch):
-    assembled, factorised = [], []
-    assemble, factorize = Beam.mass_elements, mass_solver.factorize
-    monkeypatch.setattr(Beam, "mass_elements",
-                        lambda b, *part: assembled.append(b) or assemble(b, *part))
-    monkeypatch.setattr(mass_solver, "factorize", lambda A: factorised.append(A) or factorize(A))
-    monkeypatch.setattr(BandMatrix, "factorize", lambda A: pytest.fail("factors made anew"))
-    scene = Scene(soft(2, 2)).pin("left").gravity(GRAVITY)
-    for scheme in SCHEMES:
-        scene.integrate(0.05, 0.01, scheme=scheme)
-    assert len(assembled) == 1
-    assert [A.flat is scene.system.mass_solver.factors.band.flat for A in factorised] == [True]
-
-
-def driven_arm(angle):
-    """A section that turns by a function of time."""
-    scene = Scene(soft(2, 2, E=1e5, h=0.1)).pin("left")
-    scene.joint("angle", at="left", angle=angle)
-    return scene
-
-
-@pytest.mark.parametrize("scheme, times", [("generalized-alpha", 350), ("radau", 650)])
-def test_a_driven_angle_is_asked_once_for_a_block(scheme, times):
-    """All times of 50 steps at once, where the functions take arrays, and three of them alone.
-
-    Besides these the start asks for six.
-    """
-    asked = []
-    scene = driven_arm(lambda t: asked.append(np.size(t)) or np.sin(t))
-    scene.integrate(0.1, 0.01, scheme=scheme)
-    asked.clear()
-    scene.integrate(0.5, 0.01, scheme=scheme)
-    assert [n for n in asked if n > 1] == [times] and len(asked) <= 4 + 6
 
 
 def test_joints_that_turn_beside_others():
@@ -667,33 +598,10 @@ def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
         assert_allclose(some.u, every.u[n] + shift * every.v[n], rtol=0, atol=near)
 
 
-@pytest.mark.parametrize("scheme", ["radau", "generalized-alpha", "energy-momentum"])
-def test_stored_blocks_are_what_their_steps_were(scheme, monkeypatch):
-    scene = smooth_scene()
-    monkeypatch.setattr("skfem_ancf.dynamics.run.SHOWN", 7 * scene.N)
-    every = scene.integrate(0.3, 0.01, scheme=scheme)
-    assert len(every) == 31 and every.t[-1] == 0.3
-    asked = scene.integrate(0.3, 0.01, scheme=scheme, t_eval=every.t)
-    for k in (0, 1, 6, 7, 8, 20, 29, 30, -1):
-        one, other = every.state(k)._motion, asked.state(k)._motion
-        for name in COLUMNS:
-            assert np.array_equal(getattr(one, name), getattr(other, name)), name
-
-
 @pytest.mark.parametrize("options", [{"dt": 1e-3}, {"dt": "auto"}])
 def test_last_instant_is_the_end(options):
     history = smooth_scene().integrate(0.0105, t_eval=[0.0105], **options)
     assert history.t.tolist() == [0.0105]
-
-
-def test_time_may_start_later():
-    whole = smooth_scene().integrate(0.4, 0.01)
-    k = 20
-    scene = smooth_scene()
-    scene.initial_velocity(whole.v[k])
-    rest = scene.integrate(0.4, 0.01, start=whole.state(k), t_start=0.2)
-    assert rest.t[0] == 0.2
-    assert np.allclose(rest.u[-1], whole.u[-1], rtol=0, atol=1e-13)
 
 
 # loads, velocities, starts
@@ -935,14 +843,6 @@ def test_bad_inputs(call, error, message):
         call(Scene(soft()).clamp("left"))
 
 
-def test_get_scheme():
-    assert isinstance(get_scheme("hht"), HHT) and isinstance(get_scheme(Newmark), Newmark)
-    scheme = GeneralizedAlpha(0.3)
-    assert get_scheme(scheme) is scheme
-    assert set(SCHEMES) == {"energy-momentum", "energy-momentum-4", "generalized-alpha", "hht",
-                            "newmark", "gauss", "radau"}
-
-
 # motions known from elsewhere
 
 
@@ -1114,51 +1014,6 @@ def test_sampling_is_asking_one_by_one(function):
     times = np.linspace(0, 1, 21)
     expected = np.array([np.squeeze(function(t)) for t in times], dtype=float)
     assert np.allclose(np.squeeze(sample(function, times)), expected, rtol=0, atol=1e-14)
-
-
-def test_a_function_that_takes_arrays_is_asked_a_few_times():
-    asked = []
-    sample(lambda t: asked.append(np.shape(t)) or np.sin(t), np.linspace(0, 1, 1000))
-    assert asked == [(1000,), (), (), ()]
-
-
-@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum"])
-def test_directions_of_joints_that_follow_the_time_alone_are_solved_with_once_a_step(
-        scheme, monkeypatch):
-    """And with each new matrix, and with the mass; not in each iteration."""
-    from skfem_ancf.core import band
-
-    solved, solve_many = [], band.solve_many
-    monkeypatch.setattr(band, "solve_many", lambda *args: solved.append(1) or solve_many(*args))
-    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(3),
-                StVenantKirchhoff(2e8, 0.3, 7800), 0.01, compiled=False)
-    scene = Scene(beam).pin("left")
-    scene.joint("angle", at="left", angle=lambda t: 20.0 * t**2)
-    history = scene.integrate(0.2, 0.01, scheme=scheme)
-    assert history.iterations > 2 * history.steps
-    assert len(solved) <= 2 * history.steps + history.factorizations
-
-
-@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum", "radau"])
-def test_directions_of_hinges_are_solved_with_once_for_many_steps(scheme, monkeypatch):
-    """With each new matrix, and with the mass once in a block of steps."""
-    from skfem_ancf.core import band
-
-    solved, solve_many = [], band.solve_many
-    monkeypatch.setattr(band, "solve_many", lambda *args: solved.append(1) or solve_many(*args))
-    a, b = (Beam(MeshBeam.init_line([0, 1], 0.01, origin=(x, 0)), ElementBeamCable(3),
-                 StVenantKirchhoff(2e8, 0.3, 7800), 0.01, compiled=False) for x in (0, 1))
-    scene = Scene(a, b).pin("left", a).gravity(GRAVITY)
-    hinge = scene.hinge((1, 0))
-    history = scene.integrate(0.1, 1e-3, scheme=scheme)
-    assert len(solved) <= history.factorizations + 0.3 * history.steps
-    in_one, in_parts = (scene.integrate(0.02, 1e-3, scheme=scheme), [])
-    start = None
-    for k in range(1, 5):  # blocks begin anew
-        part = scene.integrate(0.005 * k, 1e-3, scheme=scheme, start=start)
-        start = part.state(-1)
-        in_parts.append(part.joint_force(hinge)[1:])
-    assert_allclose(np.concatenate(in_parts), in_one.joint_force(hinge)[1:], rtol=1e-7)
 
 
 def test_a_body_that_is_turned_inside_out_is_said():

@@ -1,10 +1,7 @@
 """Thicknesses that stay on tapers: against integrals of beam theory and the plane body."""
 
-import pickle
 from itertools import pairwise
 
-import matplotlib.pyplot as plt
-import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -197,23 +194,6 @@ def wide(x, y):
     return 0.02 + 0.01 * x + y * y
 
 
-def test_functions_are_asked_in_their_layer_only():
-    law = STEEL.replace(E=graded, density=lambda x, y: graded(x, y) / 1e4)
-    section = Section.layers((None, PLAIN), (0.01, law), width=wide)
-    beam = Beam(taper(8), ElementBeamANCFCubic(2), section=section)
-    x, w = gauss(20)
-    y = np.array([0.5 * height(x) - 0.01, 0.01 + 0.0 * x])
-    at = y[0][:, None] + y[1][:, None] * x
-    top = (w * np.sum(w * y[1][:, None] * wide(x[:, None], at) * graded(x[:, None], at) / 1e4,
-                      axis=1)).sum()
-    low, size = -0.5 * height(x)[:, None], (height(x) - 0.01)[:, None]
-    core = (w * np.sum(w * size * wide(x[:, None], low + size * x), axis=1)).sum() * PLAIN.density
-    assert beam.total_mass == pytest.approx(top + core, rel=1e-12)
-    state = cantilever(beam, (0.0, -P))
-    r = state.resultants((0.5, 0.0))
-    assert r.recovered and r.M == pytest.approx(-0.5 * P, rel=1e-5)
-
-
 def test_constant_heights_are_those_of_fixed_layers_and_profiles():
     """A taper that does not: energy, shear factor, mass; and a layer that takes the rest."""
     flat = MeshBeam.init_line(np.linspace(0, 1, 5), height=H)
@@ -244,43 +224,6 @@ def test_rubber_on_a_core_of_steel():
     hooke = Scene(small).clamp("left").point_force((0, -0.2), at=(1, 0)).solve_static()
     assert tips[0] == pytest.approx(tips[1], rel=5e-3)
     assert tips[1] == pytest.approx(hooke.displacement((1, 0))[1], rel=0.02)
-
-
-def test_they_are_pickled_refined_and_drawn(tmp_path):
-    for section, material, _ in SECTIONS.values():
-        beam = Beam(taper(4), ElementBeamANCF(2), material, section=section)
-        other = pickle.loads(pickle.dumps(beam))
-        assert other.total_mass == beam.total_mass
-        scene = Scene(other).clamp("left").gravity((0, -9.81))
-        state = scene.solve_static(adapt=1e-2)
-        assert state.beams[0].total_mass == pytest.approx(beam.total_mass, rel=1e-9)
-        state.save(tmp_path / "beam.vtu")
-        assert "exact for degree 9 of 8" in str(scene.plan())
-
-
-@pytest.mark.parametrize("mesh, section", [
-    (MeshBeam.init_line(np.linspace(0, 1, 5), height=H), Section.layers(
-        (0.09, BRASS), (0.01, STEEL), width=0.02)), (taper(4), SECTIONS["coating"][0])])
-def test_files_and_pictures_have_both_sides_of_a_jump(mesh, section, tmp_path):
-    """S_xx over E is continuous; the quads are the body, none of them of two layers."""
-    state = cantilever(Beam(mesh, ElementBeamANCFCubic(3), section=section), (0.0, -P))
-    state.save(tmp_path / "a.vtu", fields=["S_xx", "eps_xx"], undeformed=True, subdivide=(4, 3))
-    grid = meshio.read(tmp_path / "a.vtu")
-    quads = grid.cells[0].data
-    eps = grid.point_data["eps_xx"]
-    E = (grid.point_data["S_xx"] / eps)[quads]
-    E = E[np.abs(eps[quads]).min(axis=1) > 0.1 * np.abs(eps).max()]
-    middle = np.median(E, axis=1)  # transverse strains have a part in S_xx, too
-    assert_allclose(E, middle[:, None] + 0 * E, rtol=0.2)
-    assert np.all(np.isclose(middle, STEEL.E, rtol=0.1) | np.isclose(middle, BRASS.E, rtol=0.1))
-    assert middle.min() < 0.6 * middle.max()
-    d = grid.points[quads[:, 2:]] - grid.points[quads[:, :2]]
-    area = 0.5 * (d[:, 0, 0] * d[:, 1, 1] - d[:, 1, 0] * d[:, 0, 1])
-    assert area.min() > 0.0 and area.sum() == pytest.approx(
-        H if mesh.heights is None else 0.75 * H)
-    axes = state.plot("S_xx")
-    assert axes.has_data()
-    plt.close(axes.figure)
 
 
 class Few(Formulation):

@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose
 
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, MeshBeam, RigidBody, Scene,
+from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, RigidBody, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
 from skfem_ancf.dynamics.energy_momentum import PARTS
-from skfem_ancf.dynamics.run import Run, StepFailed, integrator_of, interpolate
+from skfem_ancf.dynamics.run import integrator_of, interpolate
 from skfem_ancf.core.errors import InputError
 from skfem_ancf.equations.momentum import momentum
 
@@ -75,15 +75,6 @@ def test_first_order_schemes_too():
     assert 0.03 < min(ratios) and max(ratios) < 5, ratios
 
 
-@pytest.mark.parametrize("scheme", ["radau", "gauss"])
-def test_high_order_takes_few_steps(scheme):
-    """10^(1/5), 10^(1/6) by their order; Radau's is less for what is stiff."""
-    steps = [swinging().integrate(0.5, "auto", scheme=scheme, rtol=rtol).steps
-             for rtol in (1e-4, 1e-5)]
-    second = swinging().integrate(0.5, "auto", scheme="generalized-alpha", rtol=1e-4).steps
-    assert steps[1] < 3.0 * steps[0] and steps[0] < 0.5 * second
-
-
 def test_steps_of_fourth_order_keep_the_energy():
     """Two rods on a hinge: of automatic size, a quarter of those of second order."""
     def build():
@@ -136,15 +127,6 @@ def test_estimates_are_the_errors_of_vibrations(scheme):
         old, u, v = new, u1, v1
     sizes = [np.sqrt(np.mean(np.square(e[8:]))) for e in (estimates, errors)]
     assert sizes[0] == pytest.approx(sizes[1], rel=0.1)
-
-
-def test_steps_that_do_not_converge_are_taken_in_shorter_ones():
-    """Not in halves: their estimate is that of the step."""
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(3),
-                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01)
-    history = Scene(beam).clamp("left").gravity(GRAVITY).integrate(
-        0.8, "auto", scheme="radau", rtol=1e-2)
-    assert history.rejected > 0 and history.substeps == 0
 
 
 def test_what_joints_undo_is_not_added_up():
@@ -212,54 +194,6 @@ def test_the_difference_from_half_steps_is_about_the_error(scheme, name, dt):
     assert 0.4 * most - 1e-7 < history.error < 1.5 * most + 1e-7
 
 
-def test_a_check_changes_nothing_else():
-    checked, once = (swinging().integrate(0.2, "auto", rtol=1e-3, check=check)
-                     for check in (True, False))
-    assert np.array_equal(checked.u, once.u) and checked.steps == once.steps
-    assert once.error is None and 1e-4 < checked.error < 3e-3
-
-
-def test_a_check_of_a_motion_with_breakpoints_and_of_one_that_ends_before():
-    """Both motions start afresh where the force jumps; one whose end is an event ends there."""
-    def build():
-        scene = Scene(soft(2, 1, E=1e4))
-        return scene.point_force((30.0, 0.0), (0.5, 0.1),
-                                 amplitude=lambda t: np.where(t >= 0.0333, 1.0, 0.0))
-
-    def far(state):
-        return state.position((1, 0))[0] - 1.002
-
-    scene = build()
-    history = scene.integrate(0.2, "auto", scheme="radau", rtol=1e-5, breakpoints=[0.0333],
-                              until=far, check=True)
-    assert 0.0333 in history.t and 0.1 < history.event < 0.2
-    fine = build().integrate(history.event, 1e-3, scheme="radau", breakpoints=[0.0333])
-    off = (history.u[-1] - fine.u[-1])[positions(scene)].reshape(-1, 2)
-    assert 0.0 < np.hypot(*off.T).max() / scene.system.size < 2.0 * history.error < 1e-4
-
-
-def test_a_check_of_a_motion_with_an_obstacle_and_from_an_instant_on():
-    fallen = swinging().obstacle(Circle((0.0, -3.0), 1.0))
-    half = fallen.integrate(0.02, 0.01)
-    rest = fallen.integrate(0.06, 0.01, start=half.state(-1), check=True)
-    fine = fallen.integrate(0.06, 0.0025, start=half.state(-1))
-    off = (rest.u[-1] - fine.u[-1])[positions(fallen)].reshape(-1, 2)
-    assert rest.error == pytest.approx(np.hypot(*off.T).max() / fallen.system.size, rel=0.5)
-
-
-def test_a_check_whose_half_steps_fail_is_nan(monkeypatch):
-    advance = Run.advance
-
-    def fail(run):
-        if run.task.dt == 0.01:
-            return advance(run)
-        raise StepFailed("as if")
-
-    monkeypatch.setattr(Run, "advance", fail)
-    history = swinging().integrate(0.1, 0.01, check=True)
-    assert history.t[-1] == 0.1 and np.isnan(history.error)
-
-
 def test_a_check_that_cannot_be_says_so(tmp_path):
     for options, text in (({"checkpoint": tmp_path / "b.npz"}, "a checkpoint cannot keep"),
                           ({"check": 1}, "True or False")):
@@ -311,16 +245,6 @@ def test_a_driven_motion_after_rest_is_seen(kind):
     assert np.abs(history.u[-1] - fine.u[-1]).max() < 2e-3
 
 
-def test_a_shorter_event_needs_breakpoints():
-    def run(**options):
-        scene = Scene(soft(2, 1, E=1e4))
-        scene.point_force((3e4, 0.0), (0.5, 0.1), amplitude=lambda t: 1.0 * (0.71 <= t < 0.71001))
-        return scene.integrate(1.0, "auto", rtol=1e-3, **options).momentum[-1][0]
-
-    assert run() == 0.0  # as documented
-    assert run(breakpoints=[0.71, 0.71001]) == pytest.approx(0.3, rel=1e-9)
-
-
 @pytest.mark.parametrize("scheme", [name for name, cls in SCHEMES.items() if cls.adaptive])
 @pytest.mark.parametrize("compiled", [True, False])
 def test_steps_end_at_breakpoints(scheme, compiled):
@@ -342,15 +266,6 @@ def test_steps_end_at_breakpoints(scheme, compiled):
     assert total[first] == pytest.approx(3.0, rel=1e-9) and abs(total[first - 1]) < 1e-9
     assert np.abs(total[on][2:] - 3.0).max() < 1e-6
     assert abs(run().momentum[-1][0] - 3.0 * 0.0444) > 1e-4
-
-
-def test_a_kink_of_a_driven_motion_at_a_breakpoint():
-    """A support that stands and then runs: its velocity jumps between two steps."""
-    scene = Scene(soft(2, 1, E=1e4))
-    scene.joint("position", at=(0, 0), r=lambda t: (max(0.0, t - 0.05), 0.0))
-    history = scene.integrate(0.1, 4e-3, breakpoints=[0.05])
-    v = history.velocity((0, 0))[:, 0]
-    assert_allclose(v, np.where(history.t < 0.05, 0.0, 1.0), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("breakpoints", ["soon", [np.nan], [[0.1]]])
@@ -439,18 +354,6 @@ def test_collocation_has_the_acceleration_everywhere_in_a_step(scheme, part):
         assert np.abs((inertia - pushed)[s.constraints.free]).max() < 1e-10 * np.abs(pushed).max()
 
 
-def test_instants_close_to_a_step():
-    scene = swinging()
-    every = scene.integrate(0.1, 5e-3)
-    for part in (1e-13, 1e-9, 1e-7, 1e-5, 1e-3, 1 - 1e-5, 1 - 1e-9):
-        t = 0.05 + part * 5e-3
-        found = scene.integrate(0.1, 5e-3, t_eval=[t])
-        near = interpolate(every.state(10)._motion, every.state(11)._motion, t)
-        assert_allclose(found.u[0], near.u, rtol=0, atol=1e-5)
-        assert_allclose(found.v[0], near.v, rtol=0, atol=1e-2)
-        assert_allclose(found.acceleration[0], near.acceleration, rtol=0, atol=2.0)
-
-
 def test_interpolation_is_of_fourth_order():
     times = np.array([0.3, 0.305, 0.31, 0.32, 0.34, 0.38])
     scene = Scene(soft()).clamp("left")
@@ -480,10 +383,3 @@ def test_parts_of_steps_that_are_cut_are_counted(compiled):
     assert history.substeps >= 2 and history.steps == 2 and len(history) == 3
     assert f"{history.substeps} substeps" in repr(history) and "rejected" not in repr(history)
     assert scene.integrate(0.01, 1e-3).substeps == 0
-
-
-def test_counts_of_automatic_steps():
-    history = swinging().integrate(0.1, "auto", rtol=1e-4)
-    assert history.steps == len(history) - 1
-    assert history.iterations >= history.steps + history.rejected
-    assert history.factorizations > 0
