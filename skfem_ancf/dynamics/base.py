@@ -128,26 +128,14 @@ class Scheme:
         """Where the motion is one step later.
 
         A scheme that overrides it is asked for each step, others are taken in blocks. What it
-        keeps for its next step goes to the ``memory`` of what it returns.
+        keeps for its next step goes to the ``memory`` of what it returns. A StepFailed is answered
+        by two steps of half the size.
 
         Parameters
         ----------
-        integrator
-            An :class:`~skfem_ancf.dynamics.integrator.Integrator`, which has the system and can
-            take a step by :attr:`parameters`.
-        y
-            Where the step begins.
-        dt
-            Its size.
-
-        Returns
-        -------
-        Motion
-
-        Raises
-        ------
-        StepFailed
-            If there is no such step: it is tried in two halves.
+        integrator, y, dt
+            An :class:`~skfem_ancf.dynamics.integrator.Integrator`, which can ``take`` a step by
+            :attr:`parameters`; where the step begins, and its size.
         """
         return integrator.take(y, dt)
 

@@ -37,17 +37,7 @@ STROBES = 8
 
 
 def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> State:
-    """A Motion as a State.
-
-    Parameters
-    ----------
-    system, scheme
-        What is integrated, and how.
-    y
-        The Motion.
-    arrays
-        What the run goes on with from there, or None.
-    """
+    """A Motion as a State, with what the run goes on with from there, or None."""
     inertia = system.mass.multiply(y.acceleration)
     if system.damped:
         with system.forces.contacts.lent(y.contacts):
@@ -80,10 +70,8 @@ class History(MaterialPoints):
     multipliers
         Of the joints, shape (nt, m).
     dissipated
-        The work of damping since the start, shape (nt,), which does not fall: in each step that at
-        its mean velocity and middle place with the energy-momentum scheme, for which it is exact,
-        and with generalized-alpha; by the scheme's own rule with others. What a scheme itself
-        damps is not in it.
+        The work of damping since the start, shape (nt,), exact with the energy-momentum scheme.
+        What a scheme itself damps is not in it.
     sensors
         What the sensors of the scene have read at every step, by name: a
         :class:`~skfem_ancf.dynamics.sensors.Readings` with its times ``t``.
@@ -98,9 +86,8 @@ class History(MaterialPoints):
     iterations, factorizations
         Residuals solved for, and tangents factorised, in all steps.
     error
-        With ``integrate(..., check=True)`` the largest difference of the position of a node or a
-        rigid body from that of the same motion in steps half as long, over the size of the scene;
-        NaN where these steps have failed. None without a check.
+        With ``integrate(..., check=True)`` the largest difference of a position from that of the
+        same motion in steps half as long, over the size of the scene; NaN where these fail.
     """
 
     event: float | None
@@ -118,7 +105,8 @@ class History(MaterialPoints):
         self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
         self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
         self.dissipated = columns["dissipated"]
-        vars(self).update(counts)
+        for name, value in counts.items():
+            setattr(self, name, value)
 
     def __len__(self):
         return len(self.t)
@@ -147,17 +135,7 @@ class History(MaterialPoints):
         return state_of(self.system, self.scheme, Motion(**row))
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
-        """States one after the other.
-
-        Parameters
-        ----------
-        instants
-            Their numbers, shape (n,); all by default.
-
-        Returns
-        -------
-        iterator of State
-        """
+        """States one after the other, of the instants with these numbers; all by default."""
         if instants is not None and (isinstance(instants, (str, bytes, dict, set))
                                      or not hasattr(instants, "__iter__")):
             raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
@@ -175,10 +153,10 @@ class History(MaterialPoints):
         k = Turns(self.system).moments + self.system.bodies.index(found)
         return found.angle + self._columns["turns"][:, k]
 
-    def _read(self, read, point, beam, line):
-        """``read(state, points)`` of all instants."""
+    def _read(self, what, point, beam, line, *args, **options):
+        """What a method of the states gives at points, of all instants."""
         at = self.system.points.find(point, beam, line, ask=True)
-        return [read(state, at) for state in self]
+        return [getattr(state, what)(*args, at, **options) for state in self]
 
     def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
@@ -190,8 +168,7 @@ class History(MaterialPoints):
             One point, shape (2,), or many, as for :meth:`State.strain
             <skfem_ancf.results.State.strain>`.
         """
-        return np.array(self._read(lambda state, at: state.strain(at, recover=recover), point,
-                                   beam, line))
+        return np.array(self._read("strain", point, beam, line, recover=recover))
 
     def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
@@ -200,24 +177,20 @@ class History(MaterialPoints):
         Parameters
         ----------
         point, beam, recover, line
-            One point, shape (2,), or many, as for :meth:`State.strain
-            <skfem_ancf.results.State.strain>`.
+            As for :meth:`strain`, shape (2,) or (2, n).
         """
-        return np.array(self._read(lambda state, at: state.stress(at, recover=recover), point,
-                                   beam, line))
+        return np.array(self._read("stress", point, beam, line, recover=recover))
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
-        """Any field at all instants, shape (nt, ...).
+        """Any field of :meth:`State.field <skfem_ancf.results.State.field>`, shape (nt, ...).
 
         Parameters
         ----------
         field, point, beam, recover, line
-            As for :meth:`State.field <skfem_ancf.results.State.field>`; one point, shape (2,), or
-            many.
+            As there; one point, shape (2,), or many.
         """
-        return np.array(self._read(lambda state, at: state.field(field, at, recover=recover), point,
-                                   beam, line))
+        return np.array(self._read("field", point, beam, line, field, recover=recover))
 
     def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                    line: int | None = None) -> Resultants:
@@ -229,8 +202,7 @@ class History(MaterialPoints):
             As for :meth:`State.resultants <skfem_ancf.results.State.resultants>`; one point, shape
             (2,), or many.
         """
-        return over_time(self._read(lambda state, found: state.resultants(found, recover=recover),
-                                    at, beam, line))
+        return over_time(self._read("resultants", at, beam, line, recover=recover))
 
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam at all instants, shape (nt, m)."""
