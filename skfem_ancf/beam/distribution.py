@@ -145,12 +145,6 @@ class Spread:
     sampled: tuple[Sampled, ...] = ()
     eigen: Any = None
 
-    @property
-    def acts_at_stations(self) -> bool:
-        """True if it is nowhere distributed."""
-        return not self.sampled and all(
-            x is None for x in (self.faces, self.body, self.gravity, self.eigen))
-
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
     """The Spread of a ``traction`` or ``pressure`` on facets (n,), faces or sections."""

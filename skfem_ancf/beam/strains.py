@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
 
-from ..elements.series import coefficients, places, transform
 from ..formulations import COMPONENTS
 
 if TYPE_CHECKING:
@@ -60,19 +59,13 @@ class Interpolation:
         self.mapping = None if mesh.is_straight and mesh.heights is None else mapping
         p, m = element.axis_degree + 1, max(element.order, 1) + 1
         swell = np.array([across for _, _, across in element.functionals] * 2)
-        unit = coefficients(lambda X: element.local(X, 1.0)[0], p, m).swapaxes(-1, -2)
+        X = np.array([np.repeat(places(p), m), np.tile(places(m), p)])
+        unit = transform(p) @ element.local(X, 1.0)[0].reshape(-1, p, m) @ transform(m).T
         self.table = mesh.height ** swell[:, None, None] * unit
         n = p if mapping.heights_of(0) is None else p + mapping.height_degree * int(swell.max())
         self.shape, self.swell = (n, m), swell
         self.by_xi, self.by_eta = _slope_matrix(n), _slope_matrix(m)
         self.slope = element.local(np.zeros((2, 1)), 1.0)[3]
-
-    @cached_property
-    def _at_places(self):
-        """Where heights vary: places along, and the functions of one height there, (n, m, nb)."""
-        x = places(self.shape[0])
-        return x, (chebvander(2.0 * x - 1.0, self.table.shape[1] - 1) @ self.table).transpose(
-            1, 2, 0)
 
     def of_elements(self, q: Array, e: Array) -> Array:
         """The coefficients (p, m, 2, n) of degrees of freedom (N,) on elements (n,)."""
@@ -85,11 +78,23 @@ class Interpolation:
         if heights is None:
             found = self.table.reshape(len(q_e), -1).T @ q_e.reshape(len(q_e), -1)
         else:  # functions of the section are h^m P(Y / h)
-            (x, functions), n = self._at_places, self.shape[0]
+            n, p = self.shape[0], self.table.shape[1]
+            x = places(n)
+            functions = (chebvander(2.0 * x - 1.0, p - 1) @ self.table).transpose(1, 2, 0)
             swollen = heights(x[:, None])[0][:, None] ** self.swell[:, None]
             found = transform(n) @ (functions @ (
                 swollen[:, :, None] * q_e).reshape(n, len(q_e), -1)).reshape(n, -1)
         return found.reshape(*self.shape, *q_e.shape[1:])
+
+
+def places(n: int) -> Array:
+    """The zeros of the polynomial T_n of 2 x - 1, shape (n,)."""
+    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
+
+
+def transform(n: int) -> Array:
+    """From values at :func:`places` to coefficients of Chebyshev polynomials, shape (n, n)."""
+    return np.linalg.inv(chebvander(2.0 * places(n) - 1.0, n - 1))
 
 
 def _slope_matrix(n):
