@@ -62,19 +62,21 @@ class Immutable(metaclass=_Freezing):
         return other
 
     def _require_thawed(self, name):
-        if self._frozen and not name.startswith("_"):
+        if not name.startswith("_"):
             instead = (f"use replace({name}=...), which returns a changed copy"
                        if hasattr(self, "replace") else "make a new one")
             raise ImmutableError(f"a {type(self).__name__} does not change, and {name!r} cannot be "
                                  f"set: {instead}")
 
     def __setattr__(self, name, value):
-        self._require_thawed(name)
-        super().__setattr__(name, value)
+        if self._frozen:
+            self._require_thawed(name)
+        object.__setattr__(self, name, value)
 
     def __delattr__(self, name):
-        self._require_thawed(name)
-        super().__delattr__(name)
+        if self._frozen:
+            self._require_thawed(name)
+        object.__delattr__(self, name)
 
     def __getstate__(self):
         return {name: value for name, value in vars(self).items()

@@ -18,6 +18,7 @@ from ..core.errors import (FileError, InputError, MeshError, ModelWarning, NameU
                            require_unmasked)
 from .members import Axes, MeshLines, heights_of_chains
 from .mesh_beam import MeshBeam
+from .numbering import default_tags
 from .places import is_point, points_of_rows
 
 if TYPE_CHECKING:
@@ -281,12 +282,10 @@ class Net:
             arcs[k] = cast("Curve", arc.curve)
         s, t = 2 * line + s, np.array([left, left + 1])
         largest, heights, taper = heights_of_chains(height, s, t, lines)
-        mesh = MeshLines(np.ascontiguousarray(p), t, height=largest, heights=heights, taper=taper,
-                         p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
-                         lengths=lengths, p_XY=turning, s=s,
+        return MeshLines(np.ascontiguousarray(p), t, default_tags(p, t), height=largest,
+                         heights=heights, taper=taper, p_X=tangent, lengths=lengths, s=s,
+                         p_Y=np.array([0.0 - tangent[1], tangent[0]]), p_XY=turning,
                          curve=cast("Curve", Axes(arcs, a, d)) if arcs else None)
-        mesh._boundaries = mesh._build_default_tags()
-        return mesh
 
     def _arc(self, k, n, height):
         curve, ends = self.curves[k], self.points[:, self.lines[:, k]]

@@ -18,10 +18,9 @@ from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_options, require_path, require_positive, require_unmasked, shown)
 from . import files
 from .location import Finder
-from ..core.immutable import Immutable
 from .mapping import MappingBeam
 from ..core.origin import ours
-from .numbering import NumberedMesh
+from .numbering import NumberedMesh, default_tags
 from .places import is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
@@ -44,7 +43,7 @@ MAX_SUBDIVISION = 1000
 
 
 @dataclass(repr=False, eq=False)
-class MeshBeam(Immutable, NumberedMesh):
+class MeshBeam(NumberedMesh):
     """A planar beam in its stress-free state, divided into elements along its axis.
 
     A mesh does not change; its methods return other meshes.
@@ -216,11 +215,9 @@ class MeshBeam(Immutable, NumberedMesh):
         """The mesh of one chain; without a curve the axis is straight."""
         height, heights, taper = heights
         tangent = np.broadcast_to(tangent, p.shape)
-        mesh = cls(p, t, height=height, p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
-                   lengths=lengths, s=s, curve=curve, heights=heights, taper=taper,
-                   p_XY=np.zeros(p.shape) if turning is None else turning)
-        mesh._boundaries = mesh._build_default_tags()
-        return mesh
+        return cls(p, t, default_tags(p, t), height=height, p_X=tangent, lengths=lengths, s=s,
+                   p_Y=np.array([0.0 - tangent[1], tangent[0]]), curve=curve, heights=heights,
+                   taper=taper, p_XY=np.zeros(p.shape) if turning is None else turning)
 
     @classmethod
     def init_refdom(cls) -> MeshBeam:
@@ -243,10 +240,6 @@ class MeshBeam(Immutable, NumberedMesh):
                 "or init_curve. For a picture of a Basis take quad = mesh.to_meshquad() and "
                 "quad.plot(basis.probes(quad.p) @ y), not basis.plot or basis.refinterp")
         self.height = require_positive("height", self.height)
-        if self.heights is not None:
-            self.heights = require_finite("heights", self.heights, (4, shape[1]))
-            if not np.all(self.heights > 0.0):
-                raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
         t = self.t
         if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
             raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
@@ -261,16 +254,14 @@ class MeshBeam(Immutable, NumberedMesh):
         self._require_length(chord > 4 * np.finfo(float).eps * np.max(np.abs(p)))
         if self.p_X is None:
             self._straight()
-        self.p_X = require_finite("p_X", self.p_X, p.shape)
-        self.p_Y = require_finite("p_Y", self.p_Y, p.shape)
-        require_option("interpolation of the sections", self.sections, SECTIONS)
-        if self.p_XY is not None:
-            self.p_XY = require_finite("p_XY", self.p_XY, p.shape)
-        self.lengths = require_finite("lengths", self.lengths, (t.shape[1],))
+        for name, wanted in (("p_X", p.shape), ("p_Y", p.shape), ("p_XY", p.shape),
+                             ("lengths", shape[1:]), ("heights", (4, shape[1]))):
+            if getattr(self, name) is not None:
+                setattr(self, name, require_finite(name, getattr(self, name), wanted))
         self._require_length(self.lengths > 0)
-        self._check_sections()
-
-    def _check_sections(self):
+        if self.heights is not None and not np.all(self.heights > 0.0):
+            raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
+        require_option("interpolation of the sections", self.sections, SECTIONS)
         if self.p_XY is None and self.sections != "linear":
             raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
                             "MeshBeam.init_line or MeshBeam.init_curve")
@@ -383,7 +374,7 @@ class MeshBeam(Immutable, NumberedMesh):
         """True if every element is straight with sections normal to it."""
         d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
         tol = 1e-12 + 8 * EPS * np.max(np.abs(self.p)) / np.min(self.lengths)
-        return bool(all(np.all(np.abs(self.p_X[:, t] - d) <= tol) for t in self.t)
+        return bool(np.all(np.abs(self.p_X[:, self.t] - d[:, None]) <= tol)
                     and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
 
     @cached_property
@@ -565,6 +556,7 @@ class MeshBeam(Immutable, NumberedMesh):
                     new = OrientedBoundary(new, np.where(m.f2t[1, new] < 0, 0, f.ori[keep]))
                 tags[name] = new
             m._boundaries = tags
+        m._freeze()
         return (m, nodes) if return_mapping else m
 
     # rigid motion and scale

@@ -11,7 +11,7 @@ from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D
 
 from ..core.errors import MeshError, require_option, shown
-from ..core.immutable import read_only
+from ..core.immutable import Immutable, read_only
 from .places import satisfying
 
 if TYPE_CHECKING:
@@ -26,16 +26,25 @@ if TYPE_CHECKING:
 copyreg.pickle(OrientedBoundary, lambda f: (OrientedBoundary, (np.asarray(f), f.ori)))
 
 
-class NumberedMesh(Mesh2D):
+def default_tags(p: Array, t: Array) -> dict[str, Array]:
+    """The ends and the surfaces of a mesh: facets by name."""
+    n, ne = p.shape[1], t.shape[1]
+    facets = read_only(np.arange(n + 2 * ne, dtype=np.int32))
+    return {"left": facets[:1], "right": facets[n - 1:n], "bottom": facets[n:n + ne],
+            "top": facets[n + ne:]}
+
+
+class NumberedMesh(Immutable, Mesh2D):
     """What scikit-fem asks of the numbers of facets and elements, for meshes of beams.
 
     Facets are the sections of the nodes, then the bottoms and the tops of the elements.
     """
 
-    def __setattr__(self, name, value):
-        if name in ("_boundaries", "_subdomains") and value is not None:
-            value = {name: read_only(numbers) for name, numbers in value.items()}
-        super().__setattr__(name, value)
+    def _freeze(self):
+        super()._freeze()
+        self._boundaries, self._subdomains = (
+            None if tags is None else {name: read_only(numbers) for name, numbers in tags.items()}
+            for tags in (self._boundaries, self._subdomains))
 
     @property
     def boundaries(self) -> MappingProxyType[str, Any] | None:
@@ -67,10 +76,7 @@ class NumberedMesh(Mesh2D):
         return self._f2t
 
     def _build_default_tags(self):
-        n, ne = self.doflocs.shape[1], self.t.shape[1]
-        facets = np.arange(n + 2 * ne, dtype=np.int32)
-        return {"left": facets[:1], "right": facets[n - 1:n], "bottom": facets[n:n + ne],
-                "top": facets[n + ne:]}
+        return default_tags(self.doflocs, self.t)
 
     def normalize_facets(self, facets: Any) -> Array:
         if isinstance(facets, str):

@@ -49,6 +49,7 @@ def halved(mesh: Any, ix: Array) -> Any:
     if mesh._subdomains is not None:
         m._subdomains = {name: np.nonzero(np.isin(parent, e))[0].astype(np.int32)
                          for name, e in mesh._subdomains.items()}
+    m._freeze()
     return m
 
 
