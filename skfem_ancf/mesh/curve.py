@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import lagrange
 
 from ..core.errors import CallbackError, MeshError, ask_array, warnings_as_errors
 from ..core.quadrature import gauss
@@ -246,7 +245,8 @@ def _require_no_kink(s, p, beside):
 @cache
 def _lagrange_derivatives():
     """Of each Lagrange polynomial of the stencil the coefficients of its derivative, (7, 6)."""
-    return np.array([np.polyder(lagrange(STENCIL, row).coef) for row in np.eye(len(STENCIL))])
+    values = np.vander(STENCIL)  # of the powers, the highest first: their inverse has those of
+    return np.array([np.polyder(c) for c in np.linalg.inv(values).T])  # the polynomials
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
