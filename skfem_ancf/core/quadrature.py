@@ -64,7 +64,9 @@ def tensor(axis: Rule, section: Rule) -> Rule:
 def product_rule(axis: Rule, section: Rule) -> Rule:
     """As :func:`tensor`, without checks."""
     (x, wx), (y, wy) = axis, section
-    return np.array(np.meshgrid(x, y, indexing="ij")).reshape(2, -1), np.outer(wx, wy).ravel()
+    X = np.empty((2, len(x), len(y)))
+    X[0], X[1] = x[:, None], y
+    return X.reshape(2, -1), np.outer(wx, wy).ravel()
 
 
 def _rule(name: str, rule: Any) -> Rule:

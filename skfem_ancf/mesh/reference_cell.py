@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import comb, perm
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from skfem.element import ElementH1
@@ -19,14 +19,6 @@ if TYPE_CHECKING:
 #: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
 SECTIONS = ("linear", "cubic", "quintic", "septic",
             *(f"of degree {degree}" for degree in (9, 11, 13, 15)))
-
-#: Points at most at which functions are kept.
-KEPT_POINTS = 512
-
-
-def few(X: Any) -> bool:
-    """True if the functions at points are kept: few, and the same of all elements, (2, n)."""
-    return isinstance(X, np.ndarray) and X.ndim == 2 and X.shape[1] <= KEPT_POINTS
 
 
 class RefBeam(Refdom):
