@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from copy import copy
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -57,8 +56,8 @@ class Immutable(metaclass=_Freezing):
 
     def _thawed(self):
         """A copy whose attributes may be set, until it is frozen."""
-        other = copy(self)
-        other._frozen = False
+        other = object.__new__(type(self))
+        vars(other).update(self.__getstate__(), _frozen=False)
         return other
 
     def _require_thawed(self, name):
