@@ -252,8 +252,6 @@ def test_a_moved_beam_has_no_force_at_all(element):
     beam = Beam(mesh, element, STEEL, 0.1, compiled=False)
     u = np.zeros(beam.N).reshape(-1, beam.nd)
     u[:, :2] = 2.0**20, -2.0**17  # products with them are exact
-    for t in beam.kernel.tables:
-        assert np.all(t.pack.table[..., 0] + t.pack.table[..., element.nodal_dofs] == 0)
     assert np.max(np.abs(beam.kernel.force(u.ravel()))) == 0.0
 
 

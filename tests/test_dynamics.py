@@ -333,7 +333,7 @@ def oscillator():
     none, zero, one = np.zeros(0, np.int64), np.zeros(1, np.int64), np.ones(1)
     moments = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
                          np.zeros(0), none)
-    body, row = Body((), np.zeros((0, 8), np.int64)), np.zeros((0, 1))
+    body, row = Body((), np.zeros((0, 7), np.int64)), np.zeros((0, 1))
     spring = LoadTables(np.zeros((0, 1)), moments, zero, zero, -one, zero, body, np.zeros((0, 0)),
                         0)
     joints = JointTables(none, none, none, np.zeros(0), none, none, np.zeros(0), 0)

@@ -7,21 +7,17 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, Section, StVenantKirchhoff)
 from skfem_ancf.beam import strain_energy as body
-from skfem_ancf.equations.compiled import LOADED, load
-from skfem_ancf.dynamics import stages
-from skfem_ancf.equations.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
-from skfem_ancf.formulations import get_formulation
-from skfem_ancf.beam.kernels import CableKernel, Kernel
-from skfem_ancf.beam.kernels import law
-from skfem_ancf.beam.kernels import base as kinds_of
-from skfem_ancf.beam.kernels.base import GIVEN, nowhere, repeated
-from skfem_ancf.beam.kernels.cable import _unit
-from skfem_ancf.beam.kernels.section import with_unit_law
+from skfem_ancf.beam.kernels import CableKernel, SectionKernel, arrays, law, loops, strain
+from skfem_ancf.beam.kernels import kernel as kernels
 from skfem_ancf.core.band import add_halves, fix
 from skfem_ancf.core.linalg import BandMatrix, halves
+from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.dynamics import stages
+from skfem_ancf.equations.compiled import LOADED, load
+from skfem_ancf.equations.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
+from skfem_ancf.formulations import get_formulation
 from skfem_ancf.materials import Material
 from skfem_ancf.sections import Across, Rectangle
-from skfem_ancf.core.switch import compiled_off
 
 STEP = 1e-30
 
@@ -45,13 +41,13 @@ MESHES = {
     "curved": lambda: MeshBeam.init_curve(lambda t: np.array([np.sin(t), 1 - np.cos(t)]),
                                           np.linspace(0, 1.5, 36), height=0.05)}
 KINDS = {
-    **{f"section-{k}": (Kernel, lambda: ElementBeamANCF(2), formulation, name)
+    **{f"section-{k}": (SectionKernel, lambda: ElementBeamANCF(2), formulation, name)
        for k, (formulation, name) in {
            "linear": ("assumed", "linear"), "neo": ("assumed", "neo-hookean"),
            "own": ("continuum", "own"), "split": ("strain-split", "linear")}.items()},
-    "section-cubic": (Kernel, lambda: ElementBeamANCFCubic(2), "assumed", "linear"),
-    "section-corrected": (Kernel, lambda: ElementBeamANCF(1), "assumed", "neo-hookean"),
-    "section-shear": (Kernel, lambda: ElementBeamANCF(1), "continuum", "own"),
+    "section-cubic": (SectionKernel, lambda: ElementBeamANCFCubic(2), "assumed", "linear"),
+    "section-corrected": (SectionKernel, lambda: ElementBeamANCF(1), "assumed", "neo-hookean"),
+    "section-shear": (SectionKernel, lambda: ElementBeamANCF(1), "continuum", "own"),
     "cable-3": (CableKernel, lambda: ElementBeamCable(3), "assumed", "linear"),
     "cable-5": (CableKernel, lambda: ElementBeamCable(5), "assumed", "linear")}
 
@@ -79,11 +75,16 @@ every = pytest.mark.parametrize("mesh", MESHES)
 kinds = pytest.mark.parametrize("kind", KINDS)
 
 
-def dense(k, u, **options):
-    K = BandMatrix(k.N, 2 * k.nd - 1)
-    k.assemble(u, K, 0, np.zeros(k.N), **options)
-    K = K.tocsc().toarray()
-    return np.tril(K) + np.tril(K, -1).T
+def dense(k, tangents):
+    K = np.zeros((k.N, k.N))
+    for start, block in zip(k.t[0] * k.nd, tangents):
+        K[start:start + 2 * k.nd, start:start + 2 * k.nd] += block
+    return K
+
+
+def system_of(kind, mesh):
+    _, element, formulation, name = KINDS[kind]
+    return Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
 
 
 @kinds
@@ -104,13 +105,7 @@ def test_force_and_tangent_are_derivatives_of_the_energy(kind, mesh):
         change = np.imag(k.force(u + 1j * STEP * d)) / STEP
         tol = 1e-11
     assert abs(k.force(u) @ d - slope) < tol * np.abs(k.force(u)) @ np.abs(d)
-    K = dense(k, u)
-    close(K @ d, change, tol)
-    tangents, blocks = k.tangents(u), np.zeros_like(K)
-    for e, block in enumerate(tangents):
-        at = k.t[0, e] * k.nd
-        blocks[at:at + 2 * k.nd, at:at + 2 * k.nd] += block
-    close(blocks, K)
+    close(dense(k, k.tangents(u)) @ d, change, tol)
     close(k.scatter(k.forces(u)), k.force(u))
 
 
@@ -126,78 +121,34 @@ def test_work_of_the_mean_force_is_the_change_of_the_energy(kind, mesh):
 
 @kinds
 @every
-def test_carried_stresses_and_parts_of_the_tangent(kind, mesh):
+def test_parts_of_the_tangent(kind, mesh):
     k = kernel(kind, mesh)
     u, v = states(k)
-    K = BandMatrix(k.N, 2 * k.nd - 1)
-    found = k.assemble(u, K, 0, np.zeros(k.N))
-    h, rates = 1e-4, []
-    for sign in (1.0, -1.0):  # the mean of both steps has no second-order part
-        rates.append(k.stresses())
-        for pack, S in zip(k.packs, rates[-1]):
-            k.texts.stress(pack, u + sign * h * (v - u), S)
-    for a, b, after, before in zip(found.carry(h * (v - u)), found.stresses, *rates):
-        assert np.max(np.abs(a - b - 0.5 * (after - before))) <= 1e-5 * np.max(np.abs(a - b))
-    B, CB, stress = k.factors(k.gather(u))
-    material = np.einsum("emi,emj->eij", B, CB)
-    close(material, k.tangents(u, geometric=False), 1e-12)
+    B, HB, stress = k.gradients(u)
     close(np.einsum("emi,em->ei", B, stress), k.forces(u).reshape(len(B), -1))
-    close(material + k.geometric(k.gather(u), slice(None), stress), k.tangents(u), 1e-12)
+    close(np.einsum("emi,emj->eij", B, HB) + k.geometric(u, stress), k.tangents(u), 1e-12)
+    h, d = 1e-4, v - u  # the mean of both steps has no second-order part
+    change = k.gradients(u + h * d)[2] - k.gradients(u - h * d)[2]
+    rate = 2.0 * h * np.einsum("emi,ei->em", HB, k.gather(d).reshape(len(HB), -1))
+    assert np.max(np.abs(rate - change)) <= 1e-5 * np.max(np.abs(rate))
 
 
 @kinds
 @every
-def test_work_of_given_stresses_is_that_on_the_change_of_the_strain(kind, mesh):
-    k, rng = kernel(kind, mesh), np.random.default_rng(3)
-    u, v = states(k)
-    for pack in k.packs:
-        free = pack._replace(constant=pack.constant[:0])
-        rate, change, own = (np.zeros((k.texts.components, len(pack.weights), len(pack.start)))
-                             for _ in range(3))
-        S = rng.standard_normal(rate.shape)
-        f, g, same, mean = np.zeros((4, k.N))
-        k.strain_increment(pack, u, v, rate)
-        k.texts.evaluate(pack, GIVEN, u, u, f, S, S[:0], nowhere(f))
-        assert abs(f @ v - np.sum(pack.weights * S * rate)) < 1e-12 * np.abs(f) @ np.abs(v)
-        unit = with_unit_law(free) if kind.startswith("section") else _unit(free)
-        for x, sign in ((u, -1.0), (v, 1.0)):
-            k.texts.stress(unit, x, own)
-            change += sign * own
-        k.texts.evaluate(free, kinds_of.MEAN, u, v, g, S, own, nowhere(g))
-        assert abs(g @ (v - u) - np.sum(pack.weights * S * change)) < 1e-11 * (
-            np.abs(g) @ np.abs(v - u))
-        k.texts.evaluate(free, kinds_of.MEAN, u, v, same, own, own.copy(), nowhere(same))
-        k.texts.mean(free, u, v, mean)
-        close(same, mean)
-
-
-@pytest.mark.parametrize("mesh", ["one", "graded", "curved"])
-@pytest.mark.parametrize("kind", KINDS)
-def test_forces_and_stresses_of_copies_are_those_of_each(kind, mesh):
-    k, n = kernel(kind, mesh), 3
-    N, gap = k.packs[0].start[-1] + k.packs[0].span.size, 5
-    u = 1e-3 * np.random.default_rng(2).standard_normal((n, N + gap))
-    for pack in k.packs:
-        copies, size = repeated(pack, n, N + gap), pack.start.size
-        shape = k.texts.components, len(pack.weights)
-        f, stress = np.zeros(u.shape), np.empty((*shape, n * size))
-        k.texts.force(copies, u.ravel(), f.ravel())
-        k.texts.stress(copies, u.ravel(), stress)
-        for j in range(n):
-            one, own = np.zeros(N + gap), np.empty((*shape, size))
-            k.texts.force(pack, u[j], one)
-            k.texts.stress(pack, u[j], own)
-            assert_allclose(f[j], one, rtol=0, atol=1e-12 * abs(one).max())
-            assert_allclose(stress[:, :, j * size:(j + 1) * size], own, rtol=0,
-                            atol=1e-12 * abs(own).max())
+def test_a_translation_has_no_force_at_all(kind, mesh):
+    k = kernel(kind, mesh)
+    u = np.zeros((len(k.scatter(np.zeros((k.t.shape[1], k.nd, 2)))) // k.nd, k.nd))
+    u[:, 0], u[:, 1] = 1e3 / 3.0, -7e5 / 3.0
+    assert not k.force(u.ravel()).any()
+    f = k.force(1e-3 * np.random.default_rng(1).standard_normal(k.N)).reshape(-1, k.nd)
+    assert np.max(np.abs(f[:, :2].sum(axis=0))) <= 1e-12 * np.max(np.abs(f[:, :2]))
 
 
 @kinds
 @every
 def test_gradients_carry_stresses_and_give_forces(kind, mesh):
     """As the kernels do from the displacement, of three copies."""
-    _, element, formulation, name = KINDS[kind]
-    system = Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+    system = system_of(kind, mesh)
     tables, N, rng = system.machine.tables, system.N, np.random.default_rng(4)
     plain, copies = tables.plain.body, tables.copied(3).plain.copies
     u, _ = states(system)
@@ -233,17 +184,16 @@ def from_halves(U):
 @every
 def test_what_a_second_state_changes_of_the_derivative_of_forces(kind, mesh):
     """``B(u)^T D (B(v) - B(u))``, as gradients give it, with the moduli at u."""
-    _, element, formulation, name = KINDS[kind]
-    system = Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+    system = system_of(kind, mesh)
     plain, N, (u, v) = system.machine.tables.plain.body, system.N, states(system)
     U, expected = halves(N, system.bandwidth), np.zeros((N, N))
     body.add_turned(plain, u, v, U)
     first, last = np.zeros((2, body.gradients_size(plain)))
     body.body_gradients(plain, u, first)
     body.body_gradients(plain, v, last)
-    for k in range(len(plain.table)):
-        (B, DB), (C, _) = body._gradients(plain, k, first), body._gradients(plain, k, last)
-        for e, start in enumerate(body._starts(plain, k)):
+    for k, t in enumerate(plain.packs):
+        (B, DB), (C, _) = body._halves(plain, k, first), body._halves(plain, k, last)
+        for e, start in enumerate(t.start):
             own = slice(start, start + B.shape[2])
             expected[own, own] += DB[e].T @ (C[e] - B[e])
     close(from_halves(U), expected)
@@ -289,10 +239,40 @@ def test_what_a_law_of_ones_own_raises_is_seen():
                 raise ZeroDivisionError("no stress")
             return super().stress(strain)
 
-    k = Kernel(Across(MESHES["one"](), ElementBeamANCF(2), Rectangle(0.02), Broken(2e5, 0.3)),
-               get_formulation("continuum"))
+    across = Across(MESHES["one"](), ElementBeamANCF(2), Rectangle(0.02), Broken(2e5, 0.3))
+    k = SectionKernel(across, get_formulation("continuum"))
     with pytest.raises(ZeroDivisionError, match="no stress"):
         k.force(np.ones(k.N))
+
+
+@kinds
+@pytest.mark.parametrize("mesh", ["one", "graded", "curved"])
+def test_loops_are_arrays(kind, mesh, monkeypatch):
+    """The steps for Numba, run by Python, beside those for NumPy."""
+    k, found, none, ld = kernel(kind, mesh), [], np.zeros(0), 2 * kernel(kind, mesh).nd + 3
+    u, v = states(k)
+    for steps in (arrays, loops):
+        for name in vars(loops):
+            if hasattr(strain, name) and hasattr(arrays, name):
+                monkeypatch.setattr(strain, name, getattr(steps, name))
+        for what in range(12):
+            f, flat, written = np.zeros(k.N), np.zeros(2 * k.N * ld), []
+            for t in k.tables:
+                ns = len(t.start) * t.rows.shape[1]
+                given = np.sin(np.arange(1.0, ns + 1.0))
+                if what >= strain.PUSH and t.law.kind != law.LINEAR:
+                    given = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
+                elif what < strain.PUSH and what not in (strain.CARRY, strain.GIVEN):
+                    given = none
+                gradients = what == strain.GRADIENTS
+                written.append(np.zeros(4 * ns * k.nd if gradients else ns))
+                strain.evaluate(t, np.int64(what), u, v, f, given, written[-1],
+                                none if gradients else flat, 2 * ld)
+            found.append((f, flat, np.concatenate(written)))
+    sizes = [np.max(np.abs(x)) for x in found[strain.TANGENT]]  # others are what cancels
+    for one, other in zip(found[:12], found[12:]):
+        for a, b, size in zip(one, other, sizes):
+            assert np.max(np.abs(a - b)) <= 1e-13 * max(size, np.max(np.abs(a)))
 
 
 @pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
@@ -300,8 +280,7 @@ def test_what_a_law_of_ones_own_raises_is_seen():
 @every
 def test_compiled_is_plain(kind, mesh):
     """All that is asked of kernels, through the function that is compiled for scenes anyway."""
-    _, element, formulation, name = KINDS[kind]
-    system = Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+    system = system_of(kind, mesh)
     tables, n = system.machine.tables, len(system.machine.tables.stresses)
     u, v = states(system)
     before, rng = np.zeros((2, n)), np.random.default_rng(2)
@@ -375,7 +354,7 @@ def _energetic(kind):
 @pytest.mark.parametrize("kind", ["rubber on a curve", "graded", "layers", "tapered T of a cable",
                                   "widths"])
 def test_energies_of_many_displacements_at_once(kind, monkeypatch):
-    monkeypatch.setattr(kinds_of, "TOGETHER", 20)  # in groups
+    monkeypatch.setattr(kernels, "TOGETHER", 20)  # in groups
     kernel = _energetic(kind).kernel
     u = 1e-4 * np.random.default_rng(1).standard_normal((17, kernel.N))
     assert_allclose(kernel.energy(u), [kernel.energy(x) for x in u], rtol=1e-12)

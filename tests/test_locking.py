@@ -268,7 +268,8 @@ def test_work_of_the_stress_is_that_of_the_internal_force(order, law):
     beam = Beam(MeshBeam.init_line([0.0, 0.3, 1.0], 0.3), ElementBeamANCF(order),
                 law(2.0, 0.49, plane="strain"), 0.4, formulation=Assumed(alpha=0.0))
     u, v = 1e-2 * rng.standard_normal((2, beam.N))
-    X, w = beam.kernel.tables[0].points, beam.kernel.tables[0].w
+    one = beam.kernel.integrals[0]
+    X, w = one.term.quadrature[0], one.volumes
     rate = (beam.strain(u + v, X) - beam.strain(u - v, X)) / 2  # exact: strains are quadratic
     work = np.sum(w * np.sum(beam.stress(u, X) * rate, axis=0))
     np.testing.assert_allclose(work, beam.kernel.force(u) @ v, rtol=1e-11)

@@ -15,7 +15,7 @@ from skfem_ancf.equations import compiled
 from skfem_ancf.beam import strain_energy as body
 from skfem_ancf.dynamics import choose_scheme
 from skfem_ancf.dynamics import steps
-from skfem_ancf.beam.kernels.base import FORCE, TANGENT
+from skfem_ancf.beam.kernels.strain import FORCE, TANGENT
 from skfem_ancf.solvers import iteration
 from skfem_ancf.core.linalg import BandMatrix
 from skfem_ancf.beam.strains import Gradients

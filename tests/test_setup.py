@@ -17,12 +17,9 @@ from skfem_ancf.mesh.location import Finder
 from skfem_ancf.beam.masses import points_along
 from skfem_ancf.actions.joints import OnLine
 from skfem_ancf.actions.joints.base import Joint
-from skfem_ancf.beam.kernels import section
-from skfem_ancf.beam.kernels.base import pair_tables
 from skfem_ancf.actions.loads import EndMoment, PointForce, Pressure, Weight
 from skfem_ancf.mesh.mapping import MappingBeam
-from skfem_ancf.core.quadrature import gauss
-from skfem_ancf.sections import Across
+from skfem_ancf.core.quadrature import gauss, product_rule
 
 
 NO_ROWS = np.zeros((0, 3), np.int64)
@@ -50,21 +47,15 @@ def counted(monkeypatch, owner, name):
 def test_tables_of_cables_are_derivatives_along_the_axis(degree, x):
     mesh, element = MeshBeam.init_line(x, 0.02, angle=0.7), ElementBeamCable(degree)
     kernel = Beam(mesh, element, StVenantKirchhoff(2e9, 0.3), 0.01).kernel
-    pack, step, xi = kernel.packs[0], 1e-30j, kernel.points
-    L, slope = mesh.lengths[:len(pack.table), None, None], np.array([
+    t, step, xi = kernel.tables[0], 1e-30j, kernel.points
+    L, slope = mesh.lengths[:len(t.G), None, None], np.array([
         f[1] for f in element.functionals] * 2)
     d_xi = element.local(np.array([xi + step, 0.5 + 0.0 * xi]), 0.02)[1].T * L**(slope - 1.0)
-    both = np.concatenate([d_xi.real, d_xi.imag / step.imag / L], axis=1)
-    assert np.allclose(pack.table, both, rtol=1e-12, atol=1e-12 * np.max(np.abs(both)))
-    assert len(pack.table) == len(pack.transposed) == 1 or (len(pack.transposed) == 0
-                                                            and len(pack.table) == mesh.nelements)
-    again = pair_tables(pack.table, pack.pairs.pairs[:2], pack.constant, mesh.nelements)
-    for a, b in zip(pack.pairs, again):
-        assert a.shape == b.shape and np.allclose(a, b, rtol=1e-12,
-                                                  atol=1e-13 * np.max(np.abs(b), initial=0.0))
-    assert np.allclose(pack.frame[:len(xi), :, 0], [np.cos(0.7), np.sin(0.7)], rtol=0, atol=1e-14)
-    assert not np.any(pack.frame[len(xi):]) and not np.any(pack.kappa0)
-    assert np.allclose(pack.length0, 1.0, rtol=0, atol=1e-14)
+    both = np.concatenate([d_xi.real, d_xi.imag / step.imag / L], axis=1)[:, :, 1:]
+    assert np.allclose(t.G.swapaxes(1, 2), both, rtol=1e-12, atol=1e-12 * np.max(np.abs(both)))
+    assert kernel.shared == (len(x) == 2 or x[1] == 0.4) and len(t.G) in (1, mesh.nelements)
+    a, b = np.split(t.frame[0], 2, axis=1)
+    assert np.allclose(a.T, [np.cos(0.7), np.sin(0.7)], rtol=0, atol=1e-14) and not np.any(b)
     assert kernel.volume == pytest.approx(0.01 * 0.02 * x[-1], rel=1e-13)
 
 
@@ -85,10 +76,10 @@ def test_equal_elements_have_the_forces_of_elements_one_by_one(monkeypatch, elem
     apart = other.kernel
     monkeypatch.setattr(base.ElementBeam, "by_reference", False)  # by the mapping of the mesh
     other = beam(False)
-    a, b = apart.packs[0].table, other.kernel.packs[0].table
+    a, b = apart.tables[0].G, other.kernel.tables[0].G
     assert a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=1e-13 * np.max(np.abs(b)))
     if element.order:
-        assert len(one.kernel.packs[0].table) == 1 < len(other.kernel.packs[0].table)
+        assert one.kernel.shared and not other.kernel.shared
     rng = np.random.default_rng(1)
     scale = 0.07 ** np.array([f[1] + f[2] for f in element.functionals])
     u = 0.02 * (rng.standard_normal((4, element.nodal_dofs, 2)) / scale[:, None]).ravel()
@@ -211,14 +202,6 @@ def test_equations_that_share_coordinates_are_still_tried(more):
     np.testing.assert_allclose(state.u, one.u, rtol=0, atol=1e-10)
 
 
-def test_volumes_at_the_same_places_are_asked_once(monkeypatch):
-    asked = counted(monkeypatch, Across, "volume")
-    mesh = MeshBeam.init_line([0, 0.5, 1], lambda x: 0.1 - 0.02 * x)
-    packs = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(2e7, 0.3), 0.1, "strain-split"
-                 ).kernel.packs
-    assert len(packs) == 3 and len(asked) == 2  # of the body, and of its axis
-
-
 @pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFHermite(2, 5),
                                      ElementBeamCable(5)])
 def test_values_alone_are_those_that_come_with_derivatives(element):
@@ -237,9 +220,8 @@ def test_what_is_turned_inside_out_is_seen_by_determinants(shape):
             MeshBeam.init_line(x, lambda s: 0.1 - 0.04 * s) if shape == "taper" else
             MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), x, 0.1))
     beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(2e9, 0.3), 0.01)
-    kernel, table = beam.kernel, beam.kernel.firsts[0]
-    at, found = table._samples, set()
-    points = at.X[:, at.where[0]][:, at.sheared[:len(at.sheared) // 2]]
+    kernel, found, (term,) = beam.kernel, set(), beam.terms
+    points = product_rule(*((x, x) for x in (term.nodes("xy"), term.section_nodes)))[0]
     for size in np.geomspace(1e-3, 1.0, 12):
         u = size * rng.standard_normal(beam.N) * beam.sizes
         H, frame = beam.gradients(u, points)
@@ -247,7 +229,6 @@ def test_what_is_turned_inside_out_is_seen_by_determinants(shape):
         det = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
         found.add(kernel.inverted(u))
         assert kernel.inverted(u) == bool(np.any(det <= 0.0))
-        assert np.array_equal(table.upright(table.pack, u), det.T > 0.0)
     assert found == {True, False}
 
 
@@ -474,27 +455,6 @@ def test_a_driven_motion_whose_function_fails_is_kept_up_to_there():
     with pytest.raises(CallbackError, match=r"angle\(t=0.0575\) raised ValueError: no") as failure:
         scene.integrate(0.1, 0.01)
     assert np.allclose(failure.value.state.t, 0.01 * np.arange(6))
-
-
-def test_terms_that_are_sampled_at_the_same_places_share_their_tables(monkeypatch):
-    """And places are asked for once where slopes along the axis and across are wanted there."""
-    asked = counted(monkeypatch, section, "beam_gradients")
-    mesh = MeshBeam.init_line([0, 0.5, 1], lambda x: 0.1 - 0.02 * x)
-    law = StVenantKirchhoff(2e7, 0.3)
-    first, mean, rest = Beam(mesh, ElementBeamANCF(3), law, 0.1, "strain-split").kernel.packs
-    assert len(asked) == 1 and first.table is mean.table is rest.table
-    assert asked[0][2].shape[1] == 5 * 7  # the middle of a section is one of its points
-    assert first.table.shape[1] == 2 * 5 * 7
-    asked.clear()
-    whole, part = Beam(mesh, ElementBeamANCF(2), law.replace(plane="strain"), 0.1).kernel.packs
-    assert len(asked) == 1 and whole.table is part.table
-    asked.clear()
-    beam = Beam(mesh, ElementBeamANCF(3), law, 0.1, "ecm")
-    first, axis = beam.kernel.packs  # of the axis alone, which is among the points of the first
-    assert len(asked) == 1 and axis.table.shape[1] == 2 * 5 < first.table.shape[1]
-    slopes = np.array([gauss(5)[0], 5 * [0.5]])
-    slopes = beam.element.slopes(mesh.mapping(), slopes)[0].transpose(2, 1, 3, 0)
-    assert np.allclose(axis.table, slopes.reshape(axis.table.shape), rtol=1e-13, atol=1e-12)
 
 
 def test_masses_of_a_tapered_cable_ask_the_map_once(monkeypatch):

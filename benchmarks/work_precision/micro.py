@@ -76,7 +76,7 @@ def iteration(about, watch):
         s = scene(PROBLEMS["5.2"], ElementBeamANCF(ORDER), n, formulation)
         system, u = s.system, bent(s)
         residual = system.external_force(u) * system.constraints.mask
-        points = np.shape(s.beams[0].kernel.tables[0].points)[1]
+        points = s.beams[0].kernel.points_number
 
         def step(u=u, system=system, residual=residual):
             _, stresses = system.assemble(u)

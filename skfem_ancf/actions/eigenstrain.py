@@ -17,12 +17,10 @@ from scipy import sparse
 
 from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from ..formulations import COMPONENTS
-from .nonlinear_eigenstrain import energy_lost, sampled, unmatched
+from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
 from ..beam.strains import on_grid, strain_at, stretched
-from ..beam.kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
-from ..beam.kernels.law import LINEAR
-from ..beam.kernels.section import linearised
-from ..core.linear import first_order, step, stress_of
+from ..beam.kernels.kernel import stresses_of
+from ..core.linear import stress_of
 from .item import Item
 from .loads import Load
 from ..beam.distribution import Spread
@@ -66,6 +64,9 @@ class EigenStrain(Load):
     _elements: Any = None
     _matrix: Any = None
     _spread: Any = None
+    # strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
+    _strains: Any = None
+    _stresses: Any = None
     #: True under laws that are not linear: what it does is not in proportion to its size.
     grows = False
     # that in a motion
@@ -122,17 +123,22 @@ class EigenStrain(Load):
         function = getattr(self.amplitude, "function", None)
         if isinstance(function, Coefficient):
             bound.at_rest = function(1.0)
-        if beam.has_sections and any(t.pack.law.kind != LINEAR for t in beam.kernel.tables):
-            bound.pushes = [sampled(beam, table, self) for table in beam.kernel.tables]
+        kernel = beam.kernel
+        if not beam.has_sections:
+            bound.pushes, bound.linear = [_resultants(beam, self)], False
+            return bound
+        bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
+        bound._stresses = list(map(stresses_of, kernel.tables, bound._strains))
+        if not kernel.linear:
+            bound.pushes = [pushed_at(t, E, T) for t, E, T in zip(
+                kernel.tables, bound._strains, bound._stresses)]
             bound.grows, bound.linear, bound._size = True, False, bound.at_rest
-        elif beam.has_sections:
-            K = _pushed_apart(beam, self)
+        else:
+            K, (i, j) = kernel.geometric(
+                np.zeros(beam.N), np.concatenate(bound._stresses, axis=1)), _entries(beam)
             bound._elements, bound.linear = K, True
-            i, j = _entries(beam)
             bound._matrix = sparse.coo_matrix((K.ravel(), (i.ravel(), j.ravel())),
                                               shape=(beam.N, beam.N)).tocsr()
-        else:
-            bound.pushes, bound.linear = [_resultants(beam, self)], False
         return bound
 
     @property
@@ -168,30 +174,18 @@ class EigenStrain(Load):
             q = beam.kernel.gather(beam.q0_local) + u_e
             return factor * np.einsum("eij,ej->ei", self._elements,
                                       q.reshape(len(q), -1)).reshape(q.shape)
-        u = np.ascontiguousarray(u_e).ravel()
-        return self._pushed(GIVEN, u, u, factor, self._apart()).reshape(u_e.shape)
+        return -self.beam.kernel.pushed_forces(self._pushed(factor), u)
 
     def small_forces(self, factor: float = 1.0) -> Array:
         """As :meth:`element_forces` without displacement, linear in the strain."""
         if not self.grows:
             return self.element_forces(np.zeros(self.beam.N), factor)
-        kernel = self.beam.kernel
-        u = np.zeros(kernel.gather(np.zeros(self.beam.N)).shape, dtype=complex)
-        packs = [linearised(pack) for pack in self._apart()]
-        return first_order(self._pushed(GIVEN, u.ravel(), u.ravel(), step(0.0, factor), packs)
-                           ).reshape(u.shape)
+        return self.beam.kernel.forces_of([factor * T for T in self._stresses],
+                                          np.zeros(self.beam.N))
 
-    def _apart(self):
-        """The packs of :attr:`pushes`, each element with coordinates of its own."""
-        return [apart(pack, slice(None)) for pack in self.beam.kernel.pushed_packs()]
-
-    def _pushed(self, what, u, v, factor, packs):
-        """The force, or the mean force, of :attr:`pushes` times a factor."""
-        out = np.zeros_like(u)
-        for pack, given in zip(packs, self.pushes):
-            self.beam.kernel.texts.evaluate(pack, what, u, v, out, -factor * given,
-                                            no_stresses(pack), nowhere(out))
-        return -out
+    def _pushed(self, factor):
+        """What is given to the kernel."""
+        return [-factor * given for given in self.pushes]
 
     def force(self, u: Array) -> Array:
         if self._matrix is not None:
@@ -201,27 +195,25 @@ class EigenStrain(Load):
     def mean_force(self, u0: Array, u1: Array) -> Array:
         if self._matrix is not None:
             return super().mean_force(u0, u1)
-        return self._pushed(MEAN, u0, u1, self._size, self.beam.kernel.pushed_packs())
+        kernel = self.beam.kernel
+        return -kernel.scatter(kernel.pushed_forces(self._pushed(self._size), u0, u1))
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         if self._matrix is not None:
             A = self._matrix.tocoo()
             return A.row, A.col, A.data
-        kernel = self.beam.kernel
-        K = kernel.tangents_of(self._apart(), kernel.gather(u),
-                               [-self._size * given for given in self.pushes])
+        K = self.beam.kernel.pushed_tangents(self._pushed(self._size), u)
         rows, columns = _entries(self.beam)
         return rows.ravel(), columns.ravel(), -K.ravel()
 
     def potential(self, u: Array) -> float:
         if self.grows:
-            return energy_lost(self.beam, 0.0 * u, self.pushes, self._size) - energy_lost(
-                self.beam, u, self.pushes, self._size)
+            return energy_lost(self.beam, 0.0 * u, self._strains, self._size) - energy_lost(
+                self.beam, u, self._strains, self._size)
         if self._matrix is not None:
             return -float(u @ (self._matrix @ (self.beam.q0_local + 0.5 * u)))
-        kernel = self.beam.kernel
-        return -float(np.sum(kernel.packs[0].weights * self.pushes[0] * kernel.strain(
-            kernel.gather(u))))
+        strain = self.beam.kernel.strain(u)
+        return -float(np.sum(self.pushes[0].T * strain.reshape(-1, strain.shape[2])))
 
     def spread(self, u: Array) -> Spread:
         return self._spread
@@ -357,22 +349,8 @@ def _entries(beam):
     return np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
 
 
-def _pushed_apart(beam, eigen):
-    """The derivative of the forces of the stresses S0: constant matrices of the elements."""
-    kernel, ne, parts = beam.kernel, beam.mesh.nelements, []
-    for table in kernel.tables:
-        pack = table.pack
-        S0 = np.einsum("cd,dpe->epc", pack.law.D, sampled(beam, table, eigen)) * np.broadcast_to(
-            pack.weights.T, (ne, len(pack.weights)))[..., None]
-        parts.append(S0.transpose(0, 2, 1).reshape(ne, -1))
-    stress, nb = np.concatenate(parts, axis=1), beam.nd // 2
-    return np.concatenate([kernel.geometric(np.zeros((part.stop - part.start, 2 * nb, 2)), part,
-                                            stress[part])
-                           for part in (slice(k.start, min(k.stop, ne)) for k in kernel.chunks())])
-
-
 def _resultants(beam, eigen):
-    """Normal forces and moments of a cable that a strain would take, (2, points, elements)."""
+    """Weighted normal forces and moments of a cable that a strain would take, (ne, 2 points)."""
     xi = beam.kernel.points
     out = np.zeros((2, beam.mesh.nelements, len(xi)))
     across = beam.across
@@ -384,7 +362,8 @@ def _resultants(beam, eigen):
         S0 = size * eigen.of_layer(layer, x, y)[0]
         for k, moment in enumerate((S0, -S0 * y)):
             out[k] += moment.reshape(*out[k].shape, -1).sum(axis=-1)
-    return np.ascontiguousarray(out.transpose(0, 2, 1))
+    out *= beam.kernel.weights
+    return np.concatenate(out, axis=1)
 
 
 # functions of time too

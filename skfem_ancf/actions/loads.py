@@ -134,7 +134,7 @@ class Load(Item):
     #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.
     prestress = False
     #: Of a stress-free strain: for each pack of the beam what is given for it, an array
-    #: (components, points, elements), see :meth:`~skfem_ancf.beam.kernels.base.Chain.pushed_packs`.
+    #: (components, points, elements), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
     pushes: Sequence[Array] = ()
     for_bodies = False
 

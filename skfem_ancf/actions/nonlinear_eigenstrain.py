@@ -1,8 +1,7 @@
 """Stress-free strains of laws whose stress is not linear in the strain.
 
 The energy of such a law is W(E - E0). As a load that is ``W(E - E0) - W(E)``, whose stress at the
-points of integration depends on the strain and, not in proportion, on the size of E0; see
-:meth:`~skfem_ancf.beam.kernels.section.Kernel.pushed_packs`.
+points of integration depends on the strain and, not in proportion, on the size of E0.
 """
 
 from __future__ import annotations
@@ -13,8 +12,9 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from ..formulations import COMPONENTS
-from ..beam.kernels.law import law_evaluate
-from ..beam.kernels.section import with_unit_law
+from ..beam.kernels.arrays import at_points
+from ..beam.kernels.kernel import energy_at, strains, stresses_of
+from ..beam.kernels.law import LINEAR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SECTION, ROUND_OFF = 6, 1e-12
 
 
-def energy_lost(beam: Beam, u: Array, strains: Sequence[Array], factor: float) -> float:
+def energy_lost(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> float:
     """The integral of W(E) - W(E - factor E0).
 
     Parameters
@@ -36,48 +36,46 @@ def energy_lost(beam: Beam, u: Array, strains: Sequence[Array], factor: float) -
         A :class:`~skfem_ancf.Beam` with sections.
     u
         Displacement of its coordinates, shape (N,).
-    strains
-        E0 at the points of each term as :func:`sampled` returns it, (3, points, nelements).
+    eigen
+        E0 at the samples of each term as :func:`sampled` returns it, (ns, nelements).
     factor
         On E0.
     """
     total = 0.0
-    for pack, E0 in zip(beam.kernel.packs, strains):
-        E, W = np.empty(E0.shape), np.empty((2, 1, *E0.shape[1:]))
-        beam.kernel.texts.stress(with_unit_law(pack), u, E)
-        law_evaluate(pack.law, E, W[0])
-        law_evaluate(pack.law, E - factor * E0, W[1])
-        total += float(np.sum(pack.weights * (W[0] - W[1])))
+    for t, E0 in zip(beam.kernel.tables, eigen):
+        E = strains(t, u)
+        if t.law.kind == LINEAR:
+            total += factor * float(np.sum(stresses_of(t, E0).T * (E - 0.5 * factor * E0)))
+        else:
+            total += float(np.sum(energy_at(t, at_points(t, E))
+                                  - energy_at(t, at_points(t, E - factor * E0))))
     return total
 
 
-def sampled(beam: Beam, table: Any, eigen: Any) -> Array:
-    """A stress-free strain at the points of a term, sampled as the formulation does the strain.
+def pushed_at(t: Any, E0: Array, stresses: Array) -> Array:
+    """What a kernel takes for a stress-free strain: strains at the points, or linear stresses."""
+    return stresses if t.law.kind == LINEAR else at_points(t, E0)
+
+
+def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
+    """A stress-free strain where a term samples the strain, (ns, nelements).
 
     Parameters
     ----------
     beam
         A :class:`~skfem_ancf.Beam` with sections.
-    table
-        The tables of the term.
+    integral
+        One of the kernel's :class:`~skfem_ancf.beam.kernels.section.Integral`.
     eigen
         The :class:`~skfem_ancf.actions.eigenstrain.EigenStrain`.
-
-    Returns
-    -------
-    ndarray
-        Shape (3, points, nelements).
     """
-    term, out = table.term, []
+    term, layer, out = integral.term, integral.layer, []
     for row, name in enumerate(COMPONENTS):
         xi, eta = term.nodes(name), term.section_nodes
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-        values = eigen.of_layer(table.layer, *beam.across.coordinates(X))[row]
-        if name == "yy":
-            values = values - unmatched(beam, eigen, table.layer, X)
-        matrix = term.matrix(name)
-        out.append(values if matrix is None else values @ matrix.T)
-    return np.ascontiguousarray(np.array(out).transpose(0, 2, 1))
+        values = eigen.of_layer(layer, *beam.across.coordinates(X))[row]
+        out.append(values - unmatched(beam, eigen, layer, X) if name == "yy" else values)
+    return np.concatenate(out, axis=1).T
 
 
 def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:

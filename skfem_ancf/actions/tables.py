@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.band import clear, copy, mirror
 from ..beam.strain_energy import FlatBody, evaluate_body
-from ..beam.kernels.base import GIVEN, MEAN, TANGENT
+from ..beam.kernels.strain import PUSH, PUSH_MEAN, PUSH_TANGENT
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import own_force, own_joints, own_load_stiffness, own_mean_force
 from ..core.source import F1, F2, I1, lanes, primitive, source
@@ -53,10 +53,9 @@ class LoadTables(NamedTuple):
     rows, columns, values, which
         Forces linear in the displacement, as entries and the number of the factor.
     pushed, pushes
-        Beams with stress-free strains, a :class:`~skfem_ancf.beam.strain_energy.Body` without
-        stiffness of its own, and for each such load the stresses of a cable that are lost to it, or
-        the strain, at the points of integration, shape (k, n); see
-        :meth:`~skfem_ancf.beam.kernels.base.Chain.pushed_packs`.
+        Beams with stress-free strains, and for each such load the stresses or, of laws that are not
+        linear, the strains that are lost to it, shape (k, n); see
+        :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
     own
         Handle of what has loads of other kinds; 0 for none.
     """
@@ -193,8 +192,8 @@ def push(loads, what, factors, u, v, out, flat, ld):
     loads
         :class:`LoadTables`.
     what
-        GIVEN: the force at u. MEAN: that whose work from u to v is theirs. TANGENT: the derivative
-        at u.
+        PUSH: the force at u. PUSH_MEAN: that whose work from u to v is theirs. PUSH_TANGENT: the
+        derivative at u.
     factors
         Of the loads, those of stress-free strains last.
     u, v, out
@@ -211,7 +210,7 @@ def push(loads, what, factors, u, v, out, flat, ld):
         c, one = factors[first + k], loads.pushes[k]
         for i in lanes(given.size):
             given[i] -= c * one[i]
-    evaluate_body(loads.pushed, what, u, v, f, given, np.int64(1), given[:0], flat, ld)
+    evaluate_body(loads.pushed, what, u, v, f, given, given[:0], flat, ld)
     for i in lanes(out.size):
         out[i] -= f[i]
 
@@ -224,7 +223,7 @@ def external_force(loads, factors, t, scale, u, out):
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
     if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(GIVEN), factors, u, u, out, out[:0], np.int64(0))
+        push(loads, np.int64(PUSH), factors, u, u, out, out[:0], np.int64(0))
     if loads.own > 0:
         own_force(loads.own, t, scale, u, out)
 
@@ -243,7 +242,7 @@ def mean_external_force(loads, factors, t, u0, u1, out):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
     if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(MEAN), factors, u0, u1, out, out[:0], np.int64(0))
+        push(loads, np.int64(PUSH_MEAN), factors, u0, u1, out, out[:0], np.int64(0))
     if loads.own > 0:
         own_mean_force(loads.own, t, u0, u1, out)
 
@@ -257,7 +256,7 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
     lower = A.flat[A.top:]
     add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
     if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(TANGENT), factors, u, u, u[:0], lower, A.ld)
+        push(loads, np.int64(PUSH_TANGENT), factors, u, u, u[:0], lower, A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)

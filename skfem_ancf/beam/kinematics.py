@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .kernels import CableKernel, Kernel
+from .kernels import CableKernel, SectionKernel
 from ..core.errors import InputError, ModelWarning, warn
 from ..core.linear import first_order
 from ..core.quadrature import gauss
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SHEARED = 1e-3
 
 #: Kernels of the strain energy by the kinds that elements name.
-KERNELS: dict[str, Any] = {"sections": Kernel, "cable": CableKernel}
+KERNELS: dict[str, Any] = {"sections": SectionKernel, "cable": CableKernel}
 
 
 def require_cable(beam: Any) -> None:

@@ -1,32 +1,28 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..core.band import clear, copy
-from .kernels.base import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS,
-                           Destination, add_changes, add_pushes, add_scaled, repeated)
-from .kernels.cable import CablePack, cable_evaluate
-from .kernels.section import SectionPack, section_evaluate
+from ..core.band import add_multiple, clear, copy
 from ..core.source import I1, I2, primitive, shaped, source
+from .kernels.arrays import add_changes, add_pushes
+from .kernels.law import LINEAR
+from .kernels.strain import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS,
+                             run)
+from .kernels.tables import CABLE, StrainTables, repeated
 
 if TYPE_CHECKING:
     from .beam import Beam
 
-#: Kinds of packs, by their number in a table.
-PACKS = SectionPack, CablePack
-SECTION, CABLE = range(2)
-#: Columns of a table: kind, first coordinate and the one behind the last, first stress and the one
-#: behind the last, the shape of the stresses, coordinates of an element, and first gradient and the
-#: one behind the last.
-(KIND, FIRST, LAST, BEGIN, END, COMPONENTS, POINTS, ELEMENTS, SPAN, BEGIN_GRADIENTS,
- END_GRADIENTS) = range(11)
+#: Columns of the table of a body: first stress of the tables and the one behind the last; samples
+#: of an element and degrees of freedom; first gradient and the one behind the last; the kind.
+BEGIN, END, SAMPLES, SPAN, BEGIN_GRADIENTS, END_GRADIENTS, KIND = range(7)
 
 
 class Body(NamedTuple):
-    """The beams of a scene, for the plain texts: packs, and a table with a row for each."""
+    """The beams of a scene: their :class:`StrainTables`, and a table with a row for each."""
 
     packs: tuple
     table: I2
@@ -38,7 +34,7 @@ class FlatBody(NamedTuple):
     Attributes
     ----------
     packs
-        Addresses of the packs' words, see :mod:`skfem_ancf.equations.compiled.records`.
+        Addresses of the words of the tables, see :mod:`skfem_ancf.equations.compiled.records`.
     table
         As of the Body.
     """
@@ -48,43 +44,40 @@ class FlatBody(NamedTuple):
 
 
 @primitive("packs")
-def section_pack(body, k):
-    """The pack number k of sections."""
+def tables_of(body, k):
+    """The StrainTables number k."""
     return body.packs[k]
 
 
-@primitive("packs")
-def cable_pack(body, k):
-    """The pack number k of a cable."""
-    return body.packs[k]
+def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:
+    """The Body of beams with their slices of the degrees of freedom."""
+    return _body([[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
+                  for beam, s in zip(beams, slices)], lambda t: t.rows.shape[1])
 
 
-def body_of(beams: Sequence["Beam"], slices: Sequence[slice],
-            own: Sequence[Sequence[Any]] | None = None) -> "Body":
-    """The Body of beams with their slices of the coordinates.
+def pushed_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:
+    """The Body of what strains without stress change: their stresses or, nonlinear, strains.
 
-    Parameters
-    ----------
-    beams, slices
-        The beams, and the coordinates of each.
-    own
-        The packs of each; those of its kernel by default.
+    The tables of linear laws take stresses that are given; of others strains at the points, that
+    are added to those of the displacement.
     """
-    packs, rows, at, place = [], [], 0, 0
-    for beam, s, its in zip(beams, slices, own or [beam.kernel.packs for beam in beams]):
-        for pack in its:
-            shape = beam.kernel.texts.components, len(pack.weights), len(pack.start)
-            size = shape[0] * shape[1] * shape[2]
-            packs.append(pack)
-            n = 2 * size * len(pack.span)
-            rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape,
-                         len(pack.span), place, place + n])
-            at, place = at + size, place + n
-    table = np.array(rows, np.int64) if rows else np.zeros((0, END_GRADIENTS + 1), np.int64)
-    return Body(tuple(packs), table)
+    return _body([[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
+                  for beam, s in zip(beams, slices)],
+                 lambda t: t.rows.shape[1] if t.law.kind == LINEAR else 3 * t.weights.shape[1])
 
 
-def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float]) -> "Body":
+def _body(tables, numbers):
+    rows, at, place = [], 0, 0
+    flat = tuple(t for its in tables for t in its)
+    for t in flat:
+        size, span = numbers(t) * len(t.start), 2 * t.G.shape[1] + 2
+        n = 2 * t.rows.shape[1] * len(t.start) * span
+        rows.append([at, at + size, t.rows.shape[1], span, place, place + n, t.kind])
+        at, place = at + size, place + n
+    return Body(flat, np.array(rows, np.int64) if rows else np.zeros((0, KIND + 1), np.int64))
+
+
+def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float]) -> Body:
     """The Body of what resists the rates of strains; ``body`` itself where nothing does.
 
     Parameters
@@ -94,48 +87,43 @@ def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float
     times
         Retardation time of each beam.
     """
-    packs, rows, first = [], [], 0
+    packs: list[StrainTables] = []
+    rows, first = [], 0
     for beam, time in zip(beams, times):
-        last = first + len(beam.kernel.packs)
+        viscous = beam.kernel.viscous_tables(time)
+        last = first + len(viscous)
         if time > 0.0:
-            packs += beam.kernel.viscous_packs(time)
+            packs += [t._replace(start=own.start)
+                      for t, own in zip(viscous, body.packs[first:last])]
             rows += list(body.table[first:last])
         first = last
     return Body(tuple(packs), np.array(rows)) if packs else body
 
 
-def copies_of(body: "Body", n: int, N: int) -> "Body":
-    """The Body of ``n`` times the same beams, whose coordinates are one behind the other.
+def copies_of(body: Body, n: int, N: int) -> Body:
+    """The Body of ``n`` times the same beams, whose degrees of freedom begin N later each time.
 
     What takes few elements at a time takes less than n times as long for them. There are no
     tangents of it: they would be n times as long.
-
-    Parameters
-    ----------
-    body
-        What :func:`body_of` has made.
-    n, N
-        How often, and the number of all coordinates.
     """
     table = body.table.copy()
-    table[:, LAST] += (n - 1) * N
-    table[:, [BEGIN, END, ELEMENTS]] *= n
-    return Body(tuple(repeated(pack, n, N) for pack in body.packs), table)
+    table[:, [BEGIN, END]] *= n
+    return Body(tuple(repeated(t, n, N) for t in body.packs), table)
 
 
-def stress_size(body: "Body") -> int:
-    """How many numbers the stresses of all integration points are."""
+def stress_size(body: Body) -> int:
+    """How many numbers the stresses of all samples are."""
     return int(body.table[-1, END]) if len(body.table) else 0
 
 
-def gradients_size(body: "Body") -> int:
+def gradients_size(body: Body) -> int:
     """How many numbers :func:`body_gradients` finds."""
     return int(body.table[-1, END_GRADIENTS]) if len(body.table) else 0
 
 
 @source
 def quadratic(body):
-    """True if all strains are quadratic in the coordinates: those of sections are."""
+    """True if all strains are quadratic in the degrees of freedom: those of sections are."""
     for k in range(body.table.shape[0]):
         if body.table[k, KIND] == CABLE:
             return False
@@ -144,46 +132,25 @@ def quadratic(body):
 
 @source
 def _stress(body, k, stresses):
-    """The stresses of pack k, shape (components, points, elements), a view; or of none."""
-    row = body.table[k]
-    if stresses.size == 0:
-        return shaped(stresses, (np.int64(0), row[POINTS], row[ELEMENTS]))
-    return shaped(stresses[row[BEGIN]:row[END]], (row[COMPONENTS], row[POINTS], row[ELEMENTS]))
-
-
-@source
-def _written(body, k, what, out):
-    """Where pack k writes: its stresses, or two gradients of each for each coordinate."""
-    row = body.table[k]
-    if what == GRADIENTS:
-        return shaped(out[row[BEGIN_GRADIENTS]:row[END_GRADIENTS]],
-                      (2 * row[SPAN] * row[COMPONENTS], row[POINTS], row[ELEMENTS]))
-    return _stress(body, k, out)
+    """The stresses of tables k, a view; or of none."""
+    return stresses[body.table[k, BEGIN]:body.table[k, END]] if stresses.size > 0 else stresses
 
 
 @source
 def _gradients(body, k, gradients):
-    """What :func:`body_gradients` has found for pack k, (2, elements, stresses, coordinates)."""
-    row = body.table[k]
-    return shaped(gradients[row[BEGIN_GRADIENTS]:row[END_GRADIENTS]],
-                  (np.int64(2), row[ELEMENTS], row[COMPONENTS] * row[POINTS], row[SPAN]))
+    """What :func:`body_gradients` has found for tables k, a view."""
+    return gradients[body.table[k, BEGIN_GRADIENTS]:body.table[k, END_GRADIENTS]]
 
 
 @source
-def evaluate_body(body, what, u, v, f, given, use_given, out, flat, ld):
-    """What :func:`~skfem_ancf.beam.kernels.section.section_evaluate` does, for all beams.
+def evaluate_body(body, what, u, v, f, given, out, flat, ld):
+    """What :func:`~skfem_ancf.beam.kernels.strain.evaluate` does, for all beams.
 
     The tangent goes to an array in which columns begin every ``ld`` entries.
     """
     for k in range(body.table.shape[0]):
-        a, b = body.table[k, FIRST], body.table[k, LAST]
-        old = _stress(body, k, given if use_given > 0 else given[:0])
-        new = _written(body, k, what, out)
-        to = Destination(flat, ld, a)
-        if body.table[k, KIND] == SECTION:
-            section_evaluate(section_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, new, to)
-        else:
-            cable_evaluate(cable_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, new, to)
+        written = _gradients(body, k, out) if what == GRADIENTS else _stress(body, k, out)
+        run(tables_of(body, k), what, u, v, f, _stress(body, k, given), written, flat, ld)
 
 
 @source
@@ -191,7 +158,7 @@ def body_force(body, u, f):
     """The internal force."""
     clear(f)
     none = f[:0]
-    evaluate_body(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, none, np.int64(0))
+    evaluate_body(body, np.int64(FORCE), u, u, f, none, none, none, np.int64(0))
 
 
 @source
@@ -203,15 +170,15 @@ def body_tangent(body, u, f, carried, use_carried, stresses, A):
     """
     clear(f)
     clear(A.flat)
-    evaluate_body(body, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
-                  A.flat[A.top:], A.ld)
+    evaluate_body(body, np.int64(TANGENT), u, u, f, carried if use_carried else carried[:0],
+                  stresses, A.flat[A.top:], A.ld)
 
 
 @source
 def body_stress(body, u, stresses):
     """The stresses at u."""
-    evaluate_body(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses,
-                  u, np.int64(0))
+    none = u[:0]
+    evaluate_body(body, np.int64(STRESS), u, u, none, none, stresses, none, np.int64(0))
 
 
 @source
@@ -220,16 +187,15 @@ def body_mean_stress(body, copies, weights, stresses, out):
     clear(out)
     for k in range(body.table.shape[0]):
         all_of_them, mean = _stress(copies, k, stresses), _stress(body, k, out)
-        size = mean.shape[2]
         for j in range(weights.size):
-            add_scaled(weights[j], all_of_them[:, :, j * size:(j + 1) * size], mean, mean)
+            add_multiple(weights[j], all_of_them[j * mean.size:(j + 1) * mean.size], mean)
 
 
 @source
 def body_carry(body, u, du, stresses, carried):
     """The stresses, linearised, at u + du, from those at u."""
-    evaluate_body(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried,
-                  u, np.int64(0))
+    none = u[:0]
+    evaluate_body(body, np.int64(CARRY), u, du, none, stresses, carried, none, np.int64(0))
 
 
 @source
@@ -239,20 +205,17 @@ def add_viscous_stress(viscous, body, copies, k, u, v, rooms, out):
     ``rooms``, shape (2, s), is room, of which the first row is zero.
     """
     clear(rooms[1])
-    evaluate_body(viscous, np.int64(CARRY), u, v, u, rooms[0], np.int64(1), rooms[1], u,
-                  np.int64(0))
+    body_carry(viscous, u, v, rooms[0], rooms[1])
     for j in range(body.table.shape[0]):
         one, all_of_them = _stress(body, j, rooms[1]), _stress(copies, j, out)
-        size = one.shape[2]
-        its = all_of_them[:, :, k * size:(k + 1) * size]
-        add_scaled(1.0, one, its, its)
+        add_multiple(1.0, one, all_of_them[k * one.size:(k + 1) * one.size])
 
 
 @source
 def add_viscous_force(body, u, v, f):
     """Add the force of stresses in proportion to the rates of the strains."""
     none = f[:0]
-    evaluate_body(body, np.int64(VISCOUS), u, v, f, none, np.int64(0), none, none, np.int64(0))
+    evaluate_body(body, np.int64(VISCOUS), u, v, f, none, none, none, np.int64(0))
 
 
 @source
@@ -260,7 +223,7 @@ def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
     clear(f)
     none = f[:0]
-    evaluate_body(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, none, np.int64(0))
+    evaluate_body(body, np.int64(MEAN), u0, u1, f, none, none, none, np.int64(0))
 
 
 @source
@@ -271,38 +234,37 @@ def body_mixed(body, mean, u0, u1, f, carried, stresses):
     """
     clear(f)
     evaluate_body(body, np.int64(MEAN if mean else FORCE), u0 if mean else u1, u1, f, carried,
-                  np.int64(1), stresses, f, np.int64(0))
+                  stresses, f[:0], np.int64(0))
 
 
 @source
 def add_force_of(body, u, stresses, f):
     """Add the force at u of given stresses."""
     none = f[:0]
-    evaluate_body(body, np.int64(GIVEN), u, u, f, stresses, np.int64(1), none, none, np.int64(0))
+    evaluate_body(body, np.int64(GIVEN), u, u, f, stresses, none, none, np.int64(0))
 
 
 @source
 def body_gradients(body, u, gradients):
-    """The derivatives of the strains at u, times weights, and of the stresses, of each element."""
+    """The derivatives of the strains at u, and of the weighted stresses, of each element."""
     none = u[:0]
-    evaluate_body(body, np.int64(GRADIENTS), u, u, u, none, np.int64(0), gradients, none,
-                  np.int64(0))
+    evaluate_body(body, np.int64(GRADIENTS), u, u, none, none, gradients, none, np.int64(0))
 
 
 @source
 def body_tangent_by(body, u, stresses, gradients, A):
     """As :func:`body_gradients`, and the lower half of the tangent at these stresses."""
     clear(A.flat)
-    evaluate_body(body, np.int64(GRADIENTS), u, u, u, stresses, np.int64(1), gradients,
-                  A.flat[A.top:], A.ld)
+    evaluate_body(body, np.int64(GRADIENTS), u, u, u[:0], stresses, gradients, A.flat[A.top:],
+                  A.ld)
 
 
 @source
-def _starts(body, k):
-    """The first coordinate of each element of pack k, in those of its beam."""
-    if body.table[k, KIND] == SECTION:
-        return section_pack(body, k).start
-    return cable_pack(body, k).start
+def _halves(body, k, gradients):
+    """The gradients of tables k, shape (2, elements, samples, degrees of freedom)."""
+    row, found = body.table[k], _gradients(body, k, gradients)
+    n = row[SAMPLES] * row[SPAN]
+    return shaped(found, (np.int64(2), found.size // (2 * n), row[SAMPLES], row[SPAN]))
 
 
 @source
@@ -310,20 +272,20 @@ def carry_by(body, copies, gradients, du, stresses, carried):
     """As :func:`body_carry`, of copies, by the gradients of the body."""
     copy(stresses, carried)
     for k in range(body.table.shape[0]):
-        B, new = _gradients(body, k, gradients)[1], _stress(copies, k, carried)
-        add_changes(B, _starts(copies, k), du[copies.table[k, FIRST]:copies.table[k, LAST]], new)
+        add_changes(_halves(body, k, gradients)[1], tables_of(copies, k).start, du,
+                    _stress(copies, k, carried))
 
 
 @source
 def add_force_by(body, copies, gradients, stresses, f):
     """As :func:`add_force_of`, of copies, by the gradients of the body."""
     for k in range(body.table.shape[0]):
-        B, given = _gradients(body, k, gradients)[0], _stress(copies, k, stresses)
-        add_pushes(B, _starts(copies, k), given, f[copies.table[k, FIRST]:copies.table[k, LAST]])
+        add_pushes(_halves(body, k, gradients)[0], tables_of(copies, k).start,
+                   _stress(copies, k, stresses), f)
 
 
 @source
 def add_turned(body, u, v, U):
     """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
     none = u[:0]
-    evaluate_body(body, np.int64(TURNED), u, v, u, none, np.int64(0), none, U.flat, U.ld)
+    evaluate_body(body, np.int64(TURNED), u, v, none, none, none, U.flat, U.ld)

@@ -15,7 +15,6 @@ from . import compiled
 from .compiled.words import Kept
 from .tables import Tables
 from ..beam.kernels.law import OWN
-from ..beam.kernels.section import SectionPack
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, expected, wanted
 
@@ -26,7 +25,7 @@ logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: what texts have in common, what kernels have, the kernels,
 #: each if a scene has it, and each text; and loading what lies on disk.
-COMPILING = {"common": 3.0, "kernels": 0.8, "SectionPack": 2.3, "CablePack": 1.2,
+COMPILING = {"common": 3.0, "StrainTables": 6.0,
              "elements": 1.4, "contacts": 2.9, "equilibrium": 2.4, "steps": 5.9, "evaluate": 0.3}
 #: The same for texts that are compiled where they are used, not beforehand.
 WHERE_USED = {"collocate": 5.6}
@@ -77,7 +76,7 @@ class Machine:
             self._plain = "compiled=False"
         elif system.forces.contacts.own:
             self._plain = "a distance of your own: SignedDistance"
-        elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
+        elif any(pack.law.kind == OWN
                  for pack in self.tables.plain.body.packs):
             self._plain = ("a law of your own in Python, where a "
                            "skfem_ancf.materials.TextMaterial is compiled")

@@ -235,38 +235,22 @@ def _joined(parts):
 
 def _beam_rows(beam, u):
     """B and C B of one beam as sparse matrices, and its weighted stresses."""
-    kernel, columns = beam.kernel, []
-    values = [], [], []
-    for part in kernel.chunks():
-        found = kernel.factors(kernel.gather(u, part), part)
-        n = found[0].shape[2]
-        dofs = beam.nd * beam.mesh.t[0, part][:, None, None] + np.arange(n)
-        columns.append(np.broadcast_to(dofs, found[0].shape).ravel())
-        for all_values, new in zip(values, found):
-            all_values.append(new.ravel())
-    B, CB, stress = map(np.concatenate, values)
-    j, first = np.concatenate(columns), n * np.arange(len(stress) + 1)
-    shape = len(stress), beam.N
-    return (*(sparse.csr_matrix((v, j, first), shape=shape) for v in (B, CB)), stress)
+    B, CB, stress = beam.kernel.gradients(u)
+    n, stress = B.shape[2], stress.ravel()
+    dofs = beam.nd * beam.mesh.t[0][:, None, None] + np.arange(n)
+    j, first = np.broadcast_to(dofs, B.shape).ravel(), n * np.arange(len(stress) + 1)
+    return (*(sparse.csr_matrix((x.ravel(), j, first), shape=(len(stress), beam.N))
+              for x in (B, CB)), stress)
 
 
 def _beam_geometric(beam, u, stress):
     """The geometric part of one beam, sparse."""
-    kernel, i, j, values, first = beam.kernel, [], [], [], 0
     if not np.any(stress):
         return sparse.csr_matrix((beam.N, beam.N))
-    rows = len(stress) // beam.mesh.nelements
-    for part in kernel.chunks():
-        u_e = kernel.gather(u, part)
-        last = first + rows * len(u_e)
-        S = kernel.geometric(u_e, part, stress[first:last].reshape(len(u_e), rows))
-        first = last
-        dofs = beam.nd * beam.mesh.t[0, part][:, None] + np.arange(S.shape[1])
-        i.append(np.broadcast_to(dofs[:, :, None], S.shape).ravel())
-        j.append(np.broadcast_to(dofs[:, None, :], S.shape).ravel())
-        values.append(S.ravel())
-    i, j, values = map(np.concatenate, (i, j, values))
-    return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N))
+    S = beam.kernel.geometric(u, stress.reshape(beam.mesh.nelements, -1))
+    dofs = beam.nd * beam.mesh.t[0][:, None] + np.arange(S.shape[1])
+    i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+    return sparse.csr_matrix((S.ravel(), (i.ravel(), j.ravel())), shape=(beam.N, beam.N))
 
 
 def is_symmetric(S: csr_matrix, sizes: Array) -> bool:

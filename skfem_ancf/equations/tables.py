@@ -2,7 +2,6 @@
 
 from copy import copy
 from functools import cache, cached_property, partial
-from operator import is_
 from typing import Any, NamedTuple
 from weakref import ref
 
@@ -10,15 +9,14 @@ import numpy as np
 
 from . import compiled
 from ..core.band import Band
-from ..beam.strain_energy import (BEGIN, END_GRADIENTS, FlatBody, body_of, copies_of, stress_size,
-                                  viscous_body_of)
+from ..beam.strain_energy import (BEGIN, KIND, FlatBody, body_of, copies_of, pushed_body_of,
+                                  stress_size, viscous_body_of)
 from .compiled.words import Words, constant
 from ..actions.forces.system import NO_FORCES
 from ..actions.forces.texts import ForceTables
-from ..beam.kernels.base import packed
 from ..beam.kernels.law import LINEAR, text_of
 from ..beam.kernels.moments import MomentPack
-from ..beam.kernels.section import SectionPack, linearised
+from ..beam.kernels.tables import linearised
 from ..core.origin import ours
 from ..core.callbacks import handle_of
 from ..core.sampling import sample
@@ -33,7 +31,7 @@ _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO
                                   np.zeros(0), 0))
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
                                   np.zeros((0, 2)), np.zeros(0), _NO_INTS))
-_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
+_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64)))
 _NO_PUSHES = np.zeros((0, 0))
 constant(NO_FORCES)
 
@@ -155,11 +153,9 @@ class Tables:
     def linearised(self) -> "Tables | None":
         """The same with laws of constant moduli, those without strain; None if all are such."""
         body = self.plain.body
-        packs = [linearised(pack) if isinstance(pack, SectionPack) else pack
-                 for pack in body.packs]
-        if all(map(is_, packs, body.packs)):
+        if all(t.law.kind == LINEAR for t in body.packs):
             return None
-        body = body._replace(packs=tuple(packs))
+        body = body._replace(packs=tuple(map(linearised, body.packs)))
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
 
     def copied(self, n: int) -> "Tables":
@@ -255,9 +251,8 @@ class Tables:
             return _NO_BODY, _NO_PUSHES
         of = {id(load.beam): load.beam for load in loads}
         beams = list(of.values())
-        packs = [beam.kernel.pushed_packs() for beam in beams]
-        body = body_of(beams, [self.system.of(beam) for beam in beams], packs)
-        first = np.cumsum([0, *map(len, packs)])[:-1]
+        body = pushed_body_of(beams, [self.system.of(beam) for beam in beams])
+        first = np.cumsum([0, *(len(beam.kernel.tables) for beam in beams)])[:-1]
         begins = dict(zip(of, body.table[first, BEGIN]))
         rows = np.zeros((len(loads), stress_size(body)))
         for row, load in zip(rows, loads):
@@ -425,8 +420,13 @@ class Tables:
 @cache
 def _parts(packs, elements, contacts):
     """As :attr:`Tables.parts`, of classes of packs and whether there are elements and contacts."""
-    return ("common", *["kernels"] * bool(packs), *sorted(x.__name__ for x in packs),
+    return ("common", *sorted(x.__name__ for x in packs),
             *["elements"] * elements, *["contacts"] * contacts)
+
+
+def packed(values, dtype=np.float64):
+    """An array as compiled code takes it: contiguous and writable, of one type."""
+    return np.require(values, dtype, ["C", "W"])
 
 
 def _beside(arrays):
@@ -442,10 +442,7 @@ def _with_laws(body, address):
         return pack if text is None else pack._replace(
             law=pack.law._replace(address=address(text)))
 
-    packs = tuple([
-        addressed(pack) if isinstance(pack, SectionPack) and pack.law.kind != LINEAR else pack
-        for pack in body.packs])
-    return body if all(map(is_, packs, body.packs)) else body._replace(packs=packs)
+    return body._replace(packs=tuple(map(addressed, body.packs)))
 
 
 def _kind(load):

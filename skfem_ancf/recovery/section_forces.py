@@ -15,7 +15,6 @@ from numpy.polynomial.chebyshev import chebint, chebvander
 
 from ..core.errors import AncfError
 from ..formulations.ecm import AXIS as WHOLE
-from ..beam.kernels.base import apart
 from ..mesh.mapping import cross
 from ..core.quadrature import gauss, lagrange
 from ..sections.jumps import beside, jumps
@@ -372,9 +371,4 @@ def viscous_forces(beam: Beam, u: Array, v: Array, time: float) -> Array:
 
     They are those of a displacement ``u`` (N,), its rate ``v`` (N,) and a retardation time.
     """
-    kernel = beam.kernel
-    u, v = kernel.gather(u).ravel(), kernel.gather(v).ravel()
-    out = np.zeros(u.size)
-    for pack in kernel.viscous_packs(time):
-        kernel.texts.viscous(apart(pack, slice(None)), u, v, out)
-    return out.reshape(beam.mesh.nelements, -1, 2)
+    return beam.kernel.viscous_forces(u, v, time)

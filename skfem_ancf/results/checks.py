@@ -11,7 +11,6 @@ import numpy as np
 from ..beam import kinematics
 from ..core.errors import ModelWarning, warn
 from ..beam.distribution import SNAP
-from ..materials import LinearLaw
 
 if TYPE_CHECKING:
 
@@ -180,7 +179,7 @@ def _linear_findings(beam, u, base):
 
 
 def _is_linear(beam):
-    return all(isinstance(t.law, LinearLaw) for t in beam.kernel.tables)
+    return beam.kernel.linear
 
 
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:

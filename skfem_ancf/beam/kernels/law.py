@@ -9,7 +9,6 @@ import numpy as np
 from ...materials import LinearLaw, TextMaterial
 from ...materials.base import ShearCorrected
 from ...core.source import F1, F2, lanes, primitive, room, source
-from .base import packed
 
 #: Kinds of laws: constant moduli, a law with texts, and any other.
 LINEAR, TEXT, OWN = 0, 1, 2
@@ -158,13 +157,17 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     """
     one = np.ones(3)
     if isinstance(law, LinearLaw):
-        return LawTables(LINEAR, 0, 0, packed(law.D), np.zeros(3), one)
+        return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
     handle, kind, constants = next(_handles), OWN, np.zeros(3)
     if isinstance(base, TextMaterial) and base.has_text:
-        kind, constants = TEXT, packed(base.constants)
+        kind, constants = TEXT, np.array(base.constants, dtype=float)
     _LAWS[handle] = base
     weakref.finalize(owner, _LAWS.pop, handle, None)
     with np.errstate(all="ignore"):
         D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
-    return LawTables(kind, handle, 0, packed(D), constants, packed(scale))
+    return LawTables(kind, handle, 0, np.array(D), constants, np.array(scale, dtype=float))
+
+
+#: Of cables, which have moduli alone.
+NO_LAW = LawTables(LINEAR, 0, 0, np.zeros((3, 3)), np.zeros(3), np.ones(3))

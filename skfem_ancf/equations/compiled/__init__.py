@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 #: What is compiled apart from the texts that call it, and the module that does so.
-ADDRESSES = {"common": "shared", "kernels": "shared", "SectionPack": "blocks",
-             "CablePack": "blocks", "elements": "elements", "contacts": "contacts"}
+ADDRESSES = {"common": "shared", "StrainTables": "blocks",
+             "elements": "elements", "contacts": "contacts"}
 #: Those of them that this process has.
 KNOWN: set[str] = set()
 #: Compiled functions that this process has, by the name of their text.

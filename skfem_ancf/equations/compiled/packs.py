@@ -1,19 +1,13 @@
-"""Packs of beams, by the places of their words."""
+"""Tables of beams, by the places of their words."""
 
-from ...beam.strain_energy import PACKS
+from ...beam.kernels.tables import StrainTables
 from .records import reader, record_type
 from .twin import jit
 
-#: What reads a pack at an address, by the name of its class.
-READERS = {kind.__name__: reader(record_type(kind)) for kind in PACKS}
-_section, _cable = READERS.values()
+#: What reads tables at an address.
+READER = reader(record_type(StrainTables))
 
 
 @jit
-def section_pack(body, k):
-    return _section(body.packs[k])
-
-
-@jit
-def cable_pack(body, k):
-    return _cable(body.packs[k])
+def tables_of(body, k):
+    return READER(body.packs[k])

@@ -19,9 +19,7 @@ from ...beam.strain_energy import FlatBody
 from ...actions.forces import texts as forces
 from ...actions.forces.contact_texts import ContactTables, Question
 from ...actions.forces.texts import ForceTables
-from ...beam.kernels import base
-from ...beam.kernels.base import Destination, PairTables
-from ...core.source import F1, F2, F3, I1
+from ...core.source import F1, F2, I1
 from ...actions.tables import JointTables, LoadTables
 from . import address as address_of_group
 from . import key
@@ -49,7 +47,7 @@ class Call(NamedTuple):
 _FROM_JOINTS = JointTables, F1, float, F1, F1, F1
 GROUPS = {
     "common": (
-        Call(body.evaluate_body, (FlatBody, int, F1, F1, F1, F1, int, F1, F1, int)),
+        Call(body.evaluate_body, (FlatBody, int, F1, F1, F1, F1, F1, F1, int)),
         Call(tables.add_load_stiffness, (LoadTables, F1, float, float, F1, Band)),
         Call(tables.push, (LoadTables, int, F1, F1, F1, F1, F1, int)),
         Call(tables.constraint, (JointTables, F1, F1, float, F1, F1)),
@@ -67,13 +65,6 @@ GROUPS = {
         Call(band.dense_solve, (F2, F1), bool),
         Call(band.solve_dependent, (F2, F1), bool),
         Call(band.fix, (Band, I1))),
-    "kernels": (
-        Call(base.load, (I1, I1, int, F1, F3)),
-        Call(base.add_force, (F3, F3, F3, I1, I1, int, F3, F3, F1)),
-        Call(base.product, (F3, int, F3, F3)),
-        Call(base.turned_product, (F3, F3, int, F3, F3)),
-        Call(base.add_tangent, (F3, PairTables, I1, int, F3, F3, ByValue(Destination))),
-        Call(base.add_both_halves, (F3, PairTables, I1, int, F3, F3, ByValue(Destination)))),
 }
 
 

@@ -58,6 +58,8 @@ def twin(function):
     if function is column:
         return _one
     if function.twin is not None:
+        if "." in function.twin:  # loops in another folder
+            return twin(getattr(import_module(function.twin), function.__name__))
         return getattr(import_module(f"{__package__}.{function.twin}"), function.__name__)
     return jit(linked(function))
 

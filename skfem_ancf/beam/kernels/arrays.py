@@ -1,0 +1,276 @@
+"""Steps of the kernels, of all elements of a block at once; :mod:`.loops` has the same for Numba.
+
+Elements are the last axis of what is of rows, samples and points, and the first of matrices.
+Displacements may be complex.
+"""
+
+import numpy as np
+
+from ...core.source import primitive
+from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION
+
+#: Steps that Numba compiles from loops.
+step = primitive("skfem_ancf.beam.kernels.loops")
+
+
+@step
+def block():
+    """How many elements are evaluated together: as many as stay in cache."""
+    return 256
+
+
+def _at(t, first, last, of):
+    """Which of a table are those of elements."""
+    return t.at[first:last, of]
+
+
+def _product(A, at, X):
+    """``A[at] @ X`` of matrices and X (k, m, ne)."""
+    if len(A) == 1:
+        return (A[0] @ X.reshape(len(X), -1)).reshape(A.shape[1], *X.shape[1:])
+    return (A[at] @ X.transpose(2, 0, 1)).transpose(1, 2, 0)
+
+
+def _of_elements(A, at):
+    """Values (k, ...) of each element as the last axis, which is 1 if all have the same."""
+    return np.moveaxis(A if len(A) == 1 else A[at], 0, -1)
+
+
+@step
+def gathered(t, first, last, u):
+    """Degrees of freedom (nb - 1, 2, ne) of the elements, as their left nodes see them."""
+    m, start = t.G.shape[1], t.start[first:last]
+    U = u[start + np.arange(2, 2 * m + 2)[:, None]].reshape(m, 2, -1)
+    U[m // 2] -= u[start + np.arange(2)[:, None]]
+    return U
+
+
+@step
+def displaced(t, first, last, u):
+    """Displacements (rows, 2, ne) of the rows of the elements from ``first`` to ``last``."""
+    return _product(t.G.transpose(0, 2, 1), _at(t, first, last, OF_G), gathered(t, first, last, u))
+
+
+@step
+def sampled(t, first, d, dd):
+    """Strains (ns, ne) at d, and directions X (2, ns, 2, ne) in which rows g and h do work.
+
+    What the strain changes by from d to d + dd is ``X[0] . dd_g + X[1] . dd_h``; where dd is 0, X
+    are its derivatives.
+    """
+    x, (g, h) = _of_elements(
+        t.frame, _at(t, first, first + d.shape[2], OF_FRAME)).swapaxes(0, 1), t.rows
+    r = x + d
+    if t.kind == SECTION:
+        c = np.where(g == h, 0.5, 1.0)[:, None, None]
+        strain = (c * (r[g] * d[h] + d[g] * x[h])).sum(axis=1)
+        middle = r + 0.5 * dd
+        return strain, np.array([c * middle[h], c * middle[g]])
+    n, s = len(d) // 2, r + dd
+    (a0, b0), (a, b), (a1, b1) = ((y[:n], y[n:]) for y in (x, r, s))
+    length0, length, length1 = (np.sqrt((y * y).sum(axis=1)) for y in (a0, a, a1))
+    kappa0, kappa, kappa1 = (_cross(y, z) / w**2 for y, z, w in (
+        (a0, b0, length0), (a, b, length), (a1, b1, length1)))
+    strain = np.concatenate([((a + a0) * d[:n]).sum(axis=1) / (length + length0), kappa - kappa0])
+    X = np.zeros((2, 2 * n, *d.shape[1:]), d.dtype)
+    square, both = (length**2 + length1**2)[:, None], (kappa + kappa1)[:, None]
+    X[0, :n] = (a + a1) / (length + length1)[:, None]
+    X[0, n:] = (_turned(b + b1) - both * (a + a1)) / square
+    X[1, n:] = -_turned(a + a1) / square
+    return strain, X
+
+
+def _cross(a, b):
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _turned(a):
+    """Vectors (n, 2, ne) turned clockwise."""
+    return np.stack([a[:, 1], -a[:, 0]], axis=1)
+
+
+@step
+def changed(t, dd, X):
+    """What changes dd of the rows change the strains by, (ns, ne)."""
+    return (X[0] * dd[t.rows[0]] + X[1] * dd[t.rows[1]]).sum(axis=1)
+
+
+@step
+def own_moduli(t, first, last):
+    """Moduli of a linear law between samples, (1, nq) or (ne, nq)."""
+    return t.H if len(t.H) == 1 else t.H[_at(t, first, last, OF_H)]
+
+
+@step
+def at_points(t, strain):
+    """Strains at the points of integration, (3, points, ne)."""
+    return (t.along @ strain).reshape(3, -1, strain.shape[1])
+
+
+@step
+def moduli_of(t, first, D):
+    """Moduli between samples, (ne, nq), from those at the points, (9, points, ne)."""
+    D = D * _of_elements(t.weights, _at(t, first, first + D.shape[2], OF_WEIGHTS))
+    (s, m), A = t.pairs, t.along.reshape(3, -1, t.along.shape[1])
+    return np.einsum("cpq,cdpe,dpq->eq", A[:, :, s], D.reshape(3, 3, *D.shape[1:]), A[:, :, m],
+                     optimize=True)
+
+
+@step
+def from_points(t, first, S):
+    """Weighted stresses (ns, ne) from those at the points, (3, points, ne)."""
+    S = S * _of_elements(t.weights, _at(t, first, first + S.shape[2], OF_WEIGHTS))
+    return t.along.T @ S.reshape(-1, S.shape[2])
+
+
+@step
+def weighted(t, H, strain):
+    """Moduli times strains, (ns, ne)."""
+    return _dense(t, H) @ strain if len(H) == 1 else (
+        _dense(t, H) @ strain.T[:, :, None])[..., 0].T
+
+
+def _dense(t, H):
+    """The matrices of moduli, (ns, ns), or (ne, ns, ns)."""
+    dense = np.zeros((len(H), t.rows.shape[1], t.rows.shape[1]), H.dtype)
+    dense[:, t.pairs[0], t.pairs[1]] = H
+    return dense[0] if len(H) == 1 else dense
+
+
+@step
+def add_forces(t, first, X, T, f):
+    """Add the forces of weighted stresses (ns, ne)."""
+    at = _at(t, first, first + T.shape[1], OF_G)
+    _add_to_nodes(t, first, sum(_product(t.G[:, :, rows], at, T[:, None] * Y)
+                                for rows, Y in zip(t.rows, X)), f)
+
+
+def _add_to_nodes(t, first, F, f):
+    """Add forces (nb - 1, 2, ne) on what :func:`gathered` finds."""
+    m, n, start = len(F), len(F) // 2, t.start[first:first + F.shape[2]]
+    F = F.reshape(2 * m, -1)
+    # no two elements have the same left node, nor the same right one
+    f[start + np.arange(2)[:, None]] -= F[2 * n:2 * n + 2]
+    f[start + np.arange(2, m + 1)[:, None]] += F[:m - 1]
+    f[start + np.arange(m + 1, 2 * m + 2)[:, None]] += F[m - 1:]
+
+
+@step
+def add_constant(t, first, last, u, f):
+    """Add the forces of the constant stiffness."""
+    U = gathered(t, first, last, u)
+    F = _product(t.C, _at(t, first, last, OF_C), U.reshape(t.C.shape[1], 1, -1))
+    _add_to_nodes(t, first, F.reshape(U.shape), f)
+
+
+@step
+def derivatives(t, first, X, B):
+    """Write the derivatives of the strains, (ne, ns, 2 nb - 2)."""
+    G = t.G.transpose(0, 2, 1)
+    G = G if len(G) == 1 else G[_at(t, first, first + len(B), OF_G)]
+    B[:] = sum(G[:, rows, :, None] * np.moveaxis(Y, -1, 0)[:, :, None]
+               for rows, Y in zip(t.rows, X)).reshape(B.shape)
+
+
+@step
+def moved(t, H, B, HB):
+    """Write moduli times derivatives of the strains, (ne, ns, 2 nb - 2)."""
+    HB[:] = _dense(t, H) @ B
+
+
+@step
+def between(B, HB, K):
+    """Write B^T HB of each element, (ne, 2 nb - 2, 2 nb - 2)."""
+    K[:] = B.transpose(0, 2, 1) @ HB
+
+
+@step
+def add_stiffness(t, first, K):
+    """Add the constant stiffness."""
+    K += t.C[_at(t, first, first + len(K), OF_C)] if len(t.C) > 1 else t.C
+
+
+@step
+def add_geometric(t, first, d, T, K):
+    """Add the part due to weighted stresses (ns, ne)."""
+    m, (g, h), T, G = t.G.shape[1], t.rows, T.T, t.G.transpose(0, 2, 1)
+    G = G if len(G) == 1 else G[_at(t, first, first + len(K), OF_G)]
+    K = K.reshape(-1, m, 2, m, 2)
+    if t.kind == SECTION:
+        c = np.where(g == h, 0.5, 1.0)[:, None, None]
+        both = (c * G[:, g, :, None] * G[:, h, None]).reshape(len(G), len(g), -1)
+        P = (T @ both[0] if len(G) == 1 else (T[:, None] @ both)).reshape(-1, m, m)
+        P = P + P.transpose(0, 2, 1)
+        K[:, :, 0, :, 0] += P
+        K[:, :, 1, :, 1] += P
+        return
+    n, r = T.shape[1] // 2, _of_elements(
+        t.frame, _at(t, first, first + len(K), OF_FRAME)).swapaxes(0, 1) + d
+    (a, b), (ax, ay) = (x.transpose(1, 2, 0) for x in (r[:n], r[n:]))
+    square = a * a + b * b
+    kappa = (a * ay - b * ax) / square
+    N, M = T[:, :n] / (square * np.sqrt(square)), 2.0 * T[:, n:] / square**2
+    c, y, zx, zy = 4.0 * kappa * M, kappa * square, M * a * b, 0.5 * M * (b * b - a * a)
+    one, two = (G[:, :n, :, None] * x[:, :, None] for x in (G[:, :n], G[:, n:]))
+    two = two + two.transpose(0, 1, 3, 2)
+    xx = c * a * a + N * b * b - M * (2.0 * ay * a + y)
+    yy = c * b * b + N * a * a + M * (2.0 * ax * b - y)
+    xy = (c - N) * a * b - M * (ay * b - ax * a)
+    for i, j, p, q in ((0, 0, xx, zx), (1, 1, yy, -zx), (0, 1, xy, zy), (1, 0, xy, zy)):
+        K[:, :, i, :, j] += (p[..., None, None] * one + q[..., None, None] * two).sum(axis=1)
+
+
+@step
+def add_to_band(t, first, K, to, halves):
+    """Add matrices of elements to a band, of two halves to both."""
+    K = _with_left(K)
+    j, i = np.triu_indices(K.shape[1])
+    at = t.start[first:first + len(K), None] * to.ld + (j * (to.ld - 1) + i)
+    left = np.searchsorted(j, K.shape[1] // 2)  # as for forces
+    for k in (slice(left), slice(left, None)):
+        to.flat[at[:, k]] += K[:, i[k], j[k]]
+        if halves:
+            to.flat[at[:, k] + to.ld // 2] += K[:, j[k], i[k]]
+
+
+def _with_left(K):
+    """Matrices with the left node's position: less what the right one's has, (ne, 2 nb, 2 nb)."""
+    n = K.shape[1]
+    q, out = n // 2 + 1, np.empty((len(K), n + 2, n + 2))
+    out[:, 2:, 2:] = K
+    out[:, :2, 2:] = -out[:, q:q + 2, 2:]
+    out[:, :, :2] = -out[:, :, q:q + 2]
+    return out
+
+
+@step
+def put_columns(B, out):
+    """Write derivatives by the degrees of freedom of both nodes, (ne, ns, 2 nb)."""
+    n = B.shape[2] // 2 + 1
+    out[:, :, 2:], out[:, :, :2] = B, -B[:, :, n - 2:n]
+
+
+def weights_of(t):
+    """Weights of the points, (points, ne) or (points, 1)."""
+    return _of_elements(t.weights, t.at[:, OF_WEIGHTS])
+
+
+def add_held_energies(t, u, out):
+    """Add the energies (ne,) of the constant stiffness."""
+    if len(t.C):
+        U = gathered(t, 0, len(t.start), u).reshape(t.C.shape[1], 1, -1)
+        out += 0.5 * (U * _product(t.C, t.at[:, OF_C], U)).sum(axis=(0, 1))
+
+
+@step
+def add_changes(B, start, x, T):
+    """Add ``B[e] x`` at start[e] to T (ne ns,), B repeated for copies of the elements."""
+    x = x[start[:, None] + np.arange(B.shape[2])].reshape(-1, len(B), B.shape[2], 1)
+    T += (B @ x).ravel()
+
+
+@step
+def add_pushes(B, start, T, f):
+    """Add ``B[e]^T T[e]`` to f at start[e], of T (ne ns,), B repeated for copies."""
+    F = T.reshape(-1, len(B), 1, B.shape[1]) @ B
+    np.add.at(f, start[:, None] + np.arange(B.shape[2]), F.reshape(len(start), -1))

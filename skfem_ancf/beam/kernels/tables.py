@@ -1,0 +1,103 @@
+"""Tables of the elements from which kernels find strains, forces and tangents.
+
+Elements of one table have a number of samples of strain. A sample depends on two rows of
+derivatives of the position: ``r_g = x_g + G_g u`` and ``r_h``. Of sections these are r_X and r_Y,
+and a sample is a Green-Lagrange strain at a point; of cables r_X and r_XX, and a sample is the
+extension or the change of curvature. Samples times moduli with the weights of the integration
+are weighted stresses T, whose work on the samples is that of the stress in the element.
+
+Left nodes take no part: G multiplies the other functions, and the right node's position
+less the left one's. A translation changes nothing then, not even round-off.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.source import F1, F2, F3, I1, I2
+from .law import LawTables
+
+#: Kinds of strains: of sections, and of cables.
+SECTION, CABLE = range(2)
+#: Columns of :attr:`StrainTables.at`.
+OF_G, OF_FRAME, OF_H, OF_C, OF_WEIGHTS = range(5)
+
+
+class StrainTables(NamedTuple):
+    """Elements with the same samples of strain.
+
+    Attributes
+    ----------
+    kind
+        :data:`SECTION` or :data:`CABLE`.
+    start
+        First degree of freedom of each element, (ne,).
+    at
+        Which G, frame, H, C and weights are an element's, (ne, 5).
+    G
+        Derivatives of the local functions but the first, (k, nb - 1, rows).
+    frame
+        The rows x in the reference configuration, (k, 2, rows).
+    rows
+        g and h of each sample, (2, ns); of a normal strain of a section both are the same.
+    pairs
+        Samples s and t of each modulus, sorted by s, with all s = t; (2, nq).
+    H
+        Moduli between samples, with weights: ``T[s] = sum H[s, t] strain[t]``; (k, nq). Of laws
+        that are not linear those without strain.
+    C
+        Constant stiffness of an element, (k, 2 nb - 2, 2 nb - 2), or (0, ...) for none.
+    law
+        :class:`~skfem_ancf.beam.kernels.law.LawTables`; what follows is for those not linear.
+    along
+        From samples to the points of integration, (3 points, ns), and (0, ns) of cables.
+    weights
+        Of the points, (k, points).
+    address
+        That of the compiled kernels; 0 for none.
+    """
+
+    kind: int
+    start: I1
+    at: I2
+    G: F3
+    frame: F3
+    rows: I2
+    pairs: I2
+    H: F2
+    C: F3
+    law: LawTables
+    along: F2
+    weights: F2
+    address: int = 0
+
+
+class Destination(NamedTuple):
+    """Entry (i, j), i >= j, of a tangent is added at ``flat[j * ld + i - j]``.
+
+    Of a matrix in two halves (j, i) is ``ld // 2`` behind.
+    """
+
+    flat: F1
+    ld: int
+
+
+def apart(t: StrainTables) -> StrainTables:
+    """The tables with degrees of freedom for each element, one element behind the other."""
+    return t._replace(start=(2 * t.G.shape[1] + 2) * np.arange(len(t.start)))
+
+
+def repeated(t: StrainTables, n: int, N: int) -> StrainTables:
+    """The tables of n times the elements, whose degrees of freedom begin N later each time."""
+    return t._replace(start=(t.start + N * np.arange(n)[:, None]).ravel(),
+                      at=np.tile(t.at, (n, 1)))
+
+
+def linearised(t: StrainTables) -> StrainTables:
+    """The tables of the law with constant moduli, those without strain."""
+    return t._replace(law=t.law._replace(kind=0))
+
+
+def scaled(t: StrainTables, factor: float) -> StrainTables:
+    """The tables of a linear law with ``factor`` times the moduli, without constant stiffness."""
+    return linearised(t)._replace(H=factor * t.H, C=t.C[:0])
