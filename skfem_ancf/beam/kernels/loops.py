@@ -33,7 +33,10 @@ def product(A, at, X, transposed):
     out = np.empty((rows, m, n))
     if len(A) == 1:
         flat = X.reshape(k, m * n)
-        np.dot(A[0].T if transposed else A[0], flat, out.reshape(rows, m * n))
+        if transposed:
+            np.dot(A[0].T, flat, out.reshape(rows, m * n))
+        else:
+            np.dot(A[0], flat, out.reshape(rows, m * n))
         return out
     out[:] = 0.0
     for g in range(rows):

@@ -79,8 +79,8 @@ class SectionKernel(ElementKernel):
         for layer, terms in across.terms(formulation):
             for k, term in enumerate(terms):
                 held = self.constant if not self.tables else None
-                self.integrals.append(Integral(layer, term, *self._add(layer, term, held, rows),
-                                               k == 0))
+                samples, volumes = self._add(layer, term, held, rows)
+                self.integrals.append(Integral(layer, term, samples, volumes, k == 0))
         self.points_number = sum(one.volumes.shape[1] for one in self.integrals)
 
     def _add(self, layer, term, constant, rows):
