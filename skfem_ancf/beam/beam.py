@@ -147,6 +147,8 @@ class Beam(Immutable):
         self.mesh, self.element, self.damping = element.fitted(mesh), element, damping
         self.formulation: Formulation = get_formulation(formulation)
         self.name, self.compiled = require_label("name", name), require_flag("compiled", compiled)
+        #: Points off the axis are linear in the degrees of freedom: not of a cable.
+        self.has_sections = element.kinematics == "sections"
         self.nd = 2 * element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
         self.width = getattr(self.section, "width", None)
@@ -243,11 +245,6 @@ class Beam(Immutable):
         """The layers of the section with their terms, :class:`~.strains.BeamLayer`."""
         return [BeamLayer(self, layer, terms)
                 for layer, terms in self.across.terms(self.formulation)]
-
-    @property
-    def has_sections(self) -> bool:
-        """True if points off the axis are linear in the degrees of freedom: not of a cable."""
-        return self.element.kinematics == "sections"
 
     # degrees of freedom
 
