@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ..core.quadrature import lagrange
 from ..sections.jumps import jumps
@@ -184,14 +185,9 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
 
 def _where(element: ElementBeam, value: float) -> float | None:
     """Where the function of ``r`` at the right node has a value; it rises from 0 to 1."""
-    low, high = 0.0, 1.0
     if not -FLAT <= value <= 1.0 + FLAT:
         return None
     if min(value, 1.0 - value) < FLAT:
         return float(round(value))
-    for _ in range(60):
-        xi = 0.5 * (low + high)
-        X = np.array([[xi], [0.5]])
-        low, high = ((xi, high) if element.local(X, 1.0, element.nodal_dofs)[0][0] < value
-                     else (low, xi))
-    return 0.5 * (low + high)
+    return brentq(lambda xi: element.local(np.array([[xi], [0.5]]), 1.0, element.nodal_dofs)[0][0]
+                  - value, 0.0, 1.0, xtol=1e-15)
