@@ -16,7 +16,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
                         ElementBeamCable, ElementBeamPatelShabana, Frame, InputError, MeshBeam,
                         MeshError, ModelWarning, RigidBody, Scene, Section, StVenantKirchhoff,
                         SupportError, forms)
-from skfem_ancf.equations.border import mean_stiffness
+from skfem_ancf.solvers.iteration import mean_stiffness
 from skfem_ancf.dynamics import steps
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.io import PvdWriter
