@@ -7,7 +7,6 @@ from skfem import FacetBasis
 
 from conftest import MESHES, STRAIGHT, quarter_arc
 from skfem_ancf import MeshBeam, MeshError
-from skfem_ancf.mesh.mapping import MappingBeam
 from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 STEP = 1e-30
@@ -20,11 +19,6 @@ def test_reference_cell_is_mapped_to_itself():
     m = MeshBeam.init_refdom()
     assert_array_equal(m.mapping().F(m.p)[:, 0], m.p)
     assert_allclose(m.mapping().F(POINTS)[:, 0], POINTS, atol=1e-15)
-
-
-def test_mapping_is_that_of_the_mesh(mesh):
-    assert isinstance(mesh.mapping(), MappingBeam) and mesh.mapping() is mesh._mapping()
-    assert mesh.mapping().dim == 2
 
 
 @pytest.mark.parametrize("name", STRAIGHT)
@@ -80,21 +74,6 @@ def test_derivative(mesh):
         assert_allclose(f(each, subset), whole[..., subset, :], atol=1e-13)
 
 
-@pytest.mark.parametrize("height", [0.02, lambda s: 0.02 + 0.01 * s - 0.005 * s**3])
-@pytest.mark.parametrize("sections", ["linear", "cubic", "septic"])
-def test_few_points_of_all_elements_are_asked_for_as_many(sections, height):
-    mesh = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]),
-                               np.linspace(0.0, 1.0, 4), height).with_sections(sections)
-    mapping, some = mesh.mapping(), np.array([2, 0])
-    every = np.repeat(POINTS[:, None], mesh.nelements, axis=1)
-    for name in ("DF", "detDF", "frame"):
-        one, other = getattr(mapping, name)(POINTS), getattr(mapping, name)(every)
-        assert_allclose(one, other, rtol=1e-13, atol=1e-15)
-        assert_allclose(getattr(mapping, name)(POINTS, some), other[..., some, :], rtol=1e-13,
-                        atol=1e-15)
-
-
-
 def test_area_is_that_inside_the_boundary(mesh):
     """The integral of detDF against half the integral of x . n over the boundary."""
     mapping, (x, w) = mesh.mapping(), GAUSS
@@ -140,31 +119,6 @@ def test_facets(mesh):
         assert_allclose(np.sum(n * d, 0) / np.hypot(*d), 0.0, atol=1e-13)
         outside = mapping.invF(mapping.F(points, elements) + 1e-4 * mesh.height * n, elements)
         assert np.all(np.abs(outside[1 - local % 2] - 0.5) > 0.5)
-
-
-def test_all_facets_by_default(mesh):
-    everything = np.arange(mesh.nfacets)
-    assert_array_equal(mesh.mapping().G(ALONG), mesh.mapping().G(ALONG, everything))
-    assert_array_equal(mesh.mapping().detDG(ALONG), mesh.mapping().detDG(ALONG, everything))
-
-
-def test_normals_of_a_straight_beam():
-    m = MeshBeam.init_line([0.0, 0.4, 1.0], 0.2)
-    fb = FacetBasis(m, ElementBeamP1())
-    x, n = fb.global_coordinates(), fb.normals
-    for axis, low, high in ((0, 0.0, 1.0), (1, -0.1, 0.1)):
-        for value, sign in ((low, -1.0), (high, 1.0)):
-            on = np.all(np.abs(x[axis] - value) < 1e-12, axis=1)
-            assert np.any(on)
-            assert_allclose(n[axis][on], sign, atol=1e-14)
-            assert_allclose(n[1 - axis][on], 0.0, atol=1e-14)
-
-
-def test_boundary_points_are_in_the_cell(mesh):
-    find = mesh.boundary_facets()
-    x = mesh.mapping().G(ALONG, find)
-    X = mesh.mapping().invF(x, tind=mesh.f2t[0, find])
-    assert np.max(np.abs(X - 0.5)) < 0.5 + 1e-12
 
 
 def test_perimeter():

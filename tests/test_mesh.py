@@ -1,6 +1,5 @@
 """Meshes: construction, topology, names, refinement, parts, motion, files and bad input."""
 
-import pickle
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from skfem import Basis, FacetBasis, MeshLine, MeshQuad
 from skfem.generic_utils import OrientedBoundary
 
 from conftest import MESHES, quarter_arc, s_curve
-from skfem_ancf import AncfError, InputError, MeshBeam, MeshError, NameUnknown
+from skfem_ancf import AncfError, InputError, MeshBeam, MeshError
 from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 CENTRE = np.array([[0.5], [0.5]])
@@ -149,12 +148,6 @@ def test_oriented_facets():
     assert np.all(out > 0) and len(around) == 4
 
 
-def test_unit_square():
-    m = MeshBeam.init_refdom()
-    assert area(m) == pytest.approx(1.0, abs=1e-15)
-    assert perimeter(m) == pytest.approx(4.0, abs=1e-14)
-
-
 # curved geometry
 
 def ellipse(s):
@@ -176,20 +169,6 @@ def test_arc_length(dr):
     assert_allclose(m.p_X, d / np.hypot(*d), atol=1e-14)
     assert_allclose(m.p_Y, np.array([-d[1], d[0]]) / np.hypot(*d), atol=1e-14)
     assert_allclose(m.p, ellipse(m.s), atol=1e-15)
-
-
-def test_length_of_the_meshed_axis_converges():
-    """The cubics have the length of the curve to fourth order."""
-    x = np.linspace(0, 1, 41)
-    errors = []
-    for n in (4, 8, 16):
-        m = MeshBeam.init_curve(ellipse, np.linspace(0, np.pi / 2, n + 1), 0.1)
-        J = m.mapping().DF(np.array([x, 0.5 + 0 * x]))[:, 0]
-        speed = np.hypot(*J)
-        simpson = np.r_[1, np.tile([4, 2], 19), 4, 1] / 120
-        errors.append(abs((speed @ simpson).sum() - ELLIPSE_QUARTER))
-    assert errors[-1] < 3e-5
-    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
 
 
 @pytest.mark.parametrize("sections, bound, rate", [("linear", 1e-3, 2), ("cubic", 1e-6, 4)])
@@ -239,14 +218,6 @@ def test_area_above_and_below_a_bent_axis(radius, h):
         errors.append(np.max(np.abs(halves - exact) / exact))
     assert errors[-1] < 2e-3
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 1.9)
-
-
-def test_sections_on_the_s_curve_are_normal():
-    m = s_curve()
-    assert_allclose(np.sum(m.p_X * m.p_Y, 0), 0, atol=1e-15)
-    assert_allclose(np.hypot(*m.p_X), 1, rtol=1e-14)
-    d = np.array([2 + 0.4 * m.s, np.cos(2.5 * m.s)])
-    assert_allclose(m.p_X, d / np.hypot(*d), atol=1e-13)
 
 
 def parabola_by_abs(s):
@@ -305,14 +276,6 @@ def test_curve_moves_with_the_mesh():
     assert_same(a, b, atol=1e-12)
 
 
-def test_full_circle():
-    m = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
-                            np.linspace(0, 2 * np.pi, 33), 0.2)
-    assert_allclose(m.lengths.sum(), 2 * np.pi, rtol=1e-12)
-    assert len(m.boundaries["left"]) == len(m.boundaries["right"]) == 1
-    assert m.boundaries["left"] != m.boundaries["right"]
-
-
 # refinement
 
 def test_uniform_refinement(mesh):
@@ -339,15 +302,6 @@ def test_adaptive_refinement(curved, elements):
     s = np.sort(np.concatenate([mesh.s, [0.5 * (mesh.s[e] + mesh.s[e + 1]) for e in chosen]]))
     assert_allclose(fine.s, s, atol=1e-15)
     assert_allclose(fine.lengths.sum(), mesh.lengths.sum(), rtol=1e-12)
-
-
-def test_repeated_refinement_of_the_last_element():
-    m = MeshBeam.init_line([0.0, 1.0], 0.1)
-    for k in range(10):
-        m = m.refined([m.nelements - 1])
-        assert m.nelements == k + 2 and m.nvertices == k + 3
-        assert_array_equal(m.t[1], m.t[0] + 1)
-    assert_allclose(m.p[0], np.r_[1 - 0.5 ** np.arange(11), 1.0], atol=1e-15)
 
 
 @pytest.mark.parametrize("how", [1, [1], [0, 2]])
@@ -469,14 +423,6 @@ def test_scaled(mesh, factor):
     assert_allclose(np.hypot(*big.p_X), 1, rtol=1e-13)
 
 
-def test_copies_do_not_share_caches():
-    m = MESHES["straight"]()
-    m.mapping(), m.f2t, m.is_straight
-    moved = m.translated((1.0, 0.0))
-    assert moved.mapping() is not m.mapping() and moved.mapping().mesh is moved
-    assert m.copy().refined().nfacets == 7 + 12 and m.nfacets == 4 + 6
-
-
 # files
 
 def test_round_trip(mesh, tmp_path):
@@ -488,31 +434,12 @@ def test_round_trip(mesh, tmp_path):
         assert_same(original, back)
 
 
-def test_round_trip_without_names(tmp_path):
-    m = MESHES["straight"]()
-    bare = MeshBeam(m.p, m.t, height=m.height)
-    bare.save_npz(tmp_path / "m.npz")
-    back = MeshBeam.load_npz(tmp_path / "m.npz")
-    assert back.boundaries is None and back.subdomains is None
-    assert_same(bare, back)
-
-
-def test_pickle_of_a_straight_mesh():
-    m = tagged(MESHES["unequal"]())
-    assert_array_equal(pickle.loads(pickle.dumps(m)).p, m.p)
-
-
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu"])
 def test_save_for_a_viewer(arc, suffix, tmp_path):
     arc.save(tmp_path / f"m{suffix}")
     quad = MeshQuad.load(tmp_path / f"m{suffix}")
     assert quad.nelements == 3 * 8 * 4
     assert_allclose(Basis(quad, quad.elem()).dx.sum(), area(arc), rtol=5e-3)
-
-
-def test_load_needs_a_beam_format(tmp_path):
-    with pytest.raises(MeshError, match=r"'m.vtk': only .npz files"):
-        MeshBeam.load(tmp_path / "m.vtk")
 
 
 def test_load_of_another_mesh(tmp_path):
@@ -641,16 +568,6 @@ def test_bad_parameters(s, message):
         MeshBeam.init_curve(ellipse, s, 0.1)
 
 
-@pytest.mark.parametrize("kwargs, message", [
-    (dict(origin=(0, 0, 0)), r"origin must have shape \(2\), got \(3,\)"),
-    (dict(origin=(0, np.nan)), "origin has a value"), (dict(angle=np.inf), "angle must be finite"),
-    (dict(angle=None), "angle must be a number"),
-])
-def test_bad_placement(kwargs, message):
-    with pytest.raises(InputError, match=message):
-        MeshBeam.init_line([0, 1], 0.1, **kwargs)
-
-
 def circle(s):
     return np.array([np.cos(s), np.sin(s)])
 
@@ -685,11 +602,6 @@ def test_bad_curves(r, s, height, message):
 def test_bad_curve_derivative(dr, message):
     with pytest.raises(InputError, match=message):
         MeshBeam.init_curve(circle, np.linspace(0, 1, 4), 0.1, dr=dr)
-
-
-def test_elements_too_long_for_the_curve():
-    with pytest.raises(MeshError, match="folds|elements are too long"):
-        MeshBeam.init_curve(circle, [0, 5.5], 0.9)
 
 
 def test_errors_of_the_curve_itself_are_not_hidden():
@@ -769,11 +681,3 @@ def test_bad_fields(change, message):
 def test_refused(action, message):
     with pytest.raises(AncfError, match=message):
         action(tagged(MESHES["straight"]()))
-
-
-def test_name_errors_tell_what_is_known():
-    with pytest.raises(NameUnknown) as info:
-        MESHES["straight"]().normalize_facets("tip")
-    assert (info.value.kind, info.value.name) == ("boundary", "tip")
-    assert info.value.known == ("left", "right", "bottom", "top")
-    assert isinstance(info.value, ValueError)
