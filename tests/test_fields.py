@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from conftest import quarter_arc
 from test_io import affine, bent, turn
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
                         NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.core.errors import CallbackError
-from skfem_ancf.recovery.fields import DRAWN, FIELDS, Field, Values, find_fields
+from skfem_ancf.recovery.fields import FIELDS, Field, Values, find_fields
 from skfem_ancf.io import body_fields
 from skfem_ancf.materials import Material
 
@@ -166,12 +166,3 @@ def test_cable_in_plane_strain():
     sigma = np.array([1.1**2 * S, 0.0, NU * S]) / J
     assert state.field("tresca", POINT) == pytest.approx(np.ptp(sigma))
 
-
-def test_the_table_says_what_a_field_is():
-    for name, field in FIELDS.items():
-        assert field.name == name and field.title and field.unit
-        assert field.components in (1, 2, 3) and field.frame in ("", "beam", "global")
-        assert (name in DRAWN) == (field.components == 1 or name == "displacement")
-    assert FIELDS["S_xx"].label().endswith("(force / area)")
-    assert_array_equal([FIELDS[n].signed for n in ("eps_yy", "von_mises", "tresca", "energy")],
-                       [True, False, False, False])

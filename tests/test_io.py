@@ -120,14 +120,6 @@ def test_no_thickness_left_is_nan_without_a_warning():
 
 # Lagrange cells
 
-def test_order_of_the_points_in_a_lagrange_cell_of_degree_3():
-    """VTK: corners, edges bottom, right, top, left by rising coordinate, inside row by row."""
-    X, order = lagrange_cell(bent().beams[0])
-    third = [(0, 0), (3, 0), (3, 3), (0, 3), (1, 0), (2, 0), (3, 1), (3, 2), (1, 3), (2, 3), (0, 1),
-             (0, 2), (1, 1), (2, 1), (1, 2), (2, 2)]
-    assert_allclose(X[:, order[0]], np.array(third).T / 3, atol=1e-15)
-
-
 @pytest.mark.parametrize("order", [1, 3, 4, 10])
 def test_lagrange_cells_are_the_exact_body(order, tmp_path):
     state = bent(ElementBeamANCF(order), quarter_arc())

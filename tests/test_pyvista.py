@@ -75,16 +75,6 @@ def test_tensors_are_vtks(state):
     assert_allclose(strain[:, 2], 0.5 * (thickness**2 - 1))
 
 
-def test_lagrange_cells_are_the_body(state):
-    made = state.to_pyvista(lagrange=True, fields="eps_yy")
-    assert set(made.celltypes) == {70} and made.n_cells == 2
-    assert_allclose(made.points, body_fields(state, lagrange=True).points)
-    area = state.to_pyvista(subdivide=(60, 30)).compute_cell_sizes()["Area"].sum()
-    fine = made.tessellate(max_n_subdivide=4) if hasattr(made, "tessellate") else None
-    if fine is not None:
-        assert fine.compute_cell_sizes()["Area"].sum() == pytest.approx(area, rel=1e-2)
-
-
 def test_beams_by_name():
     a = Beam(MeshBeam.init_line([0, 1], height=0.1), ElementBeamANCF(2), STEEL, 0.1, name="mast")
     b = Beam(quarter_arc(3), ElementBeamANCF(3), STEEL, 0.1)
@@ -348,21 +338,6 @@ def test_vtkhdf_on_a_full_disk(tmp_path, size):
         assert [p.read_text() for p in tmp_path.iterdir()] == ["before"]
     finally:
         subprocess.run(["umount", str(tmp_path)], check=True)
-
-
-@pytest.mark.parametrize("lagrange", [False, True])
-def test_vtu_is_read_by_vtk(state, tmp_path, lagrange):
-    for precision, tol in (("double", 1e-15), ("single", 1e-6)):
-        path = state.save(tmp_path / f"{precision}.vtu", lagrange=lagrange, precision=precision,
-                          fields=["stress", "S_xx", "displacement"])
-        read, body = pv.read(path), body_fields(state, lagrange=lagrange, fields=[
-            "stress", "S_xx", "displacement"])
-        assert_allclose(read.points, body.points, atol=tol)
-        for name, values in body.point_data.items():
-            assert_allclose(read.point_data[name], values, rtol=10 * tol, atol=tol)
-        assert_array_equal(read.celltypes, 70 if lagrange else 9)
-    size = [(tmp_path / f"{p}.vtu").stat().st_size for p in ("single", "double")]
-    assert size[0] < 0.8 * size[1]
 
 
 def test_notebooks_get_words_and_pictures(state, history, monkeypatch):
