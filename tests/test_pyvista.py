@@ -344,7 +344,7 @@ def test_notebooks_get_words_and_pictures(state, history, monkeypatch):
     beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementBeamANCF(2), STEEL, 0.1)
     scene = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0))
     path = scene.continuation(steps=2)
-    for thing, word in ((state, "equilibrium"), (scene, "support"), (path, "limit"),
+    for thing, word in ((state, "equilibrium"), (scene, "item"), (path, "limit"),
                         (history, "instants")):
         text = thing._repr_html_()
         assert word in text and "data:image/png;base64," in text and "<State" not in text
