@@ -161,12 +161,7 @@ class Beam(Immutable):
                 f"{self.element.order}, {self.N} degrees of freedom, {self.formulation.name}>")
 
     def replace(self, **changes: Any) -> Beam:
-        """The same beam with some arguments of its constructor changed.
-
-        Parameters
-        ----------
-        **changes
-            Arguments of :class:`Beam`, as ``material=...`` or ``width=...``.
+        """The same beam with some arguments of its constructor changed, as ``width=...``.
 
         Raises
         ------

@@ -124,17 +124,8 @@ def _length(a):
 def locate(beam: Any, point: Any) -> tuple[int, Array]:
     """The element of a material point, and its point (xi, eta) of the reference cell.
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    point
-        Its place in the reference configuration, shape (2,), or the name of an end.
-
-    Raises
-    ------
-    MeshError
-        If the point is outside the body.
+    The point is its place (x, y) in the reference configuration, or the name of an end; raises
+    MeshError outside the body.
     """
     x = as_point(point, beam.mesh)[:, None]
     e, X, outside = beam.finder(x)

@@ -35,20 +35,10 @@ def is_many(points: Any) -> bool:
 
 
 def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
-    """Many points as an array (2, n), or one as an array (2,).
+    """Many points as an array (2, n), or one as an array (2,); raises MeshError for others.
 
-    Parameters
-    ----------
-    points
-        Two numbers for one point; for many a list of pairs, or an array (2, n), whose columns are
-        points: those of an array of shape (2, 2) too, as of scikit-fem's ``mesh.p``.
-    mesh
-        The mesh of the beam, for hints in messages.
-
-    Raises
-    ------
-    MeshError
-        If it is neither, with what was probably meant.
+    Two numbers are one point. Many are a list of pairs, or an array (2, n), whose columns are
+    points: those of an array of shape (2, 2) too, as of scikit-fem's ``mesh.p``.
     """
     if not is_many(points):
         return as_point(points, mesh)
@@ -79,14 +69,11 @@ class Points:
         Parameters
         ----------
         points
-            One point, shape (2,), or many, shape (2, n) or a list, see :func:`as_points`; a
-            RigidBody for its centre of mass; what was found before, which is returned.
+            One or many, see :func:`as_points`; a RigidBody for its centre of mass; what was found.
         beam
-            The beam or rigid body that they are in, its name or number; found for each if it is not
-            given.
+            The beam or rigid body that they are in, its name or number; found for each if None.
         line
-            The number of the line of a frame that they are in; of another scene that of the chain
-            of elements of the beam.
+            The number of their line of a frame, or chain of elements of the beam.
         ask
             Raise InputError where several axes are nearest, as at a node; if False it is the first.
 

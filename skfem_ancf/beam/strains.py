@@ -126,12 +126,7 @@ class Gradients:
     def __call__(self, part: slice, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
         """Derivatives along the axis and across it, and its tangent, at some of the points.
 
-        Parameters
-        ----------
-        part
-            Which of the points.
-        xi, eta
-            Their places, (n,), or one for all of them.
+        ``part`` says which; their places xi and eta are (n,), or one for all of them.
         """
         at, e, m = self.at[part], self.e[part], self.by.shape[2]
         if np.ndim(xi):
@@ -173,8 +168,7 @@ def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
     e, X
         Elements (n,) and reference points (2, n).
     term
-        One of the terms of the beam; by default the first. Components on which its law does not
-        depend are zero.
+        One of the terms of the beam, by default the first. What its law does not take is zero.
     across
         Points and weights across the section, for the mean over sections.
     """
@@ -209,15 +203,7 @@ def _places(samples, rows, xi):
 
 
 def stress_at(beam: Any, u: Array, e: Array, X: Array, strain: Array | None = None) -> Array:
-    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) of the elements, shape (3, n).
-
-    Parameters
-    ----------
-    beam, u, e, X
-        As for :func:`strain_at`, shapes (N,), (n,) and (2, n).
-    strain
-        What that returns, if it is known, (3, n).
-    """
+    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), (3, n), of a strain that may be known."""
     E = (strain_at(beam, u, e, X) if strain is None else strain)[..., None]
     at = X[:, :, None]
     of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
@@ -226,22 +212,10 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array, strain: Array | None = No
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
-    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements.
+    """Evaluate :func:`strain_at` or :func:`stress_at`, ``of``, at points of elements.
 
-    Parameters
-    ----------
-    of, beam, u
-        The function, a beam, and the displacement of its degrees of freedom, (N,).
-    X, tind
-        Reference points, (2, npoints) or (2, nelements, npoints), and elements, (nelements,), or
-        None for all.
-    *more
-        Passed on.
-
-    Returns
-    -------
-    ndarray
-        Shape (3, nelements, npoints).
+    X is (2, npoints) or (2, nelements, npoints), tind the elements or None for all; the result is
+    (3, nelements, npoints).
     """
     tind = np.arange(beam.mesh.nelements) if tind is None else tind
     shape = len(tind), X.shape[-1]
@@ -273,18 +247,7 @@ class BeamLayer:
 
     def strain(self, term: Term, u: Array, X: Array, tind: Array | None = None,
                across: Rule | None = None) -> Array:
-        """The strain of a term, (3, nelements, npoints).
-
-        Parameters
-        ----------
-        term
-            One of the terms.
-        u, X, tind
-            As for :meth:`Beam.strain <skfem_ancf.Beam.strain>`, shapes (N,), (2, npoints) or (2,
-            nelements, npoints), and (nelements,).
-        across
-            Points and weights across the section, for the mean over sections.
-        """
+        """The strain of a term, or its mean ``across`` sections; (3, nelements, npoints)."""
         return on_grid(strain_at, self.beam, u, X, tind, term, across)
 
 
@@ -298,20 +261,10 @@ def stretched(xx: Array) -> tuple[Array, Array]:
 
 
 def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any, Any]:
-    """The axis of a cable at sections.
+    """The axis of a cable at places xi (n,) of elements e (n,).
 
-    Parameters
-    ----------
-    beam, u
-        As for :func:`strain_at`, shape (N,).
-    e, xi
-        Elements and places along them, (n,).
-
-    Returns
-    -------
-    tangents, extension, bending, kappa0
-        Unit tangents before and after, (2, 2, n); stretch less that before, change of curvature,
-        and curvature before, (n,).
+    Unit tangents before and after, (2, 2, n); stretch less that before, change of curvature, and
+    curvature before, (n,).
     """
     L, basis = beam.mesh.lengths[e], beam.interpolation
     derivatives = []

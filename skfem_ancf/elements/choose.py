@@ -27,9 +27,9 @@ def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[s
 
     The error of a beam theory is a power of h / L, with L the length of the beam: the cable leaves
     out shear, ``3 E I / (k_s G A L^2)`` of the deflection of a cantilever; a section of order 1 or
-    2 carries the shear with a factor, and leaves out the shape of the section, about
-    ``(h / L)^2 / 10`` in the continuum's own measures; order 3 carries the shear parabola, and
-    leaves out what is of the order of ``(h / L)^3``.
+    2 leaves out the shape of the section, about ``(h / L)^2 / 10``; order 3 carries the shear
+    parabola, and leaves out what is of the order of ``(h / L)^3``. The element is a quintic cable,
+    or has cubic sections, or linear ones on a beam shorter than 20 heights.
 
     Parameters
     ----------
@@ -39,12 +39,6 @@ def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[s
         Fields of the section that will be looked at: names from :data:`ORDER_OF_FIELD`.
     tolerance
         Relative error of the deflection that the theory may have; what the mesh adds is not in it.
-
-    Returns
-    -------
-    ElementBeam
-        A quintic cable, or an element with cubic sections of order 2, 3 or 5, or linear sections
-        on a beam shorter than 20 heights.
 
     Raises
     ------

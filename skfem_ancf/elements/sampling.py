@@ -100,18 +100,8 @@ def _lobatto(n: int) -> tuple[float, ...]:
 def missed(m: int, n: int) -> list[Array]:
     """What n Gauss points of the slope of a field with m derivatives at each node miss.
 
-    Parameters
-    ----------
-    m
-        Derivatives along X that are degrees of freedom, the 0th included.
-    n
-        Number of Gauss points.
-
-    Returns
-    -------
-    list of ndarray
-        Combinations of those of an element of length 1, each of shape (2 m,): the coefficients of
-        the Legendre polynomials of degree n to 2 m - 2 in the slope.
+    Combinations of those of an element of length 1, each of shape (2 m,): the coefficients of the
+    Legendre polynomials of degree n to 2 m - 2 in the slope.
     """
     x, w = gauss(2 * m)
     out = []

@@ -32,18 +32,11 @@ def beside(X: Array) -> Array:
 
 def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float | None = None
           ) -> Array:
-    """The numbers of the elements that begin where a function jumps, as stations.
+    """Stations at which a function jumps between elements: the numbers of those that begin there.
 
-    Parameters
-    ----------
-    ask
-        From reference points (2, n, k) and elements (n,) to its values there, (..., n, k).
-    n
-        How many elements there are.
-    eta
-        Places across sections, shape (k,).
-    size
-        A change that is a jump; a thousandth of the largest value by default.
+    ``ask`` gives its values (..., n, k) at reference points (2, n, k) of elements (n,), at the n
+    elements and the places eta (k,) across. ``size`` is a change that is a jump; by default a
+    thousandth of the largest value.
 
     Examples
     --------

@@ -23,28 +23,13 @@ LEAST, ROUND = 8, 40
 class Moving(Measure):
     """The measure of a width whose pieces have ends ``a + b / h``: thicknesses that stay.
 
+    ``pieces_of`` gives the pieces at heights h (..., 1), with ends of this shape; ``height`` is the
+    largest, ``degree`` that of the series.
+
     Rules across have the same points all along a beam, for strains are sampled along it at fixed
     parts of the height. Their weights change instead: those of Gauss times the Legendre series of
-    the width there, cut after a degree. The series has all moments of the width up to this degree,
-    so that integrals of polynomials of at most this degree are exact, wherever the width jumps;
-    single weights may be negative.
-
-    Parameters
-    ----------
-    pieces_of
-        Called with heights h, (..., 1), it returns the pieces of the width from the bottom to the
-        top, with ends of this shape.
-    height
-        Where intervals of recovered fields have their places: the largest.
-    degree
-        That of the series.
-
-    Attributes
-    ----------
-    pieces
-        Those at that height.
-    mean
-        Integral of their width over eta.
+    the width there. The series has all moments of the width up to its degree, so that integrals of
+    polynomials of at most this degree are exact; single weights may be negative.
     """
 
     low, high, moves = 0.0, 1.0, True
