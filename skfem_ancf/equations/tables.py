@@ -424,7 +424,7 @@ def _parts(packs, elements, contacts):
             *["elements"] * elements, *["contacts"] * contacts)
 
 
-def packed(values, dtype=np.float64):
+def packed(values: Any, dtype: Any = np.float64) -> Any:
     """An array as compiled code takes it: contiguous and writable, of one type."""
     return np.require(values, dtype, ["C", "W"])
 

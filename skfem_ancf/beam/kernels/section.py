@@ -196,7 +196,7 @@ class Samples(NamedTuple):
 
 
 @lru_cache(64)
-def samples_of(at_xx, at_yy, at_xy, eta):
+def samples_of(at_xx: Any, at_yy: Any, at_xy: Any, eta: Any) -> Samples:
     """The :class:`Samples` of places along the axis of xx, yy and xy, and of places across."""
     along, across = (np.union1d(at, at_xy) for at in (at_xx, at_yy))
     places, n, m = np.union1d(along, across), len(along) * len(eta), len(eta)
