@@ -4,6 +4,8 @@ Elements are the last axis of what is of rows, samples and points, and the first
 Displacements may be complex.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ...core.source import primitive
@@ -250,12 +252,12 @@ def put_columns(B, out):
     out[:, :, 2:], out[:, :, :2] = B, -B[:, :, n - 2:n]
 
 
-def weights_of(t):
+def weights_of(t: Any) -> Any:
     """Weights of the points, (points, ne) or (points, 1)."""
     return _of_elements(t.weights, t.at[:, OF_WEIGHTS])
 
 
-def add_held_energies(t, u, out):
+def add_held_energies(t: Any, u: Any, out: Any) -> None:
     """Add the energies (ne,) of the constant stiffness."""
     if len(t.C):
         U = gathered(t, 0, len(t.start), u).reshape(t.C.shape[1], 1, -1)
