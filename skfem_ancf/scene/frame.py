@@ -18,7 +18,8 @@ from ..core.errors import (InputError, require_finite, require_finite_scalar, re
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
 from ..actions.loads import DeadLoad, EndMoment, Load
-from ..mesh.frame_graph import Net, mapping_of, net_from_meshio
+from ..mesh.frame_files import net_from_meshio
+from ..mesh.frame_graph import Net, mapping_of
 from .scene import Scene
 
 if TYPE_CHECKING:

@@ -1,0 +1,234 @@
+"""Frames from meshes of meshio: each cell a line, with the names of its sets."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import (FileError, InputError, MeshError, require_finite, require_names,
+                           require_path, shown)
+from ..core.types import Array
+from .frame_graph import Net
+
+#: Kinds of cells of meshio that are lines: the ends first, then what is between them in order.
+LINE = re.compile("line([0-9]*)")
+
+
+def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
+                    tol: float | None = None) -> Net:
+    """The lines of a mesh of meshio, each cell one, with its names.
+
+    Parameters
+    ----------
+    mesh
+        A ``meshio.Mesh``, or a file that meshio reads: Gmsh's ``.msh``, ``.vtu`` and others. Cells
+        "line" are straight, "line3", "line4", ... are polynomials through their points, "vertex"
+        gives names to nodes.
+    groups
+        Names of the sets of lines that are beams. By default those in ``named``, and those that
+        share no line with another set.
+    named
+        Names that are asked for elsewhere.
+    tol
+        As for :class:`Net`.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    MeshError
+        If it holds no lines, cells of other kinds, or points off the plane z = 0.
+    NameUnknown
+        If there is no set of a name.
+    """
+    mesh = _mesh_of(mesh)
+    if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
+        raise InputError(f"groups are names of sets of lines, got {shown(groups)}")
+    points = require_finite("the points of the mesh", mesh.points)
+    kinds = {block.type for block in mesh.cells}
+    odd = sorted(kind for kind in kinds if kind != "vertex" and not LINE.fullmatch(kind))
+    if odd:
+        raise MeshError(f"the mesh has cells of the kinds {odd}, which are no lines: a frame is "
+                        "made of 'line', 'line3', 'line4', ..., and 'vertex' names nodes; leave "
+                        "the others out of the mesh")
+    blocks = {k: block for k, block in enumerate(mesh.cells) if LINE.fullmatch(block.type)}
+    cells = [_ends_first(points, cell) for block in blocks.values()
+             for cell in np.asarray(block.data, dtype=np.int64)]
+    if not cells:
+        raise MeshError(f"the mesh has no lines: its cells are {sorted(kinds) or 'none'}")
+    # the same cell may be there once for each set that it is in
+    number: dict[tuple[int, ...], int] = {}
+    cell_number = np.array([number.setdefault(min(cell, cell[1::-1] + cell[:1:-1]), len(number))
+                            for cell in map(tuple, map(np.ndarray.tolist, cells))])
+    lines = [cells[k] for k in np.unique(cell_number, return_index=True)[1]]
+    used, ends = np.unique([cell[:2] for cell in lines], return_inverse=True)
+    if points.shape[1] > 2:
+        inside = np.unique(np.concatenate(lines))
+        off = np.abs(points[inside, 2])
+        if np.max(off) > 1e-6 * np.max(np.ptp(points[inside, :2], axis=0)):
+            k = int(inside[np.argmax(off)])
+            raise MeshError(f"the point {k} of the mesh is at z = {points[k, 2]:.9g}: a frame lies "
+                            "in the plane z = 0")
+    curves = {k: _Polynomial(points[cell, :2].T) for k, cell in enumerate(lines) if len(cell) > 2}
+    first = dict(zip(blocks, np.cumsum([0] + [len(b.data) for b in blocks.values()])))
+    wanted = [*named, *([] if groups is None else [groups] if isinstance(groups, str) else groups)]
+    sets, nodes, lost = _names(mesh, {k: cell_number[first[k]:first[k] + len(block.data)]
+                                      for k, block in blocks.items()}, used, wanted)
+    if groups is not None:
+        chosen = require_names("set of lines in groups", groups, sets)
+        beams = tuple(name for name in sets if name in chosen)
+    else:
+        taken = np.bincount(np.concatenate([*map(np.unique, sets.values()), []]).astype(int),
+                            minlength=len(lines))
+        beams = tuple(name for name, some in sets.items()
+                      if name in named or np.all(taken[some] == 1))
+    return Net(points[used, :2], ends.reshape(-1, 2), sets, nodes, curves, tol, beams, lost)
+
+
+def _mesh_of(mesh):
+    """A mesh of meshio, or the one that is in a file."""
+    import meshio
+
+    if isinstance(mesh, (str, Path)):
+        path = require_path("mesh", mesh)
+        try:
+            mesh = meshio.read(path)
+        except (Exception, SystemExit) as error:  # meshio ends the process where it knows no format
+            raise FileError(f"{path} cannot be read as a mesh: {error}") from None
+        if path.suffix.lower() == ".inp":
+            _require_sets_of_abaqus(path)
+    if not isinstance(mesh, meshio.Mesh):
+        raise InputError(f"mesh must be a meshio.Mesh or the name of a file, got {shown(mesh)}")
+    return mesh
+
+
+def _require_sets_of_abaqus(path):
+    """Raise MeshError for element sets of a file of Abaqus that meshio 5 takes for others.
+
+    It counts the names at ``*ELEMENT`` as if each block had one of its own, and keeps one block of
+    a name; sets of sets it takes for blocks in their order.
+    """
+    blocks, sets, keyword = [], [], ""
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        if line.startswith("*"):
+            keyword = line.partition(",")[0].strip().upper()
+            found = re.search(r"ELSET\s*=\s*([^,]*)", line, re.IGNORECASE)
+            name = found.group(1).strip() if found else ""
+            if keyword == "*ELEMENT":
+                blocks.append(name)
+            elif keyword == "*ELSET":
+                sets.append(name)
+        elif keyword == "*ELSET" and re.match(r"\s*[A-Za-z_]", line):
+            raise MeshError(f"{path}: the element set {sets[-1]!r} holds names of sets, which are "
+                            "not read: list the numbers of its elements")
+    named = [name for name in blocks if name]
+    again = sorted({name for name in named + sets if (named + sets).count(name) > 1})
+    if again or blocks[:len(named)] != named:
+        what = f"{again[0]!r} is there twice" if again else "a block has none before one that has"
+        raise MeshError(f"{path}: element sets are read if each has one place, at *ELSET or at an "
+                        f"*ELEMENT, ELSET=... before which others have names, too: {what}; write "
+                        "*ELSET with the numbers of all its elements")
+
+
+def _ends_first(points, cell):
+    """The points of a line: both ends, then what is between them, as in all formats but Abaqus.
+
+    Its quadratic lines are end, middle, end: of three points those farthest apart are the ends.
+    """
+    if len(cell) != 3:
+        return cell
+    a, b, c = points[cell]
+    if np.linalg.norm(c - a) > max(np.linalg.norm(b - a), np.linalg.norm(c - b)):
+        return cell[[0, 2, 1]]
+    if np.linalg.norm(c - b) > np.linalg.norm(b - a):
+        raise MeshError(f"the line through the points {cell.tolist()} of the mesh does not have "
+                        "its middle between its ends: the order is end, end, middle, or in files "
+                        "of Abaqus end, middle, end")
+    return cell
+
+
+def _names(mesh, blocks, used, wanted):
+    """Lines and nodes by name, from cell sets, point sets, and physical groups of Gmsh.
+
+    And by name a point that is no end of a line.
+    """
+    sets = {name: parts for name, parts in mesh.cell_sets.items()
+            if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
+    groups, found = {}, dict[str, list[Any]]()
+    for name, parts in sets.items():
+        if len(parts) > len(mesh.cells):
+            raise MeshError(f"the cell set {name!r} has {len(parts)} parts, the mesh "
+                            f"{len(mesh.cells)} blocks of cells: it is a set of sets; name the "
+                            "cells themselves")
+        parts = {k: _entries(name, part, len(mesh.cells[k].data)) for k, part in enumerate(parts)
+                 if part is not None}
+        some = [blocks[k][part] for k, part in parts.items() if k in blocks and len(part)]
+        if some:
+            groups[name] = np.concatenate(some)
+        for k, part in parts.items():
+            if k not in blocks and len(part):
+                found.setdefault(name, []).append(np.ravel(mesh.cells[k].data)[part])
+    for name, part in mesh.point_sets.items():
+        part = _entries(name, part, len(mesh.points))
+        if len(part):
+            found[name] = [part]
+    nodes, lost = {}, {}
+    for name, parts in found.items():
+        at = np.concatenate(parts).astype(np.int64)
+        on = np.isin(at, used)
+        if np.any(on):
+            nodes[name] = np.searchsorted(used, at[on])
+        if not np.all(on):
+            lost[name] = int(at[~on][0])
+    return groups, nodes, lost
+
+
+def _entries(name, part, n):
+    """Numbers of a set of a mesh, (k,)."""
+    try:
+        out = np.ravel(np.asarray(part))
+    except ValueError:  # of sets
+        out = np.zeros(1, dtype=object)
+    if len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n):
+        raise MeshError(f"the set {name!r} of the mesh must hold numbers from 0 to {n - 1}, got "
+                        f"{shown(part)}")
+    return out.astype(np.int64)
+
+
+def _numbered(mesh, wanted):
+    """Cell sets that a file has as numbers: physical groups, or what meshio writes of names.
+
+    Into formats without names it writes data called "a-b", which are 0 in the set a, 1 in b. Other
+    programs have such names, too: they are sets where one of them is wanted.
+    """
+    sets = {}
+    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
+    for key, parts in mesh.cell_data.items():
+        found = np.unique(np.concatenate([np.ravel(part) for part in parts]))
+        if key == "gmsh:physical":
+            known = {int(k): names.get(int(k), str(int(k))) for k in found if k}
+        elif set(wanted) & set(key.split("-")) and found.dtype.kind in "iu" and (
+                -1 <= found[0] and found[-1] < len(key.split("-"))):
+            known = dict(enumerate(key.split("-")))
+        else:
+            continue
+        for number, name in known.items():
+            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
+    return sets
+
+
+class _Polynomial:
+    """The polynomial through two ends, at s = 0 and 1, and points evenly between them."""
+
+    def __init__(self, points: Array) -> None:
+        self.points = points[:, [0, *range(2, points.shape[1]), 1]]
+
+    def __call__(self, s: Array) -> Array:
+        n = self.points.shape[1]
+        t, k = (n - 1) * np.asarray(s)[..., None], np.arange(n)
+        weights = [np.prod((t - k[k != i]) / (i - k[k != i]), axis=-1) for i in k]
+        return np.tensordot(self.points, weights, 1)
