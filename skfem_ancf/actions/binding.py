@@ -83,6 +83,7 @@ class _Force(ForceElement):
         if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < layout.N):
             raise InputError(f"dofs of {item!r} must be numbers from 0 to {layout.N - 1}, got "
                              f"{shown(item.dofs)}")
+        self.resists = hasattr(item, "force")
         self._forced = hasattr(item, "energy") or hasattr(item, "force")
         pairs = np.unique(dofs // 2) if self._forced else dofs[:0]
         self._dofs = (2 * pairs[:, None] + np.arange(2)).ravel()

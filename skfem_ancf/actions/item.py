@@ -119,6 +119,10 @@ class Item(Immutable):
         """True if both were made at once: one is a copy of the other, bound or not."""
         return self._key == getattr(other, "_key", None)
 
+    def __repr__(self) -> str:
+        parts = [type(self).__name__, self.name]
+        return f"<{' '.join(part for part in parts if part)}>"
+
     def _with(self, **changes):
         """A copy with other attributes."""
         other = self._thawed()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...core.errors import AncfError, InputError, require_finite, shown, warnings_as_errors
-from ..item import Item
+from ...core.errors import (AncfError, InputError, require_finite, require_slope, shown,
+                            warnings_as_errors)
+from ...core.origin import ours
+from ..item import Item, beside
 from ..places import Vector
 
 if TYPE_CHECKING:
@@ -92,6 +95,8 @@ class ForceElement(Item):
     """
 
     distributed = False
+    #: Its force may depend on velocities.
+    resists = True
     along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None
     links: Any = ()
     groups: Any = ()
@@ -345,11 +350,24 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
     y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
     K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))
+    if not ours(getattr(bound, "item", bound)):
+        beside(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
     if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
                          "symmetric: it has no potential. Say so in its class: symmetric = False")
     if bound.potential_at(y, 0.0) is not None:
         _require_potential(bound, y)
+
+
+def _require_derivatives(bound, x, u, d):
+    """Raise InputError unless stiffness and resistance are the derivatives of the force."""
+    v, d = u.reshape(x.shape), d.reshape(x.shape)
+    for name, at in (("stiffness", lambda s: (x + v + s * d, 0.0 * d, 0.0)),
+                     ("resistance", lambda s: (x, v + s * d, 0.0))):
+        before, now, after = (np.asarray(bound.force(*at(s))) for s in (-1.0, 0.0, 1.0))
+        slope = np.tensordot(getattr(bound, name)(*at(0.0)), d, 2)
+        require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)", after - before,
+                      2.0 * slope, 1e-12 * np.abs(now).max())
 
 
 def _require_potential(bound, x):

@@ -89,7 +89,7 @@ class Forces:
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         self.contacts = Contacts(self.elements)
-        self.resists = bool(self.own) or any(_resists(part) for part in self.parts) or any(
+        self.resists = any(e.resists for e in self.own) or any(_resists(part) for part in self.parts) or any(
             one.damping > 0.0 for one in self.contacts.obstacles)
 
     def _coupling(self, k):

@@ -1,0 +1,283 @@
+"""All that acts, of the package and of a user's, through every solver."""
+
+import copy
+import inspect
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from skfem import LinearForm
+
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, InputError, Item, MeshBeam, Scene,
+                        StVenantKirchhoff, sweep)
+from skfem_ancf.actions.forces import point
+from skfem_ancf.actions.registry import ITEMS
+from skfem_ancf.dynamics import SCHEMES
+
+MATERIAL = StVenantKirchhoff(2e7, 0.3, 1000.0, thermal_expansion=1e-5)
+
+
+def ramp(t):
+    return 0.02 * np.asarray(t) ** 2
+
+
+def rising(t):
+    return np.array([1.0 + 0.0 * np.asarray(t), ramp(t)])
+
+
+def law(t, tip):
+    return 0.1 - 2.0 * tip.position - 0.1 * tip.velocity
+
+
+@LinearForm
+def upwards(v, w):
+    return 100.0 * v[1]
+
+
+#: Arguments of each item on the first of two beams that overlap from (0.5, 0) to (1, 0).
+ARGUMENTS = {
+    "clamp": ("right", 0), "pin": ("right", 0), "fix": ("right", "r^2", 0.0, 0),
+    "motor": ((0, "right"), ramp), "gravity": ((0.0, -9.81),),
+    "point_force": ((0.0, 1.0), (1.0, 0.0), 0), "follower_force": ((0.0, 1.0), (1.0, 0.0), 0),
+    "line_load": ((0.0, 1.0), 0), "traction": ("top", (0.0, 10.0), 0), "pressure": ("top", 10.0, 0),
+    "temperature": (10.0, 0), "eigenstrain": (1e-4, None, None, 0), "moment": ("right", 0.1, 0),
+    "load": (upwards, None, 0), "spring": (50.0, ((0, (1.0, 0.0)), (1.0, 1.0)), 1.0),
+    "torsional_spring": (1.0, "right", 0.1, 0), "control": (law, (0, (1.0, 0.0)), "force", None,
+                                                            {"tip": (0, (1.0, 0.0))}),
+    "foundation": (1e3, "bottom", False, 1.0, 0), "drag": (1.0, 1.0, 0.1),
+    "point_mass": (0.5, (1.0, 0.0), 0.01, 0), "obstacle": (Circle((1.0, -0.2), 0.14),),
+    "hinge": ((0, 1), (1.0, 0.0)), "weld": ((0, 1), (1.0, 0.0)),
+    "line": ((1.0, 0.0), (1.0, 0.5), 0), "circle": ((1.0, 0.0), (1.0, -1.0), 0),
+    "position": ((1.0, 0.0), rising, 0), "angle": ("right", ramp, 0),
+    "turn": ((0, "right"), (1, "left"), ramp), "plane": ("right", 0),
+    "sleeve": ((0, (1.0, 0.0)), 1), "slot": ((0, (1.0, 0.0)), "ground", (1.0, 0.2)),
+}
+
+
+class Tip(Item):
+    """On the end of the first beam; perhaps all degrees of freedom are named."""
+
+    named = True
+
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.r = point(layout, 0, (1.0, 0.0))
+        if self.named:
+            bound.dofs = bound.r.dofs
+        return bound
+
+    def way(self, u):
+        return self.r(u) - self.r.start
+
+
+class Quartic(Tip):
+    def energy(self, u, t):
+        d = self.way(u)
+        return 30.0 * (d @ d) + 500.0 * (d @ d) ** 2
+
+
+class Everywhere(Quartic):
+    named = False
+
+
+class Forced(Tip):
+    """Its force alone."""
+
+    def force(self, u, v, t):
+        d = self.way(u)
+        f = -(60.0 + 2000.0 * (d @ d)) * d
+        return f[0] * self.r.row((1.0, 0.0), len(u)) + f[1] * self.r.row((0.0, 1.0), len(u))
+
+
+class Pull(Tip):
+    """The same by its force and derivatives, with a dashpot; t is the load factor in statics."""
+
+    def force(self, u, v, t):
+        d = self.way(u)
+        out = np.zeros(u.shape, dtype=np.result_type(u, v))
+        for k, f in enumerate(-(60.0 + 2000.0 * (d @ d)) * d + t * np.array([0.0, 0.5])
+                              - self.way(v)):
+            out[self.r.dofs[k]] += f * self.r.weights[k]
+        return out
+
+    def stiffness(self, u, v, t):
+        d = self.way(u)
+        K = -(60.0 + 2000.0 * (d @ d)) * np.eye(2) - 4000.0 * np.outer(d, d)
+        rows = np.array([self.r.row(e, len(u)) for e in np.eye(2)])
+        return rows.T @ K @ rows
+
+
+class Bob(Tip):
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.rows = np.array([bound.r.row(e, layout.N) for e in np.eye(2)])
+        return bound
+
+    def mass(self):
+        return 0.5 * self.rows.T @ self.rows
+
+
+class Rail(Tip):
+    """The end stays on a parabola."""
+
+    moving = False
+
+    def constraint(self, u, t):
+        x, y = self.way(u)
+        return np.array([y - 0.3 * x * x])
+
+
+class Lift(Tip):
+    """The end is raised by a function of time."""
+
+    def constraint(self, u, t):
+        return np.array([self.way(u)[1] - ramp(t)])
+
+    def jacobian(self, u, t):
+        return self.r.row((0.0, 1.0), len(u))[None]
+
+
+CUSTOM = (Quartic, Pull, Bob, Rail, Lift)
+
+
+def item_of(name):
+    return ITEMS[name](*ARGUMENTS[name]) if name in ITEMS else name()
+
+
+def bare(n=2):
+    """Two beams, the first clamped at its left end, the second at its right end."""
+    beams = [Beam(MeshBeam.init_line(x + np.linspace(0.0, 1.0, n + 1), height=0.1),
+                  ElementBeamANCF(2), MATERIAL, width=0.1) for x in (0.0, 0.5)]
+    return Scene(*beams).clamp("left", 0).clamp("right", 1)
+
+
+def through(item):
+    """What all solvers make of a scene with the item."""
+    return bare().gravity((0.0, -1.0)).add(item)
+
+
+def test_every_item_has_arguments_here():
+    assert set(ARGUMENTS) == set(ITEMS)
+
+
+@pytest.mark.parametrize("name", [*ITEMS, *CUSTOM])
+def test_items_through_all_solvers(name):
+    scene = through(item_of(name))
+    state = scene.solve_static()
+    assert state.converged and str(state.verdict).startswith("stable")
+    assert np.abs(scene.system.constraints.constraint(state.u, 1.0)).max(initial=0.0) < 1e-9
+    assert np.all(scene.modes(2, state).frequencies > 0)
+    path = scene.continuation(max_load=1.0, ds=0.5)
+    assert_allclose(path.u[-1], state.u, rtol=0, atol=1e-6)
+    assert path.stable[-1] is not False
+    for scheme in SCHEMES:
+        try:
+            history = scene.integrate(2e-3, 1e-3, scheme=scheme)
+        except InputError as error:  # of damping, of joints that move
+            assert scheme in ("energy-momentum-4", "gauss") and ": take '" in str(error)
+            continue
+        assert len(history) == 3 and np.all(np.isfinite(history.total_energy))
+    again = scene.integrate(2e-3, 1e-3, scheme=scheme, start=history.state(1), t_start=1e-3)
+    assert_allclose(again.u[-1], history.u[-1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [*ITEMS, *CUSTOM])
+def test_items_are_kept_and_put_on_other_meshes(name):
+    scene = through(item_of(name))
+    known = scene.solve_linear() if name != "obstacle" else scene.solve_static()
+    for other in (copy.copy(scene), pickle.loads(pickle.dumps(scene))):
+        solve = other.solve_linear if name != "obstacle" else other.solve_static
+        assert np.array_equal(solve().u, known.u)
+    finer = scene.replace(beams=[b.replace(mesh=b.mesh.refined()) for b in scene.beams])
+    assert [type(one) for one in finer.items] == [type(one) for one in scene.items]
+    coarse, fine = (s.solve_static().position((1.0, 0.0), 0) for s in (scene, finer))
+    assert_allclose(fine, coarse, rtol=0, atol=1e-2)
+    scene.state().plot("displacement")
+
+
+@pytest.mark.parametrize("name", ITEMS)
+def test_methods_of_a_scene_add_items(name):
+    added, method = through(item_of(name)), bare().gravity((0.0, -1.0))
+    if hasattr(Scene, name) and name not in ("hinge", "weld"):
+        getattr(method, name)(*ARGUMENTS[name])
+        names = list(inspect.signature(getattr(Scene, name)).parameters)[1:]
+        assert names == list(inspect.signature(ITEMS[name]).parameters)[:len(names)] or (
+            name == "obstacle")
+    else:
+        arguments = zip(inspect.signature(ITEMS[name]).parameters, ARGUMENTS[name])
+        method.joint(name, **dict(arguments))
+    assert np.array_equal(added.solve_static().u, method.solve_static().u)
+    assert repr(added.items[-1]) == repr(method.items[-1])
+
+
+def pulled(load):
+    return bare().add(Quartic()).point_force((0.0, load), at=(1.0, 0.0), beam=0).solve_static()
+
+
+def measured(state):
+    return state.displacement((1.0, 0.0), 0)[1]
+
+
+def test_a_sweep_of_a_custom_item():
+    found = sweep(pulled, {"load": [1.0, 2.0]}, measured)
+    assert not found.failures and 1.5 < found["value"][1] / found["value"][0] < 2.0
+
+
+def test_an_energy_and_its_force_are_one():
+    """By differences of the energy, by the force alone, and with its stiffness."""
+    scenes = [bare().gravity((0.0, -9.81)).add(item) for item in (
+        Quartic(), Everywhere(), Forced())]
+    known = scenes[0].solve_static()
+    for scene in scenes[1:]:
+        assert_allclose(scene.solve_static().u, known.u, rtol=0, atol=1e-9)
+    history = scenes[0].integrate(0.02, 1e-3)
+    assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
+
+
+def test_a_constraint_is_that_of_a_joint():
+    one = bare().gravity((0.0, -9.81)).add(item := Lift())
+    two = bare().gravity((0.0, -9.81))
+    joint = two.joint("position", at=(1.0, 0.0), beam=0, r=rising)
+    a, b = one.solve_static(), two.solve_static()
+    assert a.displacement((1.0, 0.0), 0)[1] == pytest.approx(0.02, abs=1e-12)
+    assert a.joint_force(item)[0] == pytest.approx(b.joint_force(joint)[1], rel=0.05)
+
+
+class Wrong(Tip):
+    """A spring along y, or a force along y of what moves along x, that is wrong in one way."""
+
+    def __init__(self, what):
+        self.what, self.symmetric = what, what != "unsymmetric"
+
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.x, bound.y = (bound.r.row(e, layout.N) for e in np.eye(2))
+        return bound
+
+    def force(self, u, v, t):
+        if self.what == "raises":
+            raise KeyError("x")
+        return np.zeros(3) if self.what == "shape" else -50.0 * self.y * (
+            (self.x if "symm" in self.what else self.y) @ u)
+
+    def stiffness(self, u, v, t):
+        size = 40.0 if self.what == "stiffness" else 50.0
+        return -size * np.outer(self.y, self.x if "symm" in self.what else self.y)
+
+
+@pytest.mark.parametrize("what, words", [
+    ("shape", "must have the shape"), ("symmetry", "symmetric = False"),
+    ("stiffness", "not the derivative of force"), ("raises", "fails in the reference")])
+def test_what_does_not_fit_is_said(what, words):
+    scene = bare()
+    with pytest.raises(InputError, match=words):
+        scene.add(Wrong(what))
+    assert len(scene.items) == 2
+    assert scene.add(Wrong("unsymmetric")).solve_linear().converged
+
+
+@pytest.mark.parametrize("thing", [3, None, Beam, Tip()])
+def test_what_is_no_item_is_said(thing):
+    with pytest.raises(InputError, match=r"derive yours from|does nothing"):
+        bare().add(thing)
