@@ -1,16 +1,17 @@
 """All items of the package by name. A new item is one file and one line here."""
 
+from typing import Any
+
 from .axial import FollowerForce, LineLoad
 from .eigenstrain import EigenStrain, Temperature
 from .forces import Control, Drag, Foundation, PointMass, Spring, TorsionalSpring
-from .item import Item
 from .joints import JOINTS, Motor
 from .loads import EndMoment, FormLoad, PointForce, Pressure, Traction, Weight
 from .obstacles import Obstacle
 from .supports import Clamp, Pin, Support
 
 #: Where a :class:`~skfem_ancf.Scene` has a method of the name, that adds the item.
-ITEMS: dict[str, type[Item]] = {
+ITEMS: dict[str, Any] = {
     "clamp": Clamp,
     "pin": Pin,
     "fix": Support,

@@ -89,8 +89,8 @@ class Forces:
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         self.contacts = Contacts(self.elements)
-        self.resists = any(e.resists for e in self.own) or any(_resists(part) for part in self.parts) or any(
-            one.damping > 0.0 for one in self.contacts.obstacles)
+        self.resists = (any(e.resists for e in self.own) or any(map(_resists, self.parts))
+                        or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _coupling(self, k):
         """Rows, columns, weights and places of the derivatives that element k adds."""
