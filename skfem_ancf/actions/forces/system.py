@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: Kinds that the texts know.
 KINDS = 4
-#: What the Forces of scenes without any have, which is made once.
-_NONE: dict[str, Any] = {}
 
 
 class Forces:
@@ -53,9 +51,6 @@ class Forces:
     """
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
-        if not elements and _NONE:
-            vars(self).update(_NONE, _N=N, _bandwidth=bandwidth)
-            return
         self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
         parts: list[Part] = []
         self.own = []
@@ -388,9 +383,6 @@ class Forces:
                 if factor != 0.0:
                     found = found + factor * np.asarray(element.resistance(x, y, t))
                 out[places] -= found.ravel()
-
-
-_NONE.update(vars(Forces((), 0, 0)))
 
 
 def _no_tables():
