@@ -41,13 +41,23 @@ class GeneralizedAlpha(Scheme):
         rho = require_finite_scalar("rho_inf", rho_inf)
         if not 0.0 <= rho <= 1.0:
             raise InputError(f"rho_inf must lie in [0, 1], got {rho!r}")
-        self._set((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
+        self.set_parameters((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
 
-    def _set(self, alpha_m, alpha_f):
+    def set_parameters(self, alpha_m: float, alpha_f: float) -> None:
+        """Set both, and gamma and beta of second order with the least damping of low frequencies.
+
+        Parameters
+        ----------
+        alpha_m, alpha_f
+            Parts of the old accelerations in the means.
+        """
         self.alpha_m, self.alpha_f = alpha_m, alpha_f
         self.gamma = 0.5 + alpha_f - alpha_m
         self.beta = 0.25 * (self.gamma + 0.5) ** 2
-        self.error_constant = abs(self.beta - 1.0 / 6.0)
+
+    @property
+    def error_constant(self) -> float:  # type: ignore[override]
+        return abs(self.beta - 1.0 / 6.0)
 
     @property
     def parameters(self) -> tuple[float, ...]:  # type: ignore[override]
@@ -83,7 +93,7 @@ class HHT(GeneralizedAlpha):
         alpha = require_finite_scalar("alpha", alpha)
         if not 0.0 <= alpha <= 1.0 / 3.0:
             raise InputError(f"alpha must lie in [0, 1/3], got {alpha!r}")
-        self._set(0.0, alpha)
+        self.set_parameters(0.0, alpha)
 
 
 class Newmark(GeneralizedAlpha):
@@ -103,7 +113,7 @@ class Newmark(GeneralizedAlpha):
     name = "newmark"
 
     def __init__(self, beta: float = 0.25, gamma: float = 0.5) -> None:
-        self._set(0.0, 0.0)
+        self.set_parameters(0.0, 0.0)
         self.beta = require_finite_scalar("beta", beta)
         self.gamma = require_finite_scalar("gamma", gamma)
         if self.gamma < 0.5 or self.beta < 0.5 * self.gamma:
