@@ -89,6 +89,11 @@ class BandMatrix:
     symmetric
         Store and factorise the lower half only: Cholesky, or LU where it is not positive
         definite.
+
+    Other Parameters
+    ----------------
+    i, j, values
+        Rows, columns and values of entries, shape (k,).
     """
 
     def __init__(self, n: int, bandwidth: int, symmetric: bool = True) -> None:
@@ -148,15 +153,7 @@ class BandMatrix:
         return np.asarray(j) * self._ld + self._diagonal + np.asarray(i) - np.asarray(j)
 
     def add(self, i: ArrayLike, j: ArrayLike, values: ArrayLike) -> None:
-        """Add entries; of a symmetric matrix those above the diagonal are ignored.
-
-        Parameters
-        ----------
-        i, j
-            Rows and columns, shapes (k,).
-        values
-            Shape (k,).
-        """
+        """Add entries; of a symmetric matrix those above the diagonal are ignored."""
         i, j, values = map(np.atleast_1d, (i, j, values))
         if self.symmetric:
             keep = i >= j
@@ -182,15 +179,7 @@ class BandMatrix:
         return blas.dgbmv(self.n, self.n, k, k, 1.0, self.ab[k:], v)
 
     def combine(self, a: float, A: BandMatrix, b: float, B: BandMatrix) -> BandMatrix:
-        """Fill with ``a A + b B``.
-
-        Parameters
-        ----------
-        a, b
-            Numbers.
-        A, B
-            Matrices of the same layout.
-        """
+        """Fill with ``a A + b B``."""
         np.multiply(A._flat, a, out=self._flat)
         self._flat += b * B._flat
         self._factor = None

@@ -110,6 +110,16 @@ class Condensed:
     K
         The matrix of the beams, which is filled before :meth:`factorize`.
 
+    Other Parameters
+    ----------------
+    u, t, multipliers
+        Where the joints are linearised: displacement (N,), time, multipliers (m,).
+    b, R, phi
+        Right-hand sides: forces (N,), and what the equations of the nodes should change by, (m,);
+        or columns of them, which together take half as long.
+    du, dm
+        Take the solution, shapes (N,) and (m,).
+
     Attributes
     ----------
     size : int
@@ -168,11 +178,6 @@ class Condensed:
     def factorize(self, u: Array, multipliers: Array) -> None:
         """Factorise what the matrix holds; of one that is not symmetric its symmetric part.
 
-        Parameters
-        ----------
-        u, multipliers
-            Where the joints are linearised, shapes (N,) and (m,).
-
         Raises
         ------
         numpy.linalg.LinAlgError, RuntimeError
@@ -227,12 +232,6 @@ class Condensed:
     def solve(self, b: Array, phi: Array) -> tuple[Array, Array]:
         """Solve with the factors.
 
-        Parameters
-        ----------
-        b, phi
-            Forces (N,), and what the equations of the nodes should change by, (m,); or columns of
-            them, shapes (N, k) and (m, k), which together take half as long.
-
         Returns
         -------
         x, multipliers
@@ -253,17 +252,7 @@ class Condensed:
 
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:
-        """Solve; without right-hand sides factorise. False if that fails.
-
-        Parameters
-        ----------
-        t, u, multipliers
-            Time, and where the joints are linearised, shapes (N,) and (m,).
-        R, phi
-            Right-hand sides, shapes (N,) and (m,), or empty.
-        du, dm
-            The solution, shapes (N,) and (m,).
-        """
+        """Solve; without right-hand sides factorise. False if that fails."""
         try:
             if len(R):
                 du[:], dm[:] = self.solve(R, phi)

@@ -58,6 +58,18 @@ class Constraints:
         A function that returns that of force elements in the stress-free state, sparse, (N, N);
         None where there are none.
 
+    Other Parameters
+    ----------------
+    u, v, t
+        Displacement and a direction or velocity, shape (N,), and time; with 0 and 1 those at both
+        ends of a step.
+    multipliers
+        Of the equations, shape (m,).
+    load
+        Factor on prescribed displacements.
+    rows, columns, values
+        Entries of a matrix, shape (k,).
+
     Attributes
     ----------
     all_joints, joints : list
@@ -172,13 +184,6 @@ class Constraints:
     def values(self, load: float, t: float | None = None) -> Array:
         """Displacements of the fixed coordinates at a load factor and a time.
 
-        Parameters
-        ----------
-        load
-            Factor on the prescribed displacements.
-        t
-            Time, for those that are functions of it; the load factor if None.
-
         Returns
         -------
         ndarray
@@ -216,11 +221,6 @@ class Constraints:
     def equation_sizes(self, rows: Array, columns: Array, values: Array) -> Array:
         """What equations are open by where one of their coordinates changes by its size.
 
-        Parameters
-        ----------
-        rows, columns, values
-            Entries of :meth:`full_jacobian`, shapes (k,).
-
         Returns
         -------
         ndarray
@@ -232,13 +232,7 @@ class Constraints:
         return out
 
     def constraint(self, u: Array, t: float | None) -> Array:
-        """Phi of the joints with multipliers, shape (m,).
-
-        Parameters
-        ----------
-        u, t
-            Displacement, shape (N,), and time.
-        """
+        """Phi of the joints with multipliers, shape (m,)."""
         if not self.tabled:
             return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
         rows, columns, values = self._slopes_at(t)
@@ -264,13 +258,7 @@ class Constraints:
         return self.quadratic_at((0.0, 0.37))
 
     def quadratic_at(self, times: Iterable[float]) -> bool:
-        """True if Phi and its derivative are those of the tables: user-defined ones may not be.
-
-        Parameters
-        ----------
-        times
-            When random displacements are tried.
-        """
+        """True if Phi and its derivative are those of the tables: user-defined ones may not be."""
         sizes = self.coordinate_sizes
         of_equations, rng = self.equation_sizes(*self.slopes), np.random.default_rng(0)
         k, i, j, v = self.seconds
@@ -312,11 +300,6 @@ class Constraints:
         """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
 
         Sparse where the multipliers are many.
-
-        Parameters
-        ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
         """
         return (self.to_dense if self.few else self.to_sparse)(*self._entries(u, t))
 
@@ -375,51 +358,21 @@ class Constraints:
         return _joined(parts or [_NO_ENTRIES])
 
     def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
-        """As :meth:`full_jacobian`, zero at fixed coordinates.
-
-        Parameters
-        ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
-        """
+        """As :meth:`full_jacobian`, zero at fixed coordinates."""
         return (self.to_dense if self.few else self.to_sparse)(*self.jacobian_entries(u, t))
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        """The second derivative of :meth:`constraint` in the direction v, shape (m,).
-
-        Parameters
-        ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
-        v
-            Direction, shape (N,).
-        """
+        """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
         return np.concatenate([np.zeros(0), *(joint.quadratic(u, t, v) for joint in self.joints)])
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> sparse.csr_matrix:
-        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N).
-
-        Parameters
-        ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
-        multipliers
-            Of the equations, shape (m,).
-        """
+        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
         i, j, v = self.curvature_entries(u, t, multipliers)
         return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
 
     def curvature_entries(self, u: Array, t: float | None,
                           multipliers: Array) -> tuple[Array, Array, Array]:
-        """Rows, columns and values of :meth:`curvature`.
-
-        Parameters
-        ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
-        multipliers
-            Of the equations, shape (m,).
-        """
+        """Rows, columns and values of :meth:`curvature`."""
         i, j, v = self._curvature(u, t, multipliers)
         return i, j, v * (self.free[i] & self.free[j])
 
@@ -432,27 +385,12 @@ class Constraints:
         return _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
 
     def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
-        """Discrete gradients of :meth:`constraint` in a step, shape (m, N).
-
-        Parameters
-        ----------
-        u0, u1, t
-            Displacements at its ends, shape (N,), and the time in its middle.
-        """
+        """Discrete gradients of :meth:`constraint` in a step, shape (m, N)."""
         return self.to_dense(*self.in_order(joint.mean_entries(u0, u1, t) for joint in self.joints))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
         """What joints turn by in a step, see :meth:`~skfem_ancf.actions.joints.Joint.mean_turning`.
-
-        Parameters
-        ----------
-        u0, u1, v0, v1
-            Displacements and velocities at its ends, shape (N,).
-        t
-            Time in the middle of it.
-        multipliers
-            Of the equations, shape (m,).
         """
         parts = zip(self.joints, self.multipliers_of(multipliers))
         return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
@@ -464,26 +402,14 @@ class Constraints:
         return [joint for joint in self.joints if type(joint).lost is not Joint.lost]
 
     def lost(self, u: Array) -> str:
-        """Which joint cannot hold in a converged state, and why; "" if all can.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates, shape (N,).
-        """
+        """Which joint cannot hold in a converged state, and why; "" if all can."""
         for joint, out, size in self._unasked:
             if (np.abs(joint.value(u, 0.0)[out]) > OPENED * size).any():
                 return f"{joint!r} cannot hold beside the other joints: it contradicts them here"
         return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
 
     def first_lost(self, rows: Array) -> tuple[int, str]:
-        """How many states one after the other joints can hold, and why not the next one.
-
-        Parameters
-        ----------
-        rows
-            Displacements of the coordinates, shape (n, N).
-        """
+        """How many states one after the other joints can hold, and why not the next one."""
         for k, u in enumerate(rows if self._limited or self._unasked else ()):
             text = self.lost(u)
             if text:

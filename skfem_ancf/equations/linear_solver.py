@@ -40,6 +40,14 @@ class LinearSolver:
     ----------
     system
         A :class:`~skfem_ancf.equations.system.System`, which has to live as long.
+
+    Other Parameters
+    ----------------
+    u, t, multipliers
+        Where the joints are linearised: displacement (N,), time, multipliers (m,).
+    residual, phi
+        Right-hand sides: forces (N,), of which those at fixed degrees of freedom are ignored, and
+        what the equations of joints should change by, (m,).
     """
 
     def __init__(self, system: Any) -> None:
@@ -87,13 +95,6 @@ class LinearSolver:
     def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
         """Fix the supports in the tangent and factorise it, with the joints where there are any.
 
-        Parameters
-        ----------
-        u, t
-            Where the joints are linearised, shape (N,), and when.
-        multipliers
-            Theirs, shape (m,).
-
         Raises
         ------
         numpy.linalg.LinAlgError, RuntimeError
@@ -127,13 +128,6 @@ class LinearSolver:
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """Solve with the factors.
 
-        Parameters
-        ----------
-        residual
-            Shape (N,); what it has at fixed degrees of freedom is ignored.
-        phi
-            What the constraints should change by, shape (m,), where there are joints.
-
         Returns
         -------
         du, multipliers
@@ -149,17 +143,7 @@ class LinearSolver:
 
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:
-        """Factorise and solve for an iteration of kernels; False if that fails.
-
-        Parameters
-        ----------
-        t, u, multipliers
-            Time, and where the joints are linearised, shapes (N,) and (m,).
-        R, phi
-            Right-hand sides, shapes (N,) and (m,).
-        du, dm
-            The solution, shapes (N,) and (m,).
-        """
+        """Factorise and solve for an iteration of kernels; False if that fails."""
         try:
             self.factorize(u, t, multipliers)
             du[:], dm[:] = self.solve(R, phi)

@@ -62,6 +62,13 @@ class System:
         ``rest_modes(system, k)`` returns k angular frequencies above those of rigid motions about
         the reference configuration, and their shapes (k, N); modal damping asks for them.
 
+    Other Parameters
+    ----------------
+    u, v, t
+        Displacement and velocity, shape (N,), and time; None is full size of loads.
+    load
+        Load factor of statics.
+
     Attributes
     ----------
     members : list
@@ -153,15 +160,7 @@ class System:
     # loads
 
     def external_force(self, u: Array, t: float | None = None) -> Array:
-        """The force of all loads at full size, shape (N,).
-
-        Parameters
-        ----------
-        u
-            Displacement, shape (N,).
-        t
-            Time of amplitudes; None for full size.
-        """
+        """The force of all loads at full size, shape (N,)."""
         out = self.constant_force.copy()
         for load in self._varying:
             s, (factor, acting) = self.of(load), load.acting(t)
@@ -197,15 +196,7 @@ class System:
     # beams and force elements
 
     def internal_force(self, u: Array, t: float | None = None, load: float = 1.0) -> Array:
-        """The force of beams and force elements, shape (N,).
-
-        Parameters
-        ----------
-        u
-            Displacement, shape (N,).
-        t, load
-            Time, for force elements; in statics the load factor in place of it.
-        """
+        """The force of beams and force elements, shape (N,)."""
         self._require_displacement(u)
         if not (u.any() or self.forces.elements) and all(b.kernel.linear for b in self.beams):
             return np.zeros(self.N)  # without round-off
@@ -216,15 +207,7 @@ class System:
         return self._evaluate(MEAN, u0, u1, t=t)
 
     def strain_energy(self, u: Array, t: float = 1.0) -> float:
-        """Strain energy of all beams, and the potential of force elements.
-
-        Parameters
-        ----------
-        u
-            Displacement, shape (N,).
-        t
-            Time, for obstacles that move; in statics the load factor.
-        """
+        """Strain energy of all beams, and the potential of force elements."""
         return float(self.energy_of_beams(u) + self.energy_of_forces(u, t))
 
     def energy_of_beams(self, u: Array) -> Any:
@@ -272,15 +255,7 @@ class System:
         return ModalDamping(self, self._rest_modes)
 
     def damping_force(self, u: Array, v: Array, t: float | None = None) -> Array:
-        """The force that resists the velocity v at u, shape (N,).
-
-        Parameters
-        ----------
-        u, v
-            Displacement and velocity, shape (N,).
-        t
-            Time, for force elements.
-        """
+        """The force that resists the velocity v at u, shape (N,)."""
         force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
         if self.forces.resists:
             add_resisting_force(self.machine.tables.plain.forces, 0.0 if t is None else t, u, v,

@@ -159,24 +159,12 @@ class Tables:
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
 
     def copied(self, n: int) -> "Tables":
-        """The same with ``n`` copies of all coordinates, whose forces a text finds together.
-
-        Parameters
-        ----------
-        n
-            Their number.
-        """
+        """The same with ``n`` copies of all coordinates, whose forces a text finds together."""
         return self.with_equations(self.plain._replace(
             copies=copies_of(self.plain.body, n, self.system.N)))
 
     def with_equations(self, plain: Equations) -> "Tables":
-        """The same with other numbers.
-
-        Parameters
-        ----------
-        plain
-            In place of those of the system.
-        """
+        """The same with other numbers."""
         tables = copy(self)
         vars(tables).pop("flat", None)
         tables._words, tables._words_of_loads, tables.plain = [], [], plain
@@ -330,11 +318,6 @@ class Tables:
         """As :meth:`static_factors` for the stiffness of loads in linear theory: of the user's own.
 
         That the package's loads follow the body is of second order there.
-
-        Parameters
-        ----------
-        scale
-            The load factor.
         """
         own = [load is not None and not ours(load) for load in self._columns]
         return np.where(own, self.static_factors(scale), 0.0)

@@ -30,6 +30,13 @@ class UserDefined:
     loads
         The loads without a table.
 
+    Other Parameters
+    ----------------
+    t, scale
+        Time, nan for none, and a factor.
+    u, out
+        Displacement, and what is added to, shape (N,).
+
     Attributes
     ----------
     forces : Forces
@@ -41,15 +48,7 @@ class UserDefined:
         self.forces, self._loads = system.forces, list(loads)
 
     def add_own_force(self, t: float, scale: float, u: Array, out: Array) -> None:
-        """Add the force of the loads.
-
-        Parameters
-        ----------
-        t, scale
-            Time, nan for none, and a factor.
-        u, out
-            Displacement, and what is added to, shape (N,).
-        """
+        """Add the force of the loads."""
         for load in self._loads:
             s, (factor, acting) = self._system.of(load), load.acting(None if np.isnan(t) else t)
             out[s] += scale * factor * acting.force(u[s])

@@ -128,14 +128,7 @@ class Descent:
 
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:
-        """Solve for a correction; False if there is none.
-
-        Parameters
-        ----------
-        t, u, multipliers, R, phi, du, dm
-            As for ``solve_own`` of :class:`~skfem_ancf.equations.linear_solver.LinearSolver`,
-            shapes (N,) and (m,).
-        """
+        """Solve for a correction; False if there is none."""
         if np.max(np.abs(u / self._sizes)) > ASTRAY:
             return False
         found = self._bounded(lambda: self.system.solver.factorize(u, t, multipliers), R, phi)

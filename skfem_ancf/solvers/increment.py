@@ -258,13 +258,7 @@ class Increment:
             NOT_CONVERGED: f"no convergence in {rules.iterations} iterations"}[status])
 
     def rescue(self, failure: StepFailed) -> Equilibrium | None:
-        """A stable equilibrium where the path has lost its stability; None where it has not.
-
-        Parameters
-        ----------
-        failure
-            Why the step failed.
-        """
+        """A stable equilibrium where the path has lost its stability; None where it has not."""
         system, start, route = self.system, self.start, self.options.route
         unstable = isinstance(failure, Unstable)
         if unstable and route.gap is None and not start.steps and (

@@ -144,6 +144,12 @@ class Search:
     stable, progress
         As for :func:`solve_static`.
 
+    Other Parameters
+    ----------------
+    method, route, start
+        "mixed" or "newton", the :class:`Route`, and the result it begins with; those of the search
+        by default.
+
     Attributes
     ----------
     held_by_loads : bool
@@ -289,13 +295,7 @@ class Search:
 
     def one_step(self, method: str, route: Route | None = None,
                  start: StaticResult | None = None) -> StaticResult:
-        """As :meth:`load_steps`, at once or not at all.
-
-        Parameters
-        ----------
-        method, route, start
-            As there.
-        """
+        """As :meth:`load_steps`, at once or not at all."""
         route = route or self.route
         result = start or self._beginning(route)
         step = Increment(self.system, result, 1.0, self._options(route, method, watched=True))

@@ -73,6 +73,13 @@ class Tracer:
         A :class:`~skfem_ancf.equations.system.System`.
     tol, max_iterations
         As for :func:`continuation`.
+
+    Other Parameters
+    ----------------
+    start, point
+        Points of the path.
+    ds, load
+        Distance along the tangent, and load factor.
     """
 
     def __init__(self, system: System, tol: float, max_iterations: int) -> None:
@@ -97,11 +104,6 @@ class Tracer:
 
         Heat between walls moves no node: there the arc length has the load in it, times the strain
         that its forces could cause.
-
-        Parameters
-        ----------
-        point
-            It is changed, and returned.
         """
         system = self.system
         forces = float(np.abs(system.external_force(point.u)) @ system.constraints.coordinate_sizes)
@@ -143,15 +145,7 @@ class Tracer:
         return drive
 
     def set_tangent(self, point: Point, after: Point | None = None) -> Point:
-        """Find the tangent of the path at a point.
-
-        Parameters
-        ----------
-        point
-            It is changed, and returned.
-        after
-            The point before, from which the tangent points on; None for that of a growing load.
-        """
+        """Find the tangent of the path at a point."""
         drive, phi = self.factorize(point)
         dF, mF = self.system.solver.solve(drive, phi)
         dF[self.system.constraints.fixed] += self.unit
@@ -165,15 +159,7 @@ class Tracer:
         return point
 
     def advance(self, start: Point, ds: float) -> Point:
-        """The next point of the path.
-
-        Parameters
-        ----------
-        start
-            A point with its tangent.
-        ds
-            The distance along the tangent.
-        """
+        """The next point of the path."""
         first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
         plane, normal = self.weights * start.tangent, self.of_load**2 * start.rate
 
