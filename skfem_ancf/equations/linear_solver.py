@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS, Inertia
 from .condensation import Condensed
-from .signature import determinant_sign, inertia_of, null_basis
+from .signature import determinant_sign, inertia_of, is_definite, null_basis
 
 if TYPE_CHECKING:
     from ..core.linalg import BandMatrix
@@ -331,11 +331,15 @@ class SaddlePoint:
         x = self._scale * self._lu.solve(self._scale * np.append(b, c))
         return x[:self._n], x[self._n:]
 
+    def _matrices(self):
+        """K and J of degrees of freedom over their sizes, sparse."""
+        (r, c, w), (i, j, v), sizes = self._J, self._entries, self._sizes
+        return (sparse.csr_array((v * sizes[i] * sizes[j], (i, j)), shape=(self._n, self._n)),
+                sparse.csr_array((w * sizes[c], (r, c)), shape=(self._m, self._n)))
+
     def reduced(self) -> Any:
         """K where J x = 0, sparse of many degrees of freedom."""
-        (r, c, w), (i, j, v), sizes = self._J, self._entries, self._sizes
-        K = sparse.csr_array((v * sizes[i] * sizes[j], (i, j)), shape=(self._n, self._n))
-        J = sparse.csr_array((w * sizes[c], (r, c)), shape=(self._m, self._n))
+        K, J = self._matrices()
         if self._n <= DENSE:
             T = null_basis(J.toarray())
             return T.T @ K.toarray() @ T
@@ -343,6 +347,15 @@ class SaddlePoint:
         return (T.T @ K @ T).tocsc()
 
     def inertia(self) -> Inertia:
-        """That of K, of its symmetric part, where J x = 0."""
+        """That of K, of its symmetric part, where J x = 0.
+
+        K is positive definite there if K plus a stiffness times J^T J is.
+        """
+        if self._n > DENSE:
+            K, J = self._matrices()
+            size = np.sqrt((J * J).sum(axis=1) / np.max(np.abs(K.diagonal())))
+            J = sparse.diags_array(1.0 / size) @ J
+            if is_definite(0.5 * (K + K.T) + J.T @ J):
+                return Inertia(0, False)
         A = self.reduced()
         return inertia_of(0.5 * (A + A.T))

@@ -171,15 +171,23 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
         values = np.linalg.eigvalsh(A / (root[:, None] * root))
         largest = max(1.0, values[-1])  # of its size is their round-off
         return beside_zero(lambda shift: int(np.sum(values < -shift * largest)))
+    if is_definite(A):
+        return Inertia(0, False)
     scale = sparse.diags(1.0 / np.sqrt(size))
-    A = scale @ A @ scale
-    try:
-        if np.all(_pivots(A) > SMALL):
-            return Inertia(0, False)
-    except np.linalg.LinAlgError:  # singular to the last bit, which a shift is not
-        pass
-    one = sparse.eye(len(size))
+    A, one = scale @ A @ scale, sparse.eye(len(size))
     return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
+
+
+def is_definite(A: sparse.csr_array) -> bool:
+    """True if a sparse symmetric matrix is positive definite, beyond round-off."""
+    size = A.diagonal()
+    if np.any(size <= 0.0):
+        return False
+    scale = sparse.diags(1.0 / np.sqrt(size))
+    try:
+        return bool(np.all(_pivots(scale @ A @ scale) > SMALL))
+    except np.linalg.LinAlgError:
+        return False
 
 
 def _pivots(A):
