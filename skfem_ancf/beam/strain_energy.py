@@ -1,7 +1,7 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from .kernels.arrays import add_changes, add_pushes
 from .kernels.law import LINEAR
 from .kernels.strain import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS,
                              run)
-from .kernels.tables import CABLE, StrainTables, repeated
+from .kernels.tables import CABLE, StrainTables, repeated, together
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -49,10 +49,26 @@ def tables_of(body, k):
     return body.packs[k]
 
 
-def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:
-    """The Body of beams with their slices of the degrees of freedom."""
-    return _body([[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
-                  for beam, s in zip(beams, slices)], lambda t: t.rows.shape[1])
+def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = False) -> Body:
+    """The Body of beams with their slices of the degrees of freedom.
+
+    With ``joined`` those of beams with the same samples are one: many short beams take no longer
+    than a long one.
+    """
+    tables = [[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
+              for beam, s in zip(beams, slices)]
+    if joined and len(beams) > 1:
+        alike: dict[Any, list[StrainTables]] = {}
+        for k, t in enumerate(t for its in tables for t in its):
+            alike.setdefault(_samples(t) if t.law.kind == LINEAR else k, []).append(t)
+        tables = [[together(some) for some in alike.values()]]
+    return _body(tables, lambda t: t.rows.shape[1])
+
+
+def _samples(t):
+    """What tables have in common that can be one."""
+    return (t.kind, t.G.shape[1:], len(t.C) > 0, t.weights.shape[1],
+            *((x.shape, x.tobytes()) for x in (t.rows, t.pairs, t.along)))
 
 
 def pushed_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:

@@ -101,7 +101,7 @@ class Tables:
         self.motion_varies = any(joint.moving for joint in system.constraints.joints)
         self.turns = any(joint.turning for joint in system.constraints.joints)
         joints = self._joints()
-        body = body_of(system.beams, system.slices)
+        body = body_of(system.beams, system.slices, joined=not system.viscous)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
                                viscous_body_of(body, system.beams, system.retardation),

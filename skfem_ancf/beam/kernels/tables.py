@@ -10,7 +10,8 @@ Left nodes take no part: G multiplies the other functions, and the right node's 
 less the left one's. A translation changes nothing then, not even round-off.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -91,6 +92,20 @@ def repeated(t: StrainTables, n: int, N: int) -> StrainTables:
     """The tables of n times the elements, whose degrees of freedom begin N later each time."""
     return t._replace(start=(t.start + N * np.arange(n)[:, None]).ravel(),
                       at=np.tile(t.at, (n, 1)))
+
+
+def together(tables: Sequence[StrainTables]) -> StrainTables:
+    """The elements of several tables with the same samples, of linear laws, in one."""
+    first = tables[0]
+    if len(tables) == 1:
+        return first
+    names = "G", "frame", "H", "C", "weights"  # in the order of the columns of ``at``
+    sizes = np.array([[len(getattr(t, name)) for name in names] for t in tables])
+    before = np.cumsum(sizes, axis=0) - sizes
+    parts: dict[str, Any] = {
+        name: np.concatenate([getattr(t, name) for t in tables]) for name in (*names, "start")}
+    return first._replace(
+        at=np.concatenate([t.at + k for t, k in zip(tables, before)]), **parts)
 
 
 def linearised(t: StrainTables) -> StrainTables:
