@@ -39,7 +39,7 @@ WRITERS = {
     "series.pvd": _series,
     "motion.vtkhdf": lambda path: scene().integrate(0.02, 0.01).save(path),
     "state.png": lambda path: scene().solve_linear().plot(filename=path),
-    "film.gif": lambda path: scene().integrate(0.02, 0.01).animate(path, backend="matplotlib"),
+    "film.gif": lambda path: scene().integrate(0.02, 0.01).animate(path),
 }
 NEEDS = {".h5": "h5py", ".vtkhdf": "h5py", ".png": "matplotlib", ".gif": "PIL"}
 

@@ -802,7 +802,7 @@ def test_outlines_are_in_files_and_pictures(tmp_path):
     ax = history.state(-1).plot()
     drawn = [len(c.get_segments()) for c in ax.collections if hasattr(c, "get_segments")]
     assert sum(n >= 96 for n in drawn) == 1
-    history.animate(tmp_path / "run.gif", backend="matplotlib")
+    history.animate(tmp_path / "run.gif")
     pytest.importorskip("pyvista")
     series = history.to_pyvista()
     first = series.mesh["obstacle 0"].points.copy()
