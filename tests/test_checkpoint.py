@@ -125,17 +125,6 @@ def test_a_scheme_of_ones_own(tmp_path, monkeypatch):
     assert int(again.state(-1)._motion.memory["count"]) == 8
 
 
-def test_the_scheme_that_was_chosen_goes_on(tmp_path, monkeypatch):
-    """By the name that was given, too: what it chose is in the file."""
-    path = tmp_path / "run.npz"
-    copies = stages(monkeypatch, path)
-    whole = swinging().integrate(0.02, 2.5e-3, scheme="auto", checkpoint=path, every=3)
-    for scheme in (None, "auto"):
-        again = swinging().resume(copies[1], scheme)
-        assert_identical(again, whole)
-        assert repr(again.scheme) == repr(whole.scheme)
-
-
 def test_a_finished_file_gives_the_history(tmp_path):
     path = tmp_path / "run.npz"
     whole = swinging().integrate(0.02, 2.5e-3, checkpoint=path)  # by time: start and end

@@ -75,17 +75,6 @@ def test_two_halves_with_factors_that_are_not_symmetric(compiled):
     assert half.iterations + rest.iterations == whole.iterations
 
 
-@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
-@pytest.mark.parametrize("build", [swinging, driven])
-def test_from_an_instant_in_the_middle(build, scheme):
-    """The factors are not kept for it: the tolerance of the iteration is the bound."""
-    scene = build()
-    whole = scene.integrate(0.2, 2.5e-3, scheme=scheme, tol=1e-13)
-    rest = scene.integrate(0.2, 2.5e-3, scheme=scheme, tol=1e-13, start=whole.state(30))
-    assert rest.t[0] == whole.t[30]
-    assert_same_end(rest, whole, {"u": 1e-9, "v": 1e-7, "acceleration": 1e-4, "multipliers": 1e-4})
-
-
 def test_a_scene_built_again_goes_on_too():
     whole = driven().integrate(0.2, 2.5e-3)
     half = driven().integrate(0.1, 2.5e-3)
