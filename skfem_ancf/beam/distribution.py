@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..core.quadrature import lagrange
 from ..sections.jumps import jumps
@@ -189,5 +189,8 @@ def _where(element: ElementBeam, value: float) -> float | None:
         return None
     if min(value, 1.0 - value) < FLAT:
         return float(round(value))
-    return brentq(lambda xi: element.local(np.array([[xi], [0.5]]), 1.0, element.nodal_dofs)[0][0]
-                  - value, 0.0, 1.0, xtol=1e-15)
+
+    def rest(xi):
+        return element.local(np.array([[xi], [0.5]]), 1.0, element.nodal_dofs)[0][0] - value
+
+    return scipy.optimize.brentq(rest, 0.0, 1.0, xtol=1e-15)

@@ -7,7 +7,7 @@ from math import ceil, ulp
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..actions.forces.turns import Turns
 from ..core.errors import (AncfError, CheckpointError, InputError, ask_number, require_finite,
@@ -347,8 +347,8 @@ class Run:
         self._value = self._asked(new)
         if before == 0.0 or before * self._value > 0.0:
             return new
-        root = brentq(lambda t: self._asked(self._between(old, new, t)), old.t, new.t,
-                      xtol=EXACT * (new.t - old.t))
+        root = scipy.optimize.brentq(lambda t: self._asked(self._between(old, new, t)),
+                                     old.t, new.t, xtol=EXACT * (new.t - old.t))
         new = self._between(old, new, root)
         self.event = new.t
         return new

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_interp_spline
+import scipy
 from scipy.linalg import solve_banded
 
 from ..core.linear import angle_of, first_order, unwrapped
@@ -138,14 +138,15 @@ class Segment:
         R, M = (x[..., self.elements] for x in self.forces.viscous_middles())
         if len(s) == 1:
             return R + np.zeros((2, len(self.s))), M + np.zeros(len(self.s))
-        return tuple(CubicSpline(s, x, axis=-1)(self.s) for x in (R, M))
+        return tuple(scipy.interpolate.CubicSpline(s, x, axis=-1)(self.s) for x in (R, M))
 
     # along the axis and across
 
     def spline(self, values: Array, axis: int) -> Any:
         """The cubic spline through values at the sections."""
-        return make_interp_spline(self.s, values, min(3, len(self.s) - 1), axis=axis,
-                                  check_finite=False)
+        degree = min(3, len(self.s) - 1)
+        return scipy.interpolate.make_interp_spline(self.s, values, degree, axis=axis,
+                                                    check_finite=False)
 
     def d_ds(self, values: Array) -> Array:
         """The derivative along the axis of values (..., n, m)."""
@@ -373,7 +374,7 @@ class Segment:
         values = stress[:, self.elements].reshape(3, len(s), -1)
         if len(s) == 1:
             return np.broadcast_to(values, self.S.shape)
-        return CubicSpline(s, values, axis=-2)(self.s)
+        return scipy.interpolate.CubicSpline(s, values, axis=-2)(self.s)
 
     @cached_property
     def result(self) -> Any:
