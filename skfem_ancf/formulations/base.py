@@ -17,7 +17,6 @@ from ..core.quadrature import gauss, lagrange, product_rule
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike
 
     from ..elements.base import ElementBeam
     from ..materials.base import Material
@@ -67,18 +66,6 @@ class Term:
         """Where along the axis a component is sampled, shape (m,)."""
         return np.asarray(self.samples.get(component, self.axis[0]), dtype=float)
 
-    def interpolation(self, component: str, xi: ArrayLike) -> Array | None:
-        """From the m samples of a component to points along the axis, (n, m); None if it has none.
-
-        Parameters
-        ----------
-        component, xi
-            "xx", "yy" or "xy", and points on [0, 1], shape (n,).
-        """
-        if component not in self.samples:
-            return None
-        return lagrange(self.samples[component], xi)
-
     @property
     def section_nodes(self) -> Array:
         """Where across the section the strain is evaluated."""
@@ -86,11 +73,13 @@ class Term:
 
     def matrix(self, component: str) -> Array | None:
         """From the samples of a component to the integration points; None for the identity."""
-        along = self.interpolation(component, self.axis[0])
-        if along is None and self.section_samples is None:
+        sampled = component in self.samples
+        if not sampled and self.section_samples is None:
             return None
+        xi = self.axis[0]
+        along = lagrange(self.samples[component], xi) if sampled else np.eye(len(xi))
         across = self.section_samples[1] if self.section_samples else np.eye(len(self.section[0]))
-        return np.kron(np.eye(len(self.axis[0])) if along is None else along, across)
+        return np.kron(along, across)
 
 
 class Integrated(Protocol):
