@@ -21,7 +21,7 @@ from .location import Finder
 from .mapping import MappingBeam
 from ..core.origin import ours
 from .numbering import NumberedMesh, default_tags
-from .places import is_point, points_of_rows
+from .places import as_point, is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
 from .taper import Scaled, heights_of
@@ -480,8 +480,8 @@ class MeshBeam(NumberedMesh):
             at = [at]
         if not at:
             raise InputError("at names no section: give 'left', 'right', or a point of the axis")
-        places = np.array([self._section_point(place) for place in at])
-        mesh = self
+        places, mesh = np.array([as_point(place, self) for place in at]), self
+        self.element_finder()(*places.T)
         while True:
             X = np.array([np.linspace(0, 1, 5), np.full(5, 0.5)])
             x = mesh._mapping().F(X)
@@ -491,16 +491,6 @@ class MeshBeam(NumberedMesh):
             if len(marked) == 0:
                 return mesh
             mesh = mesh.refined(marked)
-
-    def _section_point(self, place):
-        """The point of the axis that a place names, shape (2,)."""
-        if isinstance(place, str):
-            if place not in ("left", "right"):
-                raise NameUnknown("section", place, ("left", "right"))
-            return self.p[:, np.asarray(self.boundaries[place])[0]]
-        point = require_finite("at", place, (2,))
-        self.element_finder()(*point[:, None])
-        return point
 
     def _adaptive(self, ix):
         return halved(self, np.unique(self.normalize_elements(ix)))
