@@ -54,38 +54,6 @@ def scale(beam):
 # the kernel
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("degree, name", CASES)
-def test_the_force_is_the_gradient_of_the_energy(degree, name, formulation):
-    beam = cable(degree, MESHES[name](), formulation)
-    u, kernel, size = disturbed(beam), beam.kernel, scale(beam)
-    f, rng = kernel.force(u) * size, np.random.default_rng(1)
-    for _ in range(4):
-        d = rng.normal(size=beam.N)
-        # fourth-order differences
-        w = {e: kernel.energy(u + e * 1e-3 * size * d) for e in (-2, -1, 1, 2)}
-        slope = (8 * (w[1] - w[-1]) - (w[2] - w[-2])) / 12e-3
-        assert abs(f @ d - slope) < 1e-5 * np.linalg.norm(f) * np.linalg.norm(d)
-
-
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("degree, name", CASES)
-def test_the_tangent_is_the_derivative_of_the_force(degree, name, formulation):
-    beam = cable(degree, MESHES[name](), formulation)
-    u, kernel, size = disturbed(beam), beam.kernel, scale(beam)
-    K, nd = np.zeros((beam.N, beam.N)), beam.nd
-    for e, k in enumerate(kernel.tangents(u)):
-        K[e * nd:(e + 2) * nd, e * nd:(e + 2) * nd] += k
-    K *= np.outer(size, size)
-    assert np.max(np.abs(K - K.T)) < 1e-12 * np.max(np.abs(K))
-    rng = np.random.default_rng(2)
-    for _ in range(4):
-        d = rng.normal(size=beam.N)
-        f = {e: kernel.force(u + e * 1e-3 * size * d) * size for e in (-2, -1, 1, 2)}
-        slope = (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / 12e-3
-        assert np.linalg.norm(K @ d - slope) < 1e-5 * np.linalg.norm(K) * np.linalg.norm(d)
-
-
 @pytest.mark.parametrize("degree, name", CASES)
 def test_the_stress_free_state_has_no_force(degree, name):
     beam = cable(degree, MESHES[name]())
@@ -132,16 +100,6 @@ def test_the_mean_force_does_the_work_of_the_energy(degree, name, formulation, s
     assert np.max(np.abs(f[:, 0].sum(axis=0))) < 1e-12 * total
     moment = np.sum(q[..., 0] * f[..., 1] - q[..., 1] * f[..., 0])
     assert abs(moment) < 1e-12 * np.sum(np.abs(q) * np.abs(f))
-
-
-@pytest.mark.parametrize("degree, name", CASES)
-def test_compiled_and_plain_kernels_agree(degree, name):
-    plain, fast = (cable(degree, MESHES[name](), compiled=c).kernel for c in (False, True))
-    beam = cable(degree, MESHES[name]())
-    u, size = disturbed(beam), scale(beam)
-    for a, b in ((plain.force(u) * size, fast.force(u) * size),
-                 (plain.tangents(u), fast.tangents(u)), (plain.energy(u), fast.energy(u))):
-        np.testing.assert_allclose(b, a, rtol=0, atol=1e-12 * np.max(np.abs(a)))
 
 
 def test_degrees_are_odd_and_from_3_to_15():
