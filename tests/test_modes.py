@@ -262,22 +262,6 @@ def test_all_of_equal_frequencies_are_found(equal, k, monkeypatch):
     assert np.allclose(found, np.eye(k), atol=1e-8)
 
 
-def test_frequencies_are_looked_for_where_they_cannot_be_counted(monkeypatch):
-    """Nothing is missing, but the count is wrong, or there are no factors to count by."""
-    monkeypatch.setattr(eigen, "DENSE", 10)
-    scene = Scene(straight(16)).clamp("left")
-    known, negative = scene.modes(4).frequencies, eigen._negative
-
-    def refused(tangent, state, shift):
-        if shift < 0.0:
-            raise np.linalg.LinAlgError
-        return negative(tangent, state, shift)
-
-    for other in (refused, lambda *a: negative(*a) + 2 * (a[-1] < 0.0)):
-        monkeypatch.setattr(eigen, "_negative", other)
-        assert np.allclose(scene.modes(4).frequencies, known, rtol=1e-12)
-
-
 # buckling
 
 
