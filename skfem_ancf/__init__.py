@@ -31,7 +31,7 @@ from .results.state import Reaction, State
 from .scene.frame import Frame
 from .scene.scene import Scene
 from .sections import Section
-from .solvers.eigen import Buckling, Modes
+from .results.modes import Buckling, Modes
 from .sweeps.parameter_sweep import sweep
 
 __version__ = "0.1.0"

@@ -68,6 +68,19 @@ class Scales:
         return self.work_noise * sqrt(max(b.nd for b in self._system.members))
 
     @cached_property
+    def bending_eigenvalue(self) -> float:
+        """omega^2 of the slowest bending that a beam as long as the scene could have.
+
+        Of rigid bodies alone that of all their mass on one spring, or swinging by all loads.
+        """
+        s = self._system
+        if not s.beams:
+            mass = sum(body.total_mass for body in s.bodies)
+            return self.energy_of_bodies / (mass * s.size**2) or 1.0
+        stiffness = min(b.across.bending_over_mass() for b in s.beams)
+        return stiffness * (np.pi / s.size) ** 4
+
+    @cached_property
     def inertia_of_places(self) -> float:
         """The mass times places and directions, squared; zero where no joint knows them.
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from ..dynamics.base import Scheme
     from ..dynamics.history import History
     from ..equations.system import System
-    from ..solvers.eigen import Buckling, Modes
+    from ..results.modes import Buckling, Modes
     from .plan import Plan
 
 

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh, spsolve
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..core.band import fix
 from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportError,
-                           require_finite_scalar, require_index, require_integer, warn)
+                           require_integer, warn)
 from ..core.linalg import NO_FACTORS
+from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
-from ..equations.linearised import linear_external_force, linear_force
 
 if TYPE_CHECKING:
     from ..core.types import Array
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
 DENSE = 600  # free coordinates up to which the dense solver is used
 WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
 ORTHOGONAL = 1e-5  # scalar product of two shapes of unit mass
-ROUND_OFF = 1e-7  # of the frequency of a rigid motion, over that of the slowest bending
-SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
 UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
 LANCZOS = 1e-10  # its tolerance
 SAME = 1e-6  # relative distance of eigenvalues that are the same
@@ -34,143 +31,6 @@ ASIDE = 1e-5  # motion that shows on which sides springs push, over the size
 STIFFER = 0.1  # relative change of their stiffness that is not left out
 TURNING = 1e-2  # square of the angular velocity over that of a frequency
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
-
-
-@dataclass(repr=False)
-class Modes:
-    """Natural frequencies and shapes, the lowest first.
-
-    A motion ``shape * exp(i omega t)`` has ``omega^2`` as its eigenvalue. Where all loads have a
-    potential every eigenvalue is real. Loads that follow the body may cause complex pairs: two
-    motions that oscillate, one of which grows, which is flutter.
-
-    Attributes
-    ----------
-    frequencies
-        Angular frequencies in rad/s, shape (k,): the square roots of the eigenvalues. That of a
-        negative eigenvalue, a motion that leaves the state without oscillating, is given as a
-        negative number: minus its rate of growth. With :attr:`flutter` the array is complex: the
-        real part is the angular frequency, and minus the imaginary part the rate of growth.
-    shapes
-        Displacements of the coordinates, shape (k, N), of unit modal mass; complex with flutter.
-    state
-        The state about which the beam vibrates.
-    eigenvalues
-        ``omega^2``, shape (k,), complex.
-    """
-
-    frequencies: np.ndarray
-    shapes: np.ndarray
-    state: State
-    eigenvalues: np.ndarray
-
-    def __repr__(self):
-        return f"<Modes of {len(self.frequencies)} frequencies, {_listed(self.frequencies)} rad/s>"
-
-    @property
-    def flutter(self) -> bool:
-        """True if an oscillation grows: there is a complex pair among the eigenvalues."""
-        return bool(np.any(self.eigenvalues.imag != 0.0))
-
-    @property
-    def stable(self) -> bool:
-        """True if none of these motions grows."""
-        return not self.flutter and bool(np.all(self.frequencies >= 0.0))
-
-    @property
-    def damping_ratios(self) -> np.ndarray:
-        """The damping ratio of each motion, shape (k,): what it decays with over its frequency.
-
-        ``shape . D shape / (2 omega)`` with what resists small velocities: exact for Rayleigh's
-        and modal damping and damped materials of one kind, of first order in the ratios where
-        damping joins motions of different shape. NaN where a motion does not oscillate.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene,
-        ...                         StVenantKirchhoff)
-        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
-        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
-        >>> modes = Scene(beam).clamp("left").modes(2)
-        >>> bool(np.allclose(modes.damping_ratios, 0.5e-3 * modes.frequencies))
-        True
-        """
-        state, system = self.state, self.state.system
-        if not system.damped:
-            return np.zeros(len(self.shapes))
-        out = np.full(len(self.shapes), np.nan)
-        rigid = ROUND_OFF * np.sqrt(_bending_eigenvalue(system))
-        for k, (omega, shape) in enumerate(zip(self.frequencies, self.shapes)):
-            if np.iscomplexobj(shape) or not omega.real > rigid:
-                continue
-            force = system.damping_force(np.array(state.u), SLOW * shape, state.t) / SLOW
-            out[k] = shape @ force / (2.0 * omega.real)
-        return out
-
-    def mode(self, i: int, amplitude: float) -> State:
-        """The state displaced along a shape, to plot or save; along the real part of a complex one.
-
-        It is linearised about :attr:`state`: strain, stress and section forces differ from those
-        there in proportion to the amplitude, and with the inertia of the vibration they are in
-        equilibrium. About the stress-free state its strain energy is ``(omega amplitude)^2 / 2``.
-
-        Parameters
-        ----------
-        i
-            Number of the shape; negative ones count from the end.
-        amplitude
-            What the shape is multiplied by.
-        """
-        i = require_index("i", i, len(self.shapes))
-        amplitude = require_finite_scalar("amplitude", amplitude)
-        system, d = self.state.system, amplitude * self.shapes[i].real
-        acceleration = -self.eigenvalues[i].real * d
-        inertia = system.mass.multiply(acceleration)
-        return State(system, self.state.u + d, acceleration=acceleration, inertia=inertia,
-                     load=self.state.load, message=f"mode {i}", base=self.state,
-                     multipliers=self.state.multipliers + self._joint_forces(d, inertia))
-
-    def _joint_forces(self, d, inertia):
-        """What a displacement and its inertia change the multipliers of the joints by, (m,)."""
-        state, system = self.state, self.state.system
-        if not system.constraints.m:
-            return np.zeros(0)
-        u, load, t = np.array(state.u), state.load, state.load if state.t is None else state.t
-        rest = (linear_force(system, u, d, load) - system.internal_force(u, None, load) + inertia
-                - load * (linear_external_force(system, u, d) - system.external_force(u))
-                + system.constraints.curvature(u, t, state.multipliers) @ d)
-        J = system.constraints.sparse_jacobian(u, t)[:, system.constraints.free].tocsr()
-        return -spsolve((J @ J.T).tocsc(), J @ rest[system.constraints.free])
-
-
-@dataclass(repr=False)
-class Buckling:
-    """Load factors at which the stress-free state loses stability, the lowest first.
-
-    Attributes
-    ----------
-    factors
-        Multiples of the loads of the scene, shape (k,).
-    shapes
-        Displacements of the coordinates, shape (k, N).
-    follower : bool
-        The loads follow the body and have no potential: it may flutter at a lower factor, which
-        these of divergence do not say; :func:`modes` about a state under load does.
-    """
-
-    factors: np.ndarray
-    shapes: np.ndarray
-    follower: bool = False
-
-    def __repr__(self):
-        loads = ", under loads that follow the body" if self.follower else ""
-        return f"<Buckling at the load factors {_listed(self.factors)}{loads}>"
-
-
-def _listed(numbers):
-    """The first of some numbers, for people."""
-    return ", ".join(f"{x:.6g}" for x in numbers[:6]) + ", ..." * (len(numbers) > 6)
 
 
 def modes(system: System, state: State, k: int) -> Modes:
@@ -225,7 +85,7 @@ def _modes(system, state, k):
     shapes[:, tangent.free] = X.T
     frequencies = np.sqrt(values) if np.any(values.imag) else (
         np.sign(values.real) * np.sqrt(np.abs(values.real)))
-    _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * _bending_eigenvalue(system))
+    _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * system.scales.bending_eigenvalue)
     return Modes(frequencies, shapes, state, values.astype(complex))
 
 
@@ -280,21 +140,9 @@ def _free_mass(system, tangent):
     return M[tangent.free][:, tangent.free] if len(tangent.free) < system.N else M
 
 
-def _bending_eigenvalue(system):
-    """omega^2 of the slowest bending that a beam as long as the scene could have.
-
-    Of rigid bodies alone that of all their mass on one spring, or swinging by all loads.
-    """
-    if not system.beams:
-        mass = sum(body.total_mass for body in system.bodies)
-        return system.scales.energy_of_bodies / (mass * system.size**2) or 1.0
-    stiffness = min(b.across.bending_over_mass() for b in system.beams)
-    return stiffness * (np.pi / system.size) ** 4
-
-
 def _shift(tangent, state):
     """A number s for which K + s M is positive definite between the free coordinates."""
-    shift = _bending_eigenvalue(tangent.system)
+    shift = tangent.system.scales.bending_eigenvalue
     for _ in range(80):
         try:
             if _negative(tangent, state, shift) == 0:
@@ -573,7 +421,7 @@ def _require_no_flutter(system, tangent, Ks, factor):
         return
     M, S = _free_mass(system, tangent), tangent.S
     k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE
-    shift = _bending_eigenvalue(system)
+    shift = system.scales.bending_eigenvalue
     try:
         for part in factor * 0.5 ** np.arange(20, 0, -1):
             tangent.S = S + part * Ks

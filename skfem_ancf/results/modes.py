@@ -1,0 +1,154 @@
+"""Natural frequencies with their shapes, and linear buckling loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import spsolve
+
+from ..core.errors import require_finite_scalar, require_index
+from ..equations.linearised import linear_external_force, linear_force
+from .state import State
+
+#: Round-off of the frequency of a rigid motion, over that of the slowest bending.
+ROUND_OFF = 1e-7
+#: A velocity at which what is quadratic in it can be left out.
+SLOW = 1e-6
+
+
+@dataclass(repr=False)
+class Modes:
+    """Natural frequencies and shapes, the lowest first.
+
+    A motion ``shape * exp(i omega t)`` has ``omega^2`` as its eigenvalue. Where all loads have a
+    potential every eigenvalue is real. Loads that follow the body may cause complex pairs: two
+    motions that oscillate, one of which grows, which is flutter.
+
+    Attributes
+    ----------
+    frequencies
+        Angular frequencies in rad/s, shape (k,): the square roots of the eigenvalues. That of a
+        negative eigenvalue, a motion that leaves the state without oscillating, is given as a
+        negative number: minus its rate of growth. With :attr:`flutter` the array is complex: the
+        real part is the angular frequency, and minus the imaginary part the rate of growth.
+    shapes
+        Displacements of the coordinates, shape (k, N), of unit modal mass; complex with flutter.
+    state
+        The state about which the beam vibrates.
+    eigenvalues
+        ``omega^2``, shape (k,), complex.
+    """
+
+    frequencies: np.ndarray
+    shapes: np.ndarray
+    state: State
+    eigenvalues: np.ndarray
+
+    def __repr__(self):
+        return f"<Modes of {len(self.frequencies)} frequencies, {_listed(self.frequencies)} rad/s>"
+
+    @property
+    def flutter(self) -> bool:
+        """True if an oscillation grows: there is a complex pair among the eigenvalues."""
+        return bool(np.any(self.eigenvalues.imag != 0.0))
+
+    @property
+    def stable(self) -> bool:
+        """True if none of these motions grows."""
+        return not self.flutter and bool(np.all(self.frequencies >= 0.0))
+
+    @property
+    def damping_ratios(self) -> np.ndarray:
+        """The damping ratio of each motion, shape (k,): what it decays with over its frequency.
+
+        ``shape . D shape / (2 omega)`` with what resists small velocities: exact for Rayleigh's
+        and modal damping and damped materials of one kind, of first order in the ratios where
+        damping joins motions of different shape. NaN where a motion does not oscillate.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene,
+        ...                         StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
+        >>> modes = Scene(beam).clamp("left").modes(2)
+        >>> bool(np.allclose(modes.damping_ratios, 0.5e-3 * modes.frequencies))
+        True
+        """
+        state, system = self.state, self.state.system
+        if not system.damped:
+            return np.zeros(len(self.shapes))
+        out = np.full(len(self.shapes), np.nan)
+        rigid = ROUND_OFF * np.sqrt(system.scales.bending_eigenvalue)
+        for k, (omega, shape) in enumerate(zip(self.frequencies, self.shapes)):
+            if np.iscomplexobj(shape) or not omega.real > rigid:
+                continue
+            force = system.damping_force(np.array(state.u), SLOW * shape, state.t) / SLOW
+            out[k] = shape @ force / (2.0 * omega.real)
+        return out
+
+    def mode(self, i: int, amplitude: float) -> State:
+        """The state displaced along a shape, to plot or save; along the real part of a complex one.
+
+        It is linearised about :attr:`state`: strain, stress and section forces differ from those
+        there in proportion to the amplitude, and with the inertia of the vibration they are in
+        equilibrium. About the stress-free state its strain energy is ``(omega amplitude)^2 / 2``.
+
+        Parameters
+        ----------
+        i
+            Number of the shape; negative ones count from the end.
+        amplitude
+            What the shape is multiplied by.
+        """
+        i = require_index("i", i, len(self.shapes))
+        amplitude = require_finite_scalar("amplitude", amplitude)
+        system, d = self.state.system, amplitude * self.shapes[i].real
+        acceleration = -self.eigenvalues[i].real * d
+        inertia = system.mass.multiply(acceleration)
+        return State(system, self.state.u + d, acceleration=acceleration, inertia=inertia,
+                     load=self.state.load, message=f"mode {i}", base=self.state,
+                     multipliers=self.state.multipliers + self._joint_forces(d, inertia))
+
+    def _joint_forces(self, d, inertia):
+        """What a displacement and its inertia change the multipliers of the joints by, (m,)."""
+        state, system = self.state, self.state.system
+        if not system.constraints.m:
+            return np.zeros(0)
+        u, load, t = np.array(state.u), state.load, state.load if state.t is None else state.t
+        rest = (linear_force(system, u, d, load) - system.internal_force(u, None, load) + inertia
+                - load * (linear_external_force(system, u, d) - system.external_force(u))
+                + system.constraints.curvature(u, t, state.multipliers) @ d)
+        J = system.constraints.sparse_jacobian(u, t)[:, system.constraints.free].tocsr()
+        return -spsolve((J @ J.T).tocsc(), J @ rest[system.constraints.free])
+
+
+@dataclass(repr=False)
+class Buckling:
+    """Load factors at which the stress-free state loses stability, the lowest first.
+
+    Attributes
+    ----------
+    factors
+        Multiples of the loads of the scene, shape (k,).
+    shapes
+        Displacements of the coordinates, shape (k, N).
+    follower : bool
+        The loads follow the body and have no potential: it may flutter at a lower factor, which
+        these of divergence do not say; :func:`modes` about a state under load does.
+    """
+
+    factors: np.ndarray
+    shapes: np.ndarray
+    follower: bool = False
+
+    def __repr__(self):
+        loads = ", under loads that follow the body" if self.follower else ""
+        return f"<Buckling at the load factors {_listed(self.factors)}{loads}>"
+
+
+def _listed(numbers):
+    """The first of some numbers, for people."""
+    return ", ".join(f"{x:.6g}" for x in numbers[:6]) + ", ..." * (len(numbers) > 6)
