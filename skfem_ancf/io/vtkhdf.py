@@ -11,6 +11,7 @@ import numpy as np
 from ..core.archive import find_h5py, new_file, put_in_place
 from ..core.errors import (FileError, InputError, require_option, require_options, require_path)
 from ..recovery.fields import find_fields
+from ..recovery.grids import CELL_TYPES
 from ..actions.obstacles.pictures import around, outlines
 from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
 
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..core.types import StrPath
-
-#: VTK's numbers of the cells.
-CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
 #: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose
 #: writing fails, and takes the process with it.

@@ -56,7 +56,7 @@ class Field:
     frame : str
         Of vectors and tensors, and of components: "global" or "beam".
     neutral : float
-        Its value in the stress-free body.
+        Its value in the reference configuration.
 
     Examples
     --------

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from ..beam.beam import Beam
     from ..core.types import Array
 
+#: VTK's numbers of cells, by what meshio calls them.
+CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
+
 #: VTK evaluates Lagrange cells up to this degree.
 MAX_LAGRANGE_DEGREE = 10
 

@@ -38,9 +38,9 @@ class Resultants:
     Attributes
     ----------
     s
-        Arc length along the stress-free axis, shape (n,).
+        Arc length along the reference axis, shape (n,).
     x
-        Place of the section on the stress-free axis, shape (2, n).
+        Place of the section on the reference axis, shape (2, n).
     N
         Normal force along the deformed axis, positive in tension.
     Q
@@ -49,10 +49,10 @@ class Resultants:
     M
         Bending moment about the deformed axis, counterclockwise: it presses the upper fibres.
     curvature
-        Change of the rate at which the sections turn along the stress-free axis, per length. A
+        Change of the rate at which the sections turn along the reference axis, per length. A
         cable has N = EA (stretch - 1) and M = EI curvature, if its axis is at the centroid.
     stretch
-        Length of the axis over that in the stress-free state.
+        Length of the axis over that in the reference configuration.
     shear
         Angle from the normal of the section to the axis, in radians.
     angle

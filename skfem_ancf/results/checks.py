@@ -46,8 +46,8 @@ class Checks:
         Smallest and largest principal stretch at the integration points; of a cable those of its
         outermost fibres.
     turning
-        Largest angle in radians by which the axis turns over one element, from the stress-free
-        state.
+        Largest angle in radians by which the axis turns over one element, from the reference
+        configuration.
     findings : tuple of str
         What is beyond the range of the law or of the mesh; empty where nothing is.
 

@@ -39,7 +39,7 @@ def state_html(state: Any) -> str:
 
 
 def scene_html(scene: Any) -> str:
-    """A table of what is in a Scene, and its stress-free body."""
+    """A table of what is in a Scene, and its reference configuration."""
     rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
     rows += [("rigid body", b) for b in scene.bodies]
     rows += [("item", one) for one in scene.items]

@@ -12,7 +12,7 @@ from ..core.errors import (InputError, MissingExtra, require_flag, require_index
                            require_options, require_path, require_text)
 from ..recovery.fields import FIELDS, find_fields
 from ..core.archive import output_file
-from ..recovery.grids import grids, in_space
+from ..recovery.grids import CELL_TYPES, grids, in_space
 from ..actions.obstacles.pictures import around, outlines
 from .animation import pixels
 from .matplotlib import colormap
@@ -20,9 +20,6 @@ from .scenery import RIGID, WALL, Scenery
 
 if TYPE_CHECKING:
     from ..core.types import StrPath
-
-#: VTK's numbers of the cells.
-CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
 #: Pictures that a plotter writes.
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
