@@ -338,10 +338,10 @@ def test_restart_under_another_load_is_compiled():
 @pytest.fixture(scope="module")
 def bands():
     """What factorises and solves, plain and compiled."""
-    from skfem_ancf.equations.compiled.twin import compile_for
+    from skfem_ancf.core.jit import entry
     A = BandMatrix(2, 1).band
     return ((band.factorize, band.solve),
-            (compile_for(factors_of, (A,)), compile_for(solution_of, (A, np.zeros(2)))))
+            (entry(factors_of, (A,)), entry(solution_of, (A, np.zeros(2)))))
 
 
 @pytest.mark.parametrize("n, width", [(1, 0), (3, 0), (2, 1), (3, 2), (4, 1), (5, 3), (6, 5),

@@ -11,10 +11,11 @@ import pytest
 import test_reference as reference
 
 import skfem_ancf
+from skfem_ancf.core.source import MARKED
 
-#: Not looked at: twins of texts, which have the text's name and arguments; and where arrays of
+#: Not looked at: loops that are compiled in place of functions of their names; and where arrays of
 #: equations are packed for them.
-OTHERS = ("equations.compiled",)
+OTHERS = ("core.loops", "equations.loops", "beam.kernels.loops")
 
 #: Annotations of arrays, whose shapes are to be said.
 ARRAYS = ("Array", "ArrayLike")
@@ -42,7 +43,7 @@ def functions(module):
         if name.startswith("_") or getattr(thing, "__module__", None) != module:
             continue
         if not inspect.isclass(thing):
-            if callable(thing) and not hasattr(thing, "twin"):
+            if callable(thing) and thing not in MARKED:
                 yield name, inspect.unwrap(thing), None
             continue
         if getattr(thing, "_is_protocol", False):  # the classes that have it describe it

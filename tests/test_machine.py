@@ -1,6 +1,5 @@
-"""Where texts run: in NumPy or compiled, by the size of the task; and the same either way."""
+"""What is compiled, by the size of the task, and what is kept of it."""
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -10,10 +9,11 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFHermite, ElementBeamCable,
                         EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff)
-from skfem_ancf.equations import compiled, backend as machine
+from skfem_ancf.core import code_cache
 from skfem_ancf.core.errors import CompilationWarning
-from skfem_ancf.core.source import lanes, primitive, source
+from skfem_ancf.core.source import lanes, source
 from skfem_ancf.core.switch import expecting
+from skfem_ancf.equations import backend
 
 ROOT = Path(__file__).parent.parent
 
@@ -55,31 +55,26 @@ def test_a_first_solution_imports_no_compiler(tmp_path):
 
 @pytest.fixture
 def auto(needs_compiled, monkeypatch):
-    """The default rules, nothing loaded, nothing on disk."""
+    """The default rules, nothing loaded, nothing on disk; what is compiled is plain Python."""
+    from skfem_ancf.core import jit
     from skfem_ancf.core.switch import VARIABLE
+    from skfem_ancf.equations import loops
 
     monkeypatch.delenv(VARIABLE, raising=False)
-    loads, known, before, address = [], set(), compiled.KNOWN, compiled.address
-
-    def load(text, args):
-        loads.append(text.__name__)
-        compiled.LOADED[text.__name__] = lambda equations, *rest: text(
-            plain, *(getattr(x, "of", x) for x in rest))
-        return compiled.LOADED[text.__name__]
-
-    def found(part):
-        known.add(part)
-        return address(part)
-
-    s = scene()
+    compiled, s = [], scene()
     plain = s.system.machine.tables.plain
-    monkeypatch.setattr(compiled, "LOADED", {})
-    monkeypatch.setattr(compiled, "KNOWN", known)
-    monkeypatch.setattr(compiled, "load", load)
-    monkeypatch.setattr(compiled, "address", found)
-    monkeypatch.setattr(compiled, "on_disk", lambda *names: not names)
-    yield s, loads
-    before.update(known)
+
+    def entry(function, args):
+        compiled.append(function.__name__)
+        return lambda equations, *rest: function(plain, *rest)
+
+    monkeypatch.setattr(backend, "LOADED", {})
+    monkeypatch.setattr(backend, "PROBLEMS", [])
+    monkeypatch.setattr(jit, "entry", entry)
+    monkeypatch.setattr(loops, "part", lambda name: 0)
+    monkeypatch.setattr(code_cache, "on_disk", lambda *names: not names)
+    monkeypatch.setattr(code_cache, "note", lambda name: None)
+    return s, compiled
 
 
 #: Of a motion of 1000 steps.
@@ -103,8 +98,8 @@ def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
     s.integrate(**STEPS, t_eval=[1.0])
     assert loads == ["steps"]
     said = capsys.readouterr().err.splitlines()
-    assert said[0].startswith("skfem_ancf: compiling once, about 12 s, kept in ")
-    assert said[-1].endswith("100%") and len(said) == 5  # one for each part, and the steps
+    assert said[0].startswith("skfem_ancf: compiling once, about ") and " s, kept in " in said[0]
+    assert said[-1].endswith("100%") and len(said) == 3  # the kernel, and the steps
     assert s.plan("dynamic")["compiled loop"].reason.endswith("compiled code is loaded")
     s.system.internal_force(np.full(s.layout.N, 1e-3))  # as energies of the motion ask for them
     assert loads == ["steps", "evaluate"]
@@ -112,7 +107,7 @@ def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
 
 def test_what_lies_on_disk_is_loaded_for_tasks_longer_than_loading(auto, monkeypatch, capsys):
     s, loads = auto
-    monkeypatch.setattr(compiled, "on_disk", lambda *names: True)
+    monkeypatch.setattr(code_cache, "on_disk", lambda *names: True)
     s.solve_static()
     s.integrate(0.1, 1e-3)
     assert not loads
@@ -129,7 +124,7 @@ def test_members_and_steps_count(auto, monkeypatch):
     seen = []
     sweep(lambda x: s, {"x": np.arange(7)}, lambda s: seen.append(expected()) or 0.0)
     assert seen == [7.0] * 7 and expected() == 1.0
-    monkeypatch.setattr(compiled, "on_disk", lambda *names: True)
+    monkeypatch.setattr(code_cache, "on_disk", lambda *names: True)
     with expecting(1000):
         s.solve_static()
     assert loads == ["equilibrium"]
@@ -167,108 +162,69 @@ def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_pat
     s, loads = auto
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "folder"))
-    for function in compiled.folder, compiled.can_keep, compiled._warn_of:
+    for function in code_cache.folder, code_cache.can_keep, code_cache._warn_of:
         function.cache_clear()
     try:
         with pytest.warns(CompilationWarning, match="each process compiles anew.*NUMBA_CACHE_DIR"):
             s.integrate(**STEPS, t_eval=[1.0])
         assert not loads  # it would not pay
-        assert machine.Machine(s.system).choose("steps").way == "plain"
+        assert backend.Machine(s.system).choose("steps").way == "plain"
     finally:
-        for function in compiled.folder, compiled.can_keep, compiled._warn_of:
+        for function in code_cache.folder, code_cache.can_keep, code_cache._warn_of:
             function.cache_clear()
 
 
 def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
-    from skfem_ancf.equations.compiled.__main__ import main
     from skfem_ancf.core.switch import VARIABLE
+    from skfem_ancf.equations.compile import main
 
     monkeypatch.setenv(VARIABLE, "1")
     main()
-    assert compiled.KNOWN == set(compiled.ADDRESSES)
-    assert {"evaluate", "equilibrium", "steps"} <= set(compiled.LOADED)
-    assert compiled.on_disk(*machine.COMPILING)
-    assert compiled.KNOWN | {"evaluate", "equilibrium", "steps"} == set(machine.COMPILING)
+    assert set(backend.COMPILING) <= set(backend.LOADED)
+    assert code_cache.on_disk(*backend.COMPILING)
 
 
-def test_a_numba_that_is_too_old_is_left_out(tmp_path):
-    """In a process of its own, as ours has it imported."""
-    pytest.importorskip("numba")
-    old = ("import numba; numba.version_info = numba.version_info._replace(short=(0, 61)); "
-           "numba.__version__ = '0.61.2'\n")
-    shown = "print(Scene(beam).clamp('left').plan()['compiled loop'].reason)"
-    said = run(old + SCRIPT + shown, tmp_path, SKFEM_ANCF_COMPILED="1").splitlines()
-    np.testing.assert_allclose(eval(said[0].rsplit(" ", 1)[0]), TIP, atol=0.01)
-    assert "Numba cannot be used: version 0.61.2 is older than 0.62" in said[1]
-
-
-def test_code_of_two_versions_of_numba_is_kept_side_by_side(needs_compiled, monkeypatch):
-    from skfem_ancf.equations.compiled.twin import named
-
+def test_code_of_two_versions_of_numba_is_kept_side_by_side(monkeypatch):
     names = set()
     for number in ("0.62.0", "0.68.1"):
-        compiled.key.cache_clear()
-        monkeypatch.setattr(compiled, "version", lambda name, number=number: number)
-        names.add(named(run).__qualname__)
-    compiled.key.cache_clear()
+        code_cache.key.cache_clear()
+        monkeypatch.setattr(code_cache, "version", lambda name, number=number: number)
+        names.add(code_cache.key())
+    code_cache.key.cache_clear()
     assert len(names) == 2
 
 
 def test_kernels_that_a_scene_has_not_are_not_compiled():
-    assert scene().system.machine.tables.parts == ["common", "StrainTables"]
+    assert scene().system.machine.tables.parts == ["StrainTables"]
     cable = scene(ElementBeamCable(3))
-    assert cable.system.machine.tables.parts == ["common", "StrainTables"]
+    assert cable.system.machine.tables.parts == ["StrainTables"]
     cable.spring(1.0, between=((1.0, 0.0), ("ground", (1.0, 1.0))))
-    assert cable.system.machine.tables.parts == ["common", "StrainTables", "elements"]
-    assert set(compiled.ADDRESSES) <= set(machine.COMPILING)
-    assert machine.compiling(["steps", "StrainTables"]) > machine.compiling(["steps"]) > 0.0
+    assert cable.system.machine.tables.parts == ["StrainTables", "elements"]
+    assert set(backend.PARTS) <= set(backend.COMPILING)
 
 
-def test_a_broken_numba_costs_nothing_but_speed(auto, monkeypatch):
+@pytest.mark.parametrize("error", [ImportError("made for another NumPy"),
+                                   AttributeError("Numba has changed")])
+def test_what_cannot_be_compiled_runs_in_numpy(error, auto, monkeypatch, caplog):
+    """Said once, and nothing is lost."""
+    from skfem_ancf.core import jit
+
     s, _ = auto
-    monkeypatch.setattr(compiled, "PROBLEMS", [])
-
-    def address(part):
-        raise ImportError("made for another NumPy")
-
-    monkeypatch.setattr(compiled, "address", address)
-    with expecting(1000):
-        assert s.solve_static().converged
-    assert "another NumPy" in s.plan()["compiled loop"].reason
-
-
-@pytest.mark.parametrize("what", ["load", "address"])
-def test_what_cannot_be_compiled_runs_in_numpy(what, auto, monkeypatch, caplog):
-    """A Numba that is not as those that are known: said once, and nothing is lost."""
-    s, _ = auto
-    monkeypatch.setattr(compiled, "PROBLEMS", [])
 
     def fail(*args):
-        raise AttributeError("Numba has changed")
+        raise error
 
-    monkeypatch.setattr(compiled, what, fail)
-    with expecting(1000):
+    monkeypatch.setattr(jit, "entry", fail)
+    with expecting(10000):
         for _ in range(2):
             assert s.solve_static().converged
     said = [r.message for r in caplog.records if "runs in NumPy" in r.message]
-    assert len(said) == 1 and "Numba has changed" in said[0]
-    assert "Numba has changed" in s.plan()["compiled loop"].reason
+    assert len(said) == 1 and str(error) in said[0]
+    assert str(error) in s.plan()["compiled loop"].reason
 
 
-def test_one_signature_for_every_scene(needs_compiled, monkeypatch):
-    from skfem_ancf.equations.compiled.twin import type_of
-
-    def recorded(name, function):
-        def run(*args):
-            types.setdefault(name, set()).add(tuple(type_of(x) for x in args))
-            return function(*args)
-
-        return run
-
-    types = {}
-    scene().solve_static(), scene().integrate(1e-3, 1e-3)  # compiled
-    monkeypatch.setattr(compiled, "LOADED", {name: recorded(name, function) for name, function
-                                             in compiled.LOADED.items()})
+def test_one_signature_for_every_scene(needs_compiled):
+    """What is compiled takes arguments of one type: of another it would raise a TypeError."""
     two = scene()
     two = Scene(*two.beams, Beam(MeshBeam.init_line([0.0, 1.0], 0.1), ElementBeamCable(3),
                                  StVenantKirchhoff(1e6, 0.3, 1e3), width=0.1))
@@ -277,29 +233,30 @@ def test_one_signature_for_every_scene(needs_compiled, monkeypatch):
               scene().pressure("top", 0.1), scene().moment("right", 1e-3)):
         s.solve_static(), s.integrate(1e-3, 1e-3), s.integrate(1e-3, 1e-3, EnergyMomentum())
     s.system.internal_force(np.zeros(s.system.N))
-    assert set(types) == {"equilibrium", "steps", "evaluate"}
-    assert all(len(found) == 1 for found in types.values())
+    assert {"equilibrium", "steps", "evaluate"} <= set(backend.LOADED) and not backend.PROBLEMS
 
 
 @pytest.mark.parametrize("damage", ["empty", "noise", "a file in the way"])
 def test_a_cache_that_cannot_be_used_costs_time_only(damage, tmp_path, needs_compiled):
-    """The twin of a small text, with what Numba has kept of it spoilt between two processes."""
-    code = """
+    """A small function, with what Numba has kept of it spoilt between two processes."""
+    code = f"""
 import numpy as np, sys
-sys.path.insert(0, {folder!r})
+sys.path.insert(0, {str(tmp_path)!r})
 from small import double
-from skfem_ancf.equations.compiled.twin import compile_for
+from skfem_ancf.core.jit import entry
 y = np.zeros(3)
-compile_for(double, (np.ones(3), y))(np.ones(3), y)
+entry(double, (np.ones(3), y))(np.ones(3), y)
 print(y.tolist())
 """
     (tmp_path / "small.py").write_text(
         "from skfem_ancf.core.source import lanes, source\n\n\n@source\ndef double(x, y):\n"
         "    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
-    code = code.format(folder=str(tmp_path))
     folder = tmp_path / "numba"
     if damage == "a file in the way":
         folder.write_text("")
+        said = run(code, tmp_path, errors=True)
+        assert said.count("each process compiles anew") == 1
+        assert str(folder) in said and "NUMBA_CACHE_DIR" in said
     else:
         assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
         kept = [p for p in folder.rglob("*") if p.is_file() and "double" in p.name]
@@ -309,169 +266,15 @@ print(y.tolist())
     assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
 
 
-def test_code_that_is_not_that_of_its_index_is_compiled_anew(tmp_path, needs_compiled):
-    """Two functions of the same arguments, whose files are swapped."""
-    code = f"""
-import numpy as np, sys
-sys.path.insert(0, {str(tmp_path)!r})
-from small import cube, double
-from skfem_ancf.equations.compiled.twin import compile_for
-for text in cube, double:
-    y = np.zeros(3)
-    compile_for(text, (np.ones(3), y))(np.full(3, 4.0), y)
-    print(y.tolist())
-"""
-    (tmp_path / "small.py").write_text(
-        "from skfem_ancf.core.source import lanes, source\n\n\n"
-        "@source\ndef cube(x, y):\n    for i in lanes(x.size):\n        y[i] = x[i]**3\n\n\n"
-        "@source\ndef double(x, y):\n    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
-    expected = ["[64.0, 64.0, 64.0]", "[8.0, 8.0, 8.0]"]
-    assert run(code, tmp_path).splitlines() == expected
-    one, other = (next((tmp_path / "numba").rglob(f"*{name}*.nbc")) for name in ("cube", "double"))
-    a, b = one.read_bytes(), other.read_bytes()
-    one.write_bytes(b), other.write_bytes(a)
-    assert run(code, tmp_path).splitlines() == expected
-    assert one.read_bytes() != b
-    kept = one.stat().st_mtime_ns
-    assert run(code, tmp_path).splitlines() == expected and one.stat().st_mtime_ns == kept
-
-
-def test_a_folder_in_which_nothing_can_be_kept_is_said_in_a_warning(tmp_path, needs_compiled):
-    """In a process of its own: where it is, and what to set."""
-    (tmp_path / "numba").write_text("")
-    code = ("from skfem_ancf.equations import compiled; compiled.note('steps'); "
-            "compiled.note('equilibrium')")
-    said = run(code, tmp_path, errors=True)
-    assert said.count("each process compiles anew") == 1
-    assert str(tmp_path / "numba") in said and "NUMBA_CACHE_DIR" in said
-
-
-def test_texts_and_twins(needs_compiled):
-    """What a text calls is compiled with it: texts, inner ones too, and twins of primitives."""
-    from skfem_ancf.equations.compiled.twin import compile_for
-
-    x, y, z = np.arange(4.0), np.zeros(4), np.zeros(4)
-    total_of_squares(x, y)
-    compile_for(total_of_squares, (x, z))(x, z)
-    assert y.tolist() == z.tolist() == [14.0, 15.0, 18.0, 23.0]
-    assert primitive("factors")(lambda: None).twin == "factors"
-
-
-def test_what_two_entries_call_is_lowered_once(needs_compiled, monkeypatch):
-    from skfem_ancf.equations.compiled import together, twin
-
-    lowered = []
-    compile_extra = together.compiler.compile_extra
-    monkeypatch.setattr(together.compiler, "compile_extra", lambda *args, **options: (
-        lowered.append(args[2].__name__), compile_extra(*args, **options))[1])
-    monkeypatch.setattr(twin, "_kept_on_disk", lambda function, compiled: compiled())
-    x, y, z = np.arange(4.0), np.zeros(4), np.zeros(4)
-    twin.compile_for(sum_of_cubes, (x, y))(x, y)
-    twin.compile_for(cubes_of_cubes, (x, z))(x, z)
-    assert y[0] == 36.0 and z.tolist() == [0.0, 1.0, 512.0, 19683.0]
-    assert [name for name in lowered if name == "cube"] == ["cube"]
-
-
-@pytest.mark.parametrize("order", ["C", "F", "A"])
-def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compiled, order):
-    """From either end, of any layout and kind of number; as in other code of Numba."""
-    from numba import njit
-
-    from skfem_ancf.equations.compiled.twin import compile_for
-
-    def given():
-        a = np.arange(48.0).reshape(4, 6, 2)[:, :3] if order == "A" else np.array(
-            np.arange(24.0).reshape(4, 3, 2), order=order)
-        return a, np.array([3, -1, 0, 2]), np.zeros(8), np.zeros(4, dtype=bool)
-
-    expected = given()
-    exchange(*expected)
-    for run in (compile_for(exchange, given()), compile_for(exchange_within, given()),
-                njit(exchange)):
-        found = given()
-        run(*found)
-        for x, y in zip(found, expected):
-            assert x.tolist() == y.tolist()
-
-
-@pytest.mark.parametrize("first, last", [(0, 2), (1, 3), (-2, 9), (3, 1), (-9, -1), (7, 9)])
-def test_parts_of_arrays_are_those_of_numpy(needs_compiled, first, last):
-    """Rows and slices of every end, as places to read and to fill."""
-    from skfem_ancf.equations.compiled.twin import compile_for
-
-    found, expected = np.zeros(12), np.zeros(12)
-    A = np.arange(60.0).reshape(3, 5, 4)
-    parts(A.copy(), first, last, expected)
-    compile_for(parts, (A, first, last, found))(A, first, last, found)
-    assert found.tolist() == expected.tolist() and expected.any()
-
-
-def test_arrays_that_texts_make_live_as_long_as_they_are_used(needs_compiled):
-    """Those made in loops and given back, and views of them; none is left."""
-    from numba.core.runtime import _nrt_python as memory, rtsys
-
-    from skfem_ancf.equations.compiled.twin import compile_for
-
-    x, found, expected = np.arange(1.0, 4.0), np.zeros(3), np.zeros(3)
-    makes(x, expected)
-    run = compile_for(makes, (x, found))
-    memory.memsys_enable_stats()
-    before = rtsys.get_allocation_stats()
-    run(x, found)
-    after = rtsys.get_allocation_stats()
-    memory.memsys_disable_stats()
-    assert found.tolist() == expected.tolist() == [44.0, 36.0, 18.0]
-    assert after.alloc - before.alloc == after.free - before.free > 10
-
-
-@pytest.mark.parametrize("first, last", [(0, 4), (2, 4), (4, 2), (-2, 1), (3, 3)])
-def test_loops_run_as_in_python(needs_compiled, first, last):
-    """Loops of one end and of two, by steps, in lanes, and those in others that are left."""
-    from skfem_ancf.equations.compiled.twin import compile_for
+@pytest.mark.parametrize("first, last", [(0, 4), (2, 4), (4, 2), (3, 3)])
+def test_functions_run_as_in_python(needs_compiled, first, last):
+    """With those that they call; loops of one end and of two, by steps, in lanes, and in others."""
+    from skfem_ancf.core.jit import entry
 
     found, expected = np.zeros(5), np.zeros(5)
     loops(first, last, expected)
-    compile_for(loops, (first, last, found))(first, last, found)
+    entry(loops, (first, last, found))(first, last, found)
     assert found.tolist() == expected.tolist() and (last <= 0 or expected[0] > 0.0)
-
-
-@source
-def parts(A, first, last, out):
-    row, some, rest = A[-1, 2], A[1, first:last], A[first:]
-    out[0], out[1], out[2] = row[0] + row[-1], some.shape[0], rest.shape[0]
-    out[3] = A[0, 1, 1:last].sum() + A[0, 1, :first].sum() + A[1:, first:, 1:2].sum()
-    out[4:last], A[2, first:last] = 5.0, 1.0
-    A[0] = 2.0
-    last = 1  # what a slice was made of may change
-    out[first:][:1] = 7.0
-    out[10], out[11] = A.sum(), some.sum() + last
-
-
-@source
-def makes(x, out):
-    before = np.zeros(3)
-    for k in range(4):
-        A = np.ones((2, 3))
-        A[1] = 5.0 + k
-        row, junk = row_of(A, 1), np.zeros(3)
-        out[0] += row[0] + before[0] + junk[1]
-        before = row
-    B = np.ones((2, 3))
-    B[1] = 3.0
-    out[1], out[2] = twice(twice(row_of(B, 1)))[1] * x[2], twice(twice(x))[2] + twice(x)[2]
-
-
-@source
-def row_of(A, k):
-    return A[k]
-
-
-@source
-def twice(x):
-    y = np.empty(x.size)
-    for i in range(x.size):
-        y[i] = 2.0 * x[i]
-    return y
 
 
 @source
@@ -483,87 +286,14 @@ def loops(first, last, out):
             if k > 2:
                 break
             out[1] += 10.0 * i + k
-    for i in range(last, first, -2):
-        out[2] += 1.0 + i
-    for i in range(first, last, 2):
-        out[3] += 1.0 + i
+    add_steps(first, last, out[2:4])
     for i in lanes(3, 5):
         out[i] += 100.0
 
 
-def test_shared_texts_are_found_by_their_types(needs_compiled):
-    """Each text of a group is called with the types that the group says."""
-    from skfem_ancf.equations.compiled import shared, twin
-
-    compiled.address("common"), compiled.address("kernels")
-    for group, calls in shared.GROUPS.items():
-        for call in calls:
-            (found,) = twin.twin(call.text).shared.values()
-            assert found.group == group and call.text.__name__ in found.symbol
-            assert len(call.args) == call.text.__code__.co_argcount
-
-
 @source
-def exchange(a, places, y, flags):
-    y[0] = a[1, 2, 1]
-    y[-1] = a[-1, places[1], places[-2]]
-    a[places[0], -2, 1] = 7
-    places[-1] = 5
-    y[2] += places[3]
-    y[3:5] = a[0, 1]
-    flags[-3] = y[0] > 1.0
-    if flags[1]:
-        y[5] = a[2, 0, 0] - 1
-
-
-@source
-def exchange_within(a, places, y, flags):
-    exchange(a, places, y, flags)
-
-
-def test_texts_of_the_package_count_indices_from_the_begin():
-    """Compiled, they do not ask for negative ones."""
-    found = set()
-    for path in (ROOT / "skfem_ancf").rglob("*.py"):
-        for text in ast.walk(ast.parse(path.read_text())):
-            marks = {getattr(x, "id", "") for x in getattr(text, "decorator_list", ())}
-            if marks & {"source", "jit"}:
-                found.add(text.name)
-                for x in ast.walk(text):
-                    if isinstance(x, ast.Subscript):
-                        parts = x.slice.elts if isinstance(x.slice, ast.Tuple) else [x.slice]
-                        ends = [getattr(y, end, None) for y in parts for end in ("lower", "upper")]
-                        assert not any(isinstance(y, ast.UnaryOp) for y in parts + ends), text.name
-    assert {"collocate", "equilibrium", "cable_block"} < found
-
-
-@source
-def cube(x, y):
-    for i in lanes(x.size):
-        y[i] = x[i] * x[i] * x[i]
-
-
-@source
-def sum_of_cubes(x, y):
-    cube(x, y)
-    y[0] = np.sum(y)
-
-
-@source
-def cubes_of_cubes(x, y):
-    cube(x, y)
-    cube(y, y)
-
-
-@source
-def square(x, y):
-    for i in lanes(x.size):
-        y[i] = x[i] * x[i]
-
-
-@source
-def total_of_squares(x, y):
-    square(x, y)
-    total = np.sum(y)
-    for i in lanes(x.size):
-        y[i] += total
+def add_steps(first, last, out):
+    for i in range(last, first, -2):
+        out[0] += 1.0 + i
+    for i in lanes(0, 2, 1):
+        out[i] += 1.0

@@ -33,7 +33,8 @@ PACKAGE = ROOT / "skfem_ancf"
 OUT = ROOT / "out" / "mutation"
 # what draws, writes files, or is compiled is compared as a whole
 EVERY = "**/*"
-NOT_CHANGED = ("equations/compiled/", "io/", "visuals/", "core/progress.py")
+NOT_CHANGED = ("core/jit.py", "core/loops.py", "equations/loops.py", "beam/kernels/loops.py",
+               "io/", "visuals/", "core/progress.py")
 # what starts processes of its own, needs Numba, draws, or repeats the others at random
 LEFT_OUT = ["test_bench.py", "test_compiled.py", "test_demos.py", "test_fuzz.py",
             "test_visuals.py"]

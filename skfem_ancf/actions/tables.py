@@ -71,37 +71,37 @@ class LoadTables(NamedTuple):
     own: int
 
 
-@primitive("scatter")
+@primitive("skfem_ancf.core.loops")
 def add_each(out, at, x):
     """out[at] += x, however often a place occurs."""
     np.add.at(out, at, x)
 
 
-@primitive("scatter")
+@primitive("skfem_ancf.core.loops")
 def add_products(out, at, v, x, i):
     """out[at] += v x[i], however often a place occurs."""
     np.add.at(out, at, v * x[i])
 
 
-@primitive("scatter")
+@primitive("skfem_ancf.core.loops")
 def add_triples(out, at, v, x, i, y, j):
     """out[at] += v x[i] y[j]."""
     np.add.at(out, at, v * x[i] * y[j])
 
 
-@primitive("scatter")
+@primitive("skfem_ancf.core.loops")
 def add_entries(J, k, i, v):
     """J[k, i] += v."""
     np.add.at(J, (k, i), v)
 
 
-@primitive("scatter")
+@primitive("skfem_ancf.core.loops")
 def add_weighted_entries(J, k, i, v, x, j):
     """J[k, i] += v x[j]."""
     np.add.at(J, (k, i), v * x[j])
 
 
-@primitive("scatter")
+@primitive("skfem_ancf.core.loops")
 def subtract_from_band(A, i, j, v, x, k):
     """A[i, j] -= v x[k], of a band matrix; of the lower half alone where that is all there is."""
     there = np.nonzero((i >= j) | (A.top > 0))[0]

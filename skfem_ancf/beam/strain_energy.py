@@ -34,7 +34,7 @@ class FlatBody(NamedTuple):
     Attributes
     ----------
     packs
-        Addresses of the words of the tables, see :mod:`skfem_ancf.equations.compiled.records`.
+        Addresses of the words of the tables, see :mod:`skfem_ancf.core.words`.
     table
         As of the Body.
     """
@@ -43,7 +43,7 @@ class FlatBody(NamedTuple):
     table: I2
 
 
-@primitive("packs")
+@primitive("skfem_ancf.equations.loops")
 def tables_of(body, k):
     """The StrainTables number k."""
     return body.packs[k]

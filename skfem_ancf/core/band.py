@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import blas, lapack
 
-from .source import F1, I1, by_place, lanes, primitive, shaped, source
+from .source import F1, I1, lanes, primitive, shaped, source
 
 if TYPE_CHECKING:
     from .types import Array
@@ -32,7 +32,6 @@ HALVES = -1
 REPEATED = 1e-13
 
 
-@by_place
 class Band(NamedTuple):
     """A band matrix: its entries, the exchanges of ``gbtrf``, and its layout."""
 
@@ -55,7 +54,7 @@ def _transposed(A):
     return A.flat.reshape(-1, A.ld).T[first:first + A.width + 1]
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def multiply(A, x, y):
     """y = A x."""
     n, k = len(x), A.width
@@ -71,13 +70,13 @@ def multiply(A, x, y):
             y[:n - d] += ab[A.top - d, d:] * x[d:]
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def add_multiple(c, x, y):
     """y += c x, of vectors; compiled for short ones."""
     y += c * x
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def factorize(A):
     """Factorise in place; False if a pivot is lost.
 
@@ -126,7 +125,7 @@ def _eliminate(A):
     return bool(np.all(np.isfinite(columns[:, 0])))
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def solve(A, x):
     """Solve in place with the factors; x is (n,)."""
     ab = as_lapack(A)
@@ -137,7 +136,7 @@ def solve(A, x):
     x[:] = lapack.dtbtrs(_transposed(A), y, uplo="L", trans="T", diag="U")[0].ravel()
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def dense_solve(A, b):
     """Solve in place of b, a vector; False if A is singular."""
     try:
@@ -147,7 +146,7 @@ def dense_solve(A, b):
     return True
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
     """Solve in place of b, a vector, equations of which some may repeat others.
 
@@ -184,13 +183,13 @@ def solve_dependent(S, b):
     return True
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def subtract_rows(J, x, out):
     """out -= J^T x."""
     out -= x @ J
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
     """Change x by multiples of the rows of ``Y = J A^-1`` so that ``J1 x`` becomes what -b was.
 
@@ -242,7 +241,7 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
     X[:] = lapack.dtbtrs(_transposed(A), y, uplo="L", trans="T", diag="U")[0].T
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def factorize_complex(A, width):
     """L D L^T of a complex symmetric band, in place of its lower half; False if there is none.
 
@@ -269,7 +268,7 @@ def factorize_complex(A, width):
     return True
 
 
-@primitive("factors")
+@primitive("skfem_ancf.core.loops")
 def solve_complex(A, width, x, y):
     """Solve in place with the factors of :func:`factorize_complex`; x + i y is (n,)."""
     ab = _complex(A).reshape(x.size, -1)[:, :width + 1].T
@@ -359,37 +358,37 @@ def diagonal(A, d):
         d[j] = rows[j, A.top]
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def dot(a, b):
     """The product of two vectors."""
     return np.dot(a, b)
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def total(x):
     """The sum of a vector's numbers."""
     return np.sum(x)
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def smallest(x):
     """The smallest number of a vector."""
     return np.min(x)
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def largest(x):
     """The largest absolute value of a vector, 0 if it has none."""
     return np.max(np.abs(x), initial=0.0)
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def differs(a, b):
     """True if two vectors of one size are not the same."""
     return bool(np.any(a != b))
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def weighted(a, b, w):
     """The sum of a b w."""
     return np.dot(a * b, w)

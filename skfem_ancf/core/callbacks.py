@@ -25,50 +25,50 @@ def owner(handle: int) -> Any:
     return _objects[handle]
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_force(handle, t, scale, u, out):
     """Add the loads of one's own at a time, which is not a number in statics."""
     owner(handle).add_own_force(t, scale, u, out)
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_mean_force(handle, t, u0, u1, out):
     """Add their mean from u0 to u1."""
     owner(handle).add_own_mean_force(t, u0, u1, out)
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_load_stiffness(handle, t, scale, u, flat):
     """Subtract their derivatives from the entries of a band matrix."""
     owner(handle).subtract_own_stiffness(t, scale, u, flat)
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_joints(handle, what, t, u, v, out):
     """Joints that are no tables, see :meth:`skfem_ancf.equations.system.System.add_own_joints`."""
     owner(handle).add_own_joints(what, t, u, v, out)
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_elements(handle, what, t, factor, a, b, out):
     """Force elements of one's own, see :meth:`skfem_ancf.actions.forces.system.Forces.add_own`."""
     owner(handle).forces.add_own(what, t, factor, a, b, out)
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_poses(handle, t, span, poses):
     """Where obstacles are that move, see
     :meth:`skfem_ancf.actions.forces.contacts.Contacts.put`."""
     owner(handle).put(t, span, poses)
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def own_distance(handle, obstacle, t, x, out):
     """Distance, gradient and second derivatives of a shape of one's own."""
     owner(handle).ask(obstacle, t, x, out)
 
 
-@primitive("own")
+@primitive("skfem_ancf.core.loops")
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     """Solve with the multipliers by sparse factors; False if there is no solution."""
     return bool(owner(handle).solve_own(t, u, multipliers, R, phi, du, dm))

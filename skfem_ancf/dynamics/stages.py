@@ -18,7 +18,7 @@ from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, 
 from ..actions.forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
                                     element_damping, element_stiffness, pace_contact, put_between,
                                     settle_contact)
-from ..core.source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
+from ..core.source import F1, F2, F3, lanes, shaped, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                               external_force, joint_directions)
 from .dampers import add_damping, damping_beside, damping_force
@@ -34,7 +34,6 @@ REUSED, CARRIED, LASTING = 0.3, 0.5, 32.0
 CLOSINGS = 2
 
 
-@by_place
 class Method(NamedTuple):
     """The numbers of a method of n points and k eigenvalues, one of each pair.
 
@@ -87,7 +86,6 @@ class Interval(NamedTuple):
     joints: JointMotions
 
 
-@by_place
 class Points(NamedTuple):
     """What is found, a row for each point, and what of factors is kept.
 
@@ -185,7 +183,7 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
     u, v and the acceleration, (s, 3, N), the displacements of its points, (s, n, N), and the
     multipliers of these and at the end, (s, n + 1, m).
     """
-    s, state, method = borrowed(s), borrowed(state), w.method
+    method = w.method
     contacts, taken = e.forces.contacts, np.empty(1)
     if contacts.lasting > 0:
         pace_contact(e.forces, s.h)

@@ -26,7 +26,7 @@ from ..actions.forces.texts import (add_contact_tangent, add_elastic_force, add_
                                     augment_contact, element_stiffness, pace_contact, put_between,
                                     settle_contact)
 from ..core.callbacks import own_joints, own_solve
-from ..core.source import F1, F2, F3, borrowed, by_place, lanes, source
+from ..core.source import F1, F2, F3, lanes, source
 from ..actions.tables import (add_constraint_rate, add_curvature_force, add_joint_force,
                               add_load_stiffness, add_products, constraint, joint_directions,
                               mean_external_force)
@@ -111,7 +111,6 @@ class Rule(NamedTuple):
     mass_solver: int
 
 
-@by_place
 class Matrices(NamedTuple):
     """The mass matrix, its factors with the supports fixed, and those of the iteration matrix.
 
@@ -250,7 +249,6 @@ class Shares(NamedTuple):
     last: F1
 
 
-@by_place
 class Work(NamedTuple):
     """Work arrays.
 
@@ -294,7 +292,6 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     acceleration, (n, 4, N), the multipliers at its end and where it took them, (n, 2, m), and the
     work of damping up to its end, (n,).
     """
-    course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
     joined, damped = m > 0, matrices.dampers.active > 0
     contacts, taken, stale = e.forces.contacts, np.empty(1), joined
@@ -440,10 +437,10 @@ def _step(joints, rule, course, n):
     constant = joints.hk.size == 0 and joints.own == 0
     kept = constant and g.shape[0] == 1 and n > 0
     joints_now = JointMotion(_row(c, n), _row(g, n), course.joints.drives)
-    return borrowed(Step(course.dt, course.times[n, 0], course.times[n, 1],
-                         _row(course.factors, n), _row(course.supports, n), joints_now,
-                         mass_factor(rule, course.dt), damping_factor(rule, course.dt),
-                         0.5 if rule.conserving > 0 else 1.0, constant, kept))
+    return Step(course.dt, course.times[n, 0], course.times[n, 1],
+                _row(course.factors, n), _row(course.supports, n), joints_now,
+                mass_factor(rule, course.dt), damping_factor(rule, course.dt),
+                0.5 if rule.conserving > 0 else 1.0, constant, kept)
 
 
 @source

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import compiled
-from .compiled.words import Kept
 from .tables import Tables
 from ..beam.kernels.law import OWN
+from ..core import code_cache
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, expected, wanted
 
@@ -23,12 +22,18 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-#: Seconds that compiling takes, about: what texts have in common, what kernels have, the kernels,
-#: each if a scene has it, and each text; and loading what lies on disk.
-COMPILING = {"common": 3.0, "StrainTables": 6.0,
-             "elements": 1.4, "contacts": 2.9, "equilibrium": 2.4, "steps": 5.9, "evaluate": 0.3}
-#: The same for texts that are compiled where they are used, not beforehand.
-WHERE_USED = {"collocate": 5.6}
+#: What this process has compiled or loaded: functions by their names, and parts that they call.
+LOADED: dict[str, Any] = {}
+#: What functions call by its address.
+PARTS = "StrainTables", "elements", "contacts"
+#: Why Numba cannot be used though it is installed.
+PROBLEMS: list[str] = []
+#: Seconds that compiling takes, about: kernels, force elements and contact, each if a scene has it,
+#: and what calls them; and loading what lies on disk.
+COMPILING = {"StrainTables": 20.0, "elements": 7.0, "contacts": 19.0,
+             "equilibrium": 22.0, "steps": 35.0, "evaluate": 5.0}
+#: The same for what is compiled where it is used, not beforehand.
+WHERE_USED = {"collocate": 35.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds that NumPy takes for an iteration, about, and what each element adds to them.
@@ -71,7 +76,7 @@ class Machine:
         self.tables = Tables(system)
         self._plain: str | None = None
         self._rooms: dict[str, Any] = {}
-        self._kept = Kept()
+        self._flat: tuple[Any, list[Any]] | None = None
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif system.forces.contacts.own:
@@ -85,7 +90,7 @@ class Machine:
     def _off(self):
         if self._plain is not None:
             return self._plain
-        return compiled.PROBLEMS[0] if compiled.PROBLEMS else compiled_off()
+        return PROBLEMS[0] if PROBLEMS else compiled_off()
 
     @cached_property
     def linearised(self) -> Machine | None:
@@ -104,7 +109,7 @@ class Machine:
             In place of its own.
         """
         machine = copy(self)
-        machine.tables, machine._kept = tables, self._kept.of(self._rooms.values())
+        machine.tables, machine._flat = tables, None
         vars(machine).pop("linearised", None)
         return machine
 
@@ -121,7 +126,7 @@ class Machine:
 
     def _chosen(self, name):
         missing = self._missing(name)
-        if not missing and not compiled.PROBLEMS and self._plain is None and wanted() != "0":
+        if not missing and not PROBLEMS and self._plain is None and wanted() != "0":
             return _IS_LOADED
         if self._off is not None:
             return Choice("plain", self._off)
@@ -133,22 +138,22 @@ class Machine:
         if work < LOADING:
             return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, loading "
                           f"compiled code {LOADING:g} s and more")
-        missing = [part for part in missing if not compiled.on_disk(part)]
+        missing = [part for part in missing if not code_cache.on_disk(part)]
         if not missing:
             return Choice("compiled", f"compiled code lies on disk, NumPy would take about "
                           f"{work:.2g} s for {_iterations()}")
-        seconds, times = compiling(missing), SERVES if compiled.can_keep() else 1
+        seconds, times = compiling(missing), SERVES if code_cache.can_keep() else 1
         if times * work >= seconds:
             return Choice("compiled", f"compiling takes about {seconds:.2g} s once, NumPy would "
                           f"take about {work:.2g} s for {_iterations()}")
         return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, compiling "
                       f"would take about {seconds:.2g} s; python -m "
-                      "skfem_ancf.equations.compiled does it beforehand")
+                      "skfem_ancf.equations.compile does it beforehand")
 
     def _missing(self, name):
         """What of a text and of what it calls this process has not loaded."""
-        missing = [part for part in self.tables.parts if part not in compiled.KNOWN]
-        return missing if name in compiled.LOADED else [*missing, name]
+        missing = [part for part in self.tables.parts if part not in LOADED]
+        return missing if name in LOADED else [*missing, name]
 
     def seconds(self, iterations: float) -> float:
         """How long NumPy takes for so many iterations, about.
@@ -189,19 +194,21 @@ class Machine:
         def run(*args):
             try:
                 function, equations = self._load(text, args)
-            except compiled.TextProblem as error:
-                self._plain = str(error)
-                logger.info(self._plain)
+            except Exception as error:  # of a user's function, or of a Numba that is not as known
+                self._give_up(text, error)
                 return self._in_numpy(text)(*args)
-            except Exception as error:  # of a Numba that is not as those that are known
-                compiled.PROBLEMS.append(
-                    f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
-                    f"{text.__name__} cannot be compiled: {error!r}")
-                logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
-                return self._in_numpy(text)(*args)
-            return function(equations, *map(self._kept, args))
+            return function(equations, *args)
 
         return run
+
+    def _give_up(self, text, error):
+        if type(error).__name__ == "NotCompiled":
+            self._plain = str(error)
+            logger.info(self._plain)
+            return
+        PROBLEMS.append(f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
+                        f"{text.__name__} cannot be compiled: {error!r}")
+        logger.warning("%s; it runs in NumPy", PROBLEMS[-1])
 
     def _in_numpy(self, text):
         def run(*args):
@@ -213,17 +220,36 @@ class Machine:
     def _load(self, text, args):
         """The compiled function and the equations that it takes; says so where that takes long."""
         name = text.__name__
-        flat = vars(self.tables).get("flat")
-        if flat is None or name not in compiled.LOADED:
+        if self._flat is None or name not in LOADED:
+            from ..core.jit import entry
+            from . import loops
+
             with _LOCK, announced(self._missing(name)) as update:
                 for part in self.tables.parts:
-                    compiled.address(part)
-                    update(part)
-                flat = self.tables.flat
-                if name not in compiled.LOADED:
-                    compiled.load(text, (flat, *args))
+                    load_part(part, update)
+                if self._flat is None:
+                    self._flat = loops.flat(self.tables.plain)
+                if name not in LOADED:
+                    LOADED[name] = entry(text, (self._flat[0], *args))
+                    code_cache.note(name)
                     update(name)
-        return compiled.LOADED[name], self._kept(flat)
+        return LOADED[name], self._flat[0]
+
+
+def load_part(name: str, update: Callable[[str], None]) -> None:
+    """Compile one of :data:`PARTS`, or take it from disk.
+
+    Parameters
+    ----------
+    name, update
+        Of the part, and what is called with it then.
+    """
+    from . import loops
+
+    if name not in LOADED:
+        LOADED[name] = loops.part(name)
+        code_cache.note(name)
+        update(name)
 
 
 def compiling(names: Iterable[str]) -> float:
@@ -263,12 +289,12 @@ def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
         Of the name of what is done.
     """
     global _announced
-    names = {name for name in names if not compiled.on_disk(name)}
+    names = {name for name in names if not code_cache.on_disk(name)}
     if not names or _announced:
         yield _nothing
         return
-    said = (f"compiling once, about {compiling(names):.2g} s, kept in {compiled.folder()}"
-            if compiled.can_keep() else f"compiling, about {compiling(names):.2g} s")
+    said = (f"compiling once, about {compiling(names):.2g} s, kept in {code_cache.folder()}"
+            if code_cache.can_keep() else f"compiling, about {compiling(names):.2g} s")
     logger.info("%s: %s", ", ".join(sorted(names)), said)
     _announced = True
     try:

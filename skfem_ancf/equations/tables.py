@@ -1,42 +1,37 @@
 """The equations of a scene as tables that texts take."""
 
 from copy import copy
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 from weakref import ref
 
 import numpy as np
 
-from . import compiled
 from ..core.band import Band
 from ..beam.strain_energy import (BEGIN, KIND, FlatBody, body_of, copies_of, pushed_body_of,
                                   stress_size, viscous_body_of)
-from .compiled.words import Words, constant
-from ..actions.forces.system import NO_FORCES
 from ..actions.forces.texts import ForceTables
-from ..beam.kernels.law import LINEAR, text_of
+from ..beam.kernels.law import LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import linearised
 from ..core.origin import ours
 from ..core.callbacks import handle_of
 from ..core.sampling import sample
-from ..core.source import F1, I1, by_place
+from ..core.source import F1, I1
 from ..actions.tables import JointTables, LoadTables
 from .user_defined import UserDefined
 from ..core.types import Array
 
 #: Of a scene without them.
 _NO_INTS = np.zeros(0, np.int64)
-_NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
-                                  np.zeros(0), 0))
-_NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
-                                  np.zeros((0, 2)), np.zeros(0), _NO_INTS))
-_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64)))
+_NO_JOINTS = JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
+                         np.zeros(0), 0)
+_NO_MOMENTS = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
+                         np.zeros(0), _NO_INTS)
+_NO_BODY = FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64))
 _NO_PUSHES = np.zeros((0, 0))
-constant(NO_FORCES)
 
 
-@by_place
 class Equations(NamedTuple):
     """A scene for texts.
 
@@ -85,8 +80,8 @@ class Tables:
 
     Attributes
     ----------
-    plain, flat : Equations
-        For the plain texts, and for compiled ones.
+    plain : Equations
+        What the functions of :mod:`skfem_ancf.core.source` take.
     motion_varies, turns : bool
         A joint moves with time; its derivative in the stress-free state does.
     """
@@ -95,8 +90,6 @@ class Tables:
         # the system has the tables: without a circle both go when nobody asks for them any more
         self._system = ref(system)
         self._user_defined: UserDefined | None = None
-        self._words: list[Words] = []
-        self._words_of_loads: list[Words] = []
         self._sort(system.loads)
         self.motion_varies = any(joint.moving for joint in system.constraints.joints)
         self.turns = any(joint.turning for joint in system.constraints.joints)
@@ -127,27 +120,11 @@ class Tables:
         return bool(plain.loads.own or plain.joints.own or plain.forces.own)
 
     @cached_property
-    def flat(self) -> Equations:
-        plain = self.plain
-        addresses = {part: compiled.address(part) for part in self.parts}
-        body = self._flat(_with_laws(plain.body, compiled.law), addresses)
-        same, alone, forces = plain.viscous is plain.body, plain.copies is plain.body, plain.forces
-        if "contacts" in addresses:
-            forces = forces._replace(
-                contacts=forces.contacts._replace(address=addresses["contacts"]))
-        if "elements" in addresses:
-            forces = forces._replace(address=addresses["elements"])
-        return plain._replace(
-            body=body, viscous=body if same else self._flat(plain.viscous, addresses),
-            copies=body if alone else self._flat(_with_laws(plain.copies, compiled.law), addresses),
-            forces=forces, loads=self._flat_loads())
-
-    @cached_property
     def parts(self) -> list[str]:
-        """What of :data:`skfem_ancf.equations.compiled.ADDRESSES` the scene has."""
+        """What of :data:`skfem_ancf.equations.loops.PARTS` the scene has."""
         forces = self.plain.forces
-        return [*_parts(frozenset(map(type, self.plain.body.packs)), forces.number > 0,
-                        forces.contacts.number > 0)]
+        return [*["StrainTables"] * (len(self.plain.body.packs) > 0),
+                *["elements"] * (forces.number > 0), *["contacts"] * (forces.contacts.number > 0)]
 
     @cached_property
     def linearised(self) -> "Tables | None":
@@ -166,26 +143,8 @@ class Tables:
     def with_equations(self, plain: Equations) -> "Tables":
         """The same with other numbers."""
         tables = copy(self)
-        vars(tables).pop("flat", None)
-        tables._words, tables._words_of_loads, tables.plain = [], [], plain
+        tables.plain = plain
         return tables
-
-    def _flat(self, body, addresses):
-        """The FlatBody of a Body."""
-        found, words = _flat(body, addresses)
-        self._words += words  # it has their places only
-        return found
-
-    def _flat_loads(self):
-        """The loads for compiled texts."""
-        loads = self.plain.loads
-        if not len(loads.pushes):
-            return loads
-        pushed, self._words_of_loads = _flat(
-            _with_laws(loads.pushed, compiled.law), {
-                name: compiled.address(name) for name in {
-                    type(pack).__name__ for pack in loads.pushed.packs}})
-        return loads._replace(pushed=pushed)
 
     def _forces(self):
         s = self.system
@@ -400,13 +359,6 @@ class Tables:
         return c, g
 
 
-@cache
-def _parts(packs, elements, contacts):
-    """As :attr:`Tables.parts`, of classes of packs and whether there are elements and contacts."""
-    return ("common", *sorted(x.__name__ for x in packs),
-            *["elements"] * elements, *["contacts"] * contacts)
-
-
 def packed(values: Any, dtype: Any = np.float64) -> Any:
     """An array as compiled code takes it: contiguous and writable, of one type."""
     return np.require(values, dtype, ["C", "W"])
@@ -415,17 +367,6 @@ def packed(values: Any, dtype: Any = np.float64) -> Any:
 def _beside(arrays):
     """Arrays (n, ...) beside each other, as compiled code takes them."""
     return packed(arrays[0] if len(arrays) == 1 else np.hstack(arrays))
-
-
-def _with_laws(body, address):
-    """A Body whose laws have the addresses of their texts."""
-
-    def addressed(pack):
-        text = text_of(pack.law)
-        return pack if text is None else pack._replace(
-            law=pack.law._replace(address=address(text)))
-
-    return body._replace(packs=tuple(map(addressed, body.packs)))
 
 
 def _kind(load):
@@ -437,9 +378,3 @@ def _kind(load):
     if load.linear:
         return 2
     return 3 if load.pushes else 4
-
-
-def _flat(body, addresses):
-    """The FlatBody of a Body, and the words that it has the places of."""
-    words = [Words(pack._replace(address=addresses[type(pack).__name__])) for pack in body.packs]
-    return FlatBody(np.array([x.address for x in words], dtype=np.int64), body.table), words

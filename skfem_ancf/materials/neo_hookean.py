@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..core.types import Array, Law
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.core.loops")
 def log1p(x):
     """ln (1 + x), not a number where there is none."""
     with np.errstate(invalid="ignore", divide="ignore"):

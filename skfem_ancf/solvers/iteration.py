@@ -12,7 +12,7 @@ from ..beam.strain_energy import body_carry, body_force, body_tangent
 from ..actions.forces.texts import (add_elastic_force, add_element_tangent, contact_along,
                                     contact_work)
 from ..core.callbacks import own_solve
-from ..core.source import F1, borrowed, by_place, lanes, source
+from ..core.source import F1, lanes, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                               external_force)
 
@@ -100,7 +100,6 @@ class Unknowns(NamedTuple):
     carried: F1
 
 
-@by_place
 class Work(NamedTuple):
     """Work arrays: residual, correction, displacement before it, 1 / diagonal, loads, joints'
     opening and correction.
@@ -149,7 +148,6 @@ def equilibrium(e, target, rules, x, w, record):
     status, number
         How it ends, and the number of linear systems solved.
     """
-    target, x = borrowed(target), borrowed(x)
     N, m = x.u.size, x.multipliers.size
     clear(w.dm)
     work = before = reference = np.inf

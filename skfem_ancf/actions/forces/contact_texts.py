@@ -133,8 +133,7 @@ class ContactTables(NamedTuple):
     lasting
         Sum of what is kept from step to step: ANCHORS, PRESSURES.
     address
-        That of the compiled function of :mod:`skfem_ancf.equations.compiled.contacts`; 0 for plain
-        texts.
+        That of the compiled :func:`of_contacts`; 0 for plain texts.
     """
 
     number: int
@@ -157,7 +156,7 @@ def of_contacts(tables, asked, u, v, out):
         _of_group(tables, tables.ints[k * HEADER:(k + 1) * HEADER], asked, u, v, out)
 
 
-@primitive("contacts")
+@primitive("skfem_ancf.equations.loops")
 def run_contacts(tables, asked, u, v, out):
     """As :func:`of_contacts`; compiled once, and not anew in each text that calls it."""
     of_contacts(tables, asked, u, v, out)

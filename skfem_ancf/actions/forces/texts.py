@@ -64,7 +64,7 @@ class ForceTables(NamedTuple):
     contacts
         The obstacles, a :class:`~skfem_ancf.actions.forces.contact_texts.ContactTables`.
     address
-        That of the compiled function of :mod:`skfem_ancf.equations.compiled.elements`; 0 for plain
+        That of the compiled :func:`of_kinds`; 0 for plain
         texts.
     """
 
@@ -105,7 +105,7 @@ def _part(kinds, kind, rows, x):
 ELASTIC, RESISTING, DERIVATIVES = range(3)
 
 
-@primitive("elements")
+@primitive("skfem_ancf.equations.loops")
 def run_kinds(tables, what, y, w, factor, out):
     """As :func:`of_kinds`; compiled once, and not anew in each text that calls it."""
     of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)

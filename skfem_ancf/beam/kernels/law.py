@@ -43,7 +43,7 @@ class LawTables(NamedTuple):
     scale: F1
 
 
-@primitive("primitives")
+@primitive("skfem_ancf.equations.loops")
 def own_evaluate(handle, strain, out):
     """Stress (3, n, elements), moduli (9, ...) or energy (1, ...) of a law in Python."""
     law = _LAWS[handle]
@@ -51,7 +51,7 @@ def own_evaluate(handle, strain, out):
     out[...] = np.reshape(found, out.shape)
 
 
-@primitive("laws")
+@primitive("skfem_ancf.equations.loops")
 def run_text(law, strain, out):
     """Energy, stress or moduli of a law with a text; compiled, by its address."""
     _LAWS[law.handle].text(law.constants, strain, out)

@@ -182,7 +182,7 @@ def put_gradients(t, u, B, HB):
         put_columns(two, HB[first:last])
 
 
-@primitive("blocks")
+@primitive("skfem_ancf.equations.loops")
 def run(t, what, u, v, f, given, out, flat, ld):
     """As :func:`evaluate`; compiled once, and not anew in each function that calls it."""
     evaluate(t, what, u, v, f, given, out, flat, ld)

@@ -1,9 +1,4 @@
-"""The texts of :mod:`skfem_ancf.core.source`, compiled by Numba and kept on disk.
-
-Found at run time: without the package numba nothing changes but the speed. Only what Numba cannot
-take from the texts is written here: factors of bands, for which they have LAPACK, and calls of
-Python objects. ``python -m skfem_ancf.equations.compiled`` compiles everything beforehand.
-"""
+"""Where compiled code is kept, and what of it is there; without Numba, which loads slowly."""
 
 from __future__ import annotations
 
@@ -14,37 +9,26 @@ import os
 import sys
 from contextlib import contextmanager
 from functools import cache
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...core.errors import CompilationWarning, warn
+from .errors import CompilationWarning, warn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 logger = logging.getLogger(__name__)
 
-#: What is compiled apart from the texts that call it, and the module that does so.
-ADDRESSES = {"common": "shared", "StrainTables": "blocks",
-             "elements": "elements", "contacts": "contacts"}
-#: Those of them that this process has.
-KNOWN: set[str] = set()
-#: Compiled functions that this process has, by the name of their text.
-LOADED: dict = {}
-#: Why Numba cannot be used though it is installed.
-PROBLEMS: list[str] = []
-
 
 @cache
 def _stamp() -> str:
-    """Of all texts of the package: a function has parts from other files than its own."""
+    """Of all that is compiled: Numba looks at the file of a function, not at what it calls."""
     total = hashlib.sha256()
     package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
     for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
-        if b"@source" in text or path.parent.name == "compiled":
+        if b"@source" in text or b"numba" in text or path.name == "loops.py":
             total.update(text)
     return total.hexdigest()[:10]
 
@@ -121,7 +105,7 @@ def on_disk(*names: str) -> bool:
     Parameters
     ----------
     *names
-        Of texts, or keys of :data:`ADDRESSES`.
+        Names of what is compiled.
     """
     try:
         return all(_note_of(name).exists() for name in names)
@@ -130,77 +114,12 @@ def on_disk(*names: str) -> bool:
 
 
 def note(name: str) -> None:
-    """Note that a text has been compiled; warns where that cannot be written.
-
-    Parameters
-    ----------
-    name
-        Name of the text.
-    """
+    """Note that something has been compiled; warns where that cannot be written."""
     try:
         folder().mkdir(parents=True, exist_ok=True)
         _note_of(name).touch()
     except OSError as error:
         cannot_keep(error)
-
-
-@cache
-def address(part: str) -> int:
-    """That of what all texts call; compiles it or takes it from disk.
-
-    Parameters
-    ----------
-    part
-        A key of :data:`ADDRESSES`.
-    """
-    found = import_module(f".{ADDRESSES[part]}", __package__).address(part)
-    note(part)
-    KNOWN.add(part)
-    return found
-
-
-class TextProblem(Exception):
-    """A text of a user's own that Numba cannot compile."""
-
-
-def law(text) -> int:
-    """The address of the text of a law; compiles it.
-
-    Raises
-    ------
-    TextProblem
-        If Numba does not take it.
-    """
-    from numba.core.errors import NumbaError
-
-    from .laws import address
-
-    try:
-        return address(text)
-    except NumbaError as error:
-        name = f"{text.__module__}.{text.__qualname__}"
-        raise TextProblem(f"{name} cannot be compiled: {str(error).splitlines()[0]}") from error
-
-
-def load(text, args):
-    """The compiled function of a text, compiled or taken from disk for arguments like these.
-
-    Parameters
-    ----------
-    text
-        Marked by :func:`~skfem_ancf.core.source.source`.
-    args
-        What it will be called with.
-
-    Returns
-    -------
-    function
-    """
-    from .twin import compile_for
-
-    LOADED[text.__name__] = compile_for(text, args)
-    note(text.__name__)
-    return LOADED[text.__name__]
 
 
 @contextmanager

@@ -1,11 +1,11 @@
-"""Compile every text and keep it on disk: ``python -m skfem_ancf.equations.compiled``."""
+"""Compile everything and keep it on disk: ``python -m skfem_ancf.equations.compile``."""
 
 import os
 import sys
-from functools import partial
+from collections.abc import Callable
 
-from ...core.switch import VARIABLE
-from . import ADDRESSES, PROBLEMS, address, folder, nothing_collected, on_disk
+from ..core.code_cache import folder, nothing_collected, on_disk
+from ..core.switch import VARIABLE, compiled_off
 
 
 def main() -> None:
@@ -13,9 +13,8 @@ def main() -> None:
     os.environ[VARIABLE] = "1"
     import numpy as np
 
-    from ... import Beam, ElementBeamCable, EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff
-    from ..backend import COMPILING, announced
-    from ...core.switch import compiled_off
+    from .. import Beam, ElementBeamCable, EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff
+    from .backend import COMPILING, LOADED, PARTS, PROBLEMS, announced, load_part
 
     reason = compiled_off()
     if reason is not None:
@@ -23,18 +22,21 @@ def main() -> None:
     scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamCable(3),
                        StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.01)).clamp("left")
     system = scene.system
-    works = {**{part: partial(address, part) for part in ADDRESSES},
+    works: dict[str, Callable[[], object]] = {
              "evaluate": lambda: system.internal_force(np.zeros(system.N)),
              "equilibrium": scene.solve_static,
              "steps": lambda: scene.integrate(0.02, 0.01, EnergyMomentum())}
     if on_disk(*COMPILING):
         print(f"all is compiled already, in {folder()}", file=sys.stderr)
     with nothing_collected(), announced(COMPILING) as update:
+        for part in PARTS:
+            load_part(part, update)
         for name, work in works.items():
             work()
             if PROBLEMS:
                 raise SystemExit(PROBLEMS[0])
             update(name)
+    assert set(COMPILING) <= set(LOADED)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,189 @@
+"""Compiles the functions that :mod:`skfem_ancf.core.source` marks, by Numba's public interface.
+
+Marked functions are registered by ``numba.extending``, so that compiled code finds them by what
+Python calls. What is called from Python, or by its address, is kept on disk. Numba compiles what a
+function calls anew with each that calls it: behind an address large parts are compiled once.
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import cache
+from importlib import import_module
+from types import FunctionType
+from typing import Any, get_type_hints
+
+from numba import carray, cfunc, njit, types, typeof
+from numba.extending import intrinsic, overload
+
+from .code_cache import cannot_keep, can_keep, key, nothing_collected
+from .source import MARKED
+
+logger = logging.getLogger(__name__)
+
+# no "nnan" and "ninf": a strain that is not finite must be seen
+OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+#: Types of fields and arguments, by their annotations.
+SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(None): types.none}
+_DTYPES = {"f": types.float64, "i": types.int64}
+_registered: set[Any] = set()
+
+
+def register() -> None:
+    """Let compiled code call all marked functions that there are."""
+    while len(_registered) < len(MARKED):
+        for function, module in list(MARKED.items()):
+            if function not in _registered:
+                _registered.add(function)
+                loops = import_module(module) if module else None
+                found = getattr(loops, function.__name__, function)
+                _register(function, found)
+                if found is not function and callable(found):
+                    _register(found, found)  # loops call each other
+
+
+def _register(function, found):
+    @overload(function, jit_options=OPTIONS, strict=False)
+    def choose(*args):
+        return found if callable(found) else found[len(args)]
+
+
+def type_of(hint: Any) -> Any:
+    """Numba's type of an annotation: a number, an array as ``F1``, or a class of named tuples."""
+    code = getattr(hint, "__metadata__", [None])[0]
+    if code:
+        return types.Array(_DTYPES[code[0]], int(code[1]), "C")
+    if hint in SCALARS:
+        return SCALARS[hint]
+    return types.NamedTuple([type_of(x) for x in _hints(hint)], hint)
+
+
+@cache
+def _hints(kind):
+    return tuple(get_type_hints(kind, include_extras=True).values())
+
+
+def entry(function: Any, args: Any) -> Any:
+    """The compiled function for Python, compiled or taken from disk.
+
+    Parameters
+    ----------
+    function
+        A marked function.
+    args
+        What it is called with: it takes arguments of these types only.
+    """
+    signature = tuple(typeof(x) for x in args)
+    return _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(function)))
+
+
+def address(function: Any, hints: Any, name: str = "", kept: bool = True) -> int:
+    """The address of a compiled function, see :func:`caller`.
+
+    Parameters
+    ----------
+    function, hints
+        The function, and annotations of its arguments.
+    name
+        Of it on disk, where it has to be told from others.
+    kept
+        Keep it on disk.
+    """
+    signature = types.void(*map(type_of, hints))
+
+    def compiled(**options):
+        return cfunc(signature, **options, **OPTIONS)(_named(function, name))
+
+    found = _kept(compiled) if kept else compiled()
+    _alive.append(found)
+    return found.address
+
+
+_alive: list[Any] = []
+
+
+def _named(function, name=""):
+    """A copy, under a name by which Numba finds no code of other versions on disk."""
+    copy = FunctionType(function.__code__, function.__globals__, function.__name__,
+                        function.__defaults__, function.__closure__)
+    copy.__module__ = function.__module__
+    copy.__qualname__ = f"{function.__name__}{name}_{key()}"
+    return copy
+
+
+def _kept(compiled):
+    """What ``compiled(cache=True)`` returns, or without where nothing can be kept."""
+    register()
+    with nothing_collected():
+        if can_keep():
+            try:
+                return compiled(cache=True)
+            except (RuntimeError, OSError, EOFError, KeyError, ValueError, TypeError) as error:
+                cannot_keep(error)
+        return compiled()
+
+
+def caller(*hints: Any) -> Any:
+    """What compiled code calls an address with, and a tuple of arguments.
+
+    Parameters
+    ----------
+    *hints
+        Annotations of the arguments.
+    """
+    takes = tuple(map(type_of, hints))
+    function = types.FunctionPrototype(types.void, takes)
+
+    @intrinsic
+    def call(typing, address, arguments):
+        def generate(context, builder, signature, args):
+            pointer = builder.inttoptr(args[0], context.get_value_type(function))
+            builder.call(pointer, [builder.extract_value(args[1], k) for k in range(len(takes))])
+            return context.get_dummy_value()
+
+        return types.void(types.int64, types.Tuple(takes)), generate
+
+    return call
+
+
+def _pointer(kind):
+    """What makes a pointer of an address."""
+    @intrinsic
+    def pointer(typing, address):
+        def generate(context, builder, signature, args):
+            return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
+
+        return types.CPointer(kind)(types.int64), generate
+
+    return pointer
+
+
+_POINTERS = {letter: _pointer(kind) for letter, kind in _DTYPES.items()}
+
+
+@cache
+def reader(kind: Any) -> Any:
+    """A function of the address of :class:`~skfem_ancf.core.words.Words`: their named tuple."""
+    names = {"carray": carray, **_POINTERS}
+
+    def read(kind, at):
+        names[kind.__name__], fields = kind, []
+        for hint in _hints(kind):
+            code = getattr(hint, "__metadata__", [None])[0]
+            if code:
+                shape = "".join(f"w[{at + 1 + k}], " for k in range(int(code[1])))
+                fields.append(f"carray({code[0]}(w[{at}]), ({shape}))")
+                at += 1 + int(code[1])
+            elif hint in SCALARS:
+                fields.append(f"{'x' if hint is float else 'w'}[{at}]")
+                at += 1
+            else:
+                one, at = read(hint, at)
+                fields.append(one)
+        return f"{kind.__name__}({', '.join(fields)})", at
+
+    made, size = read(kind, 0)
+    code = (f"def read(address):\n    w = carray(i(address), ({size},))\n"
+            f"    x = carray(f(address), ({size},))\n    return {made}\n")
+    exec(code, names)  # noqa: S102
+    return njit(**OPTIONS)(names["read"])

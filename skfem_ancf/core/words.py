@@ -1,0 +1,45 @@
+"""The numbers of a named tuple as words of one array, which compiled code is given the place of.
+
+Of a number the word is the number, of an array its address and shape, of a tuple its words.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+class Words:
+    """The words of a named tuple; it and they live as long as this.
+
+    Parameters
+    ----------
+    x
+        Its fields are contiguous arrays of floats or integers, numbers, or such tuples.
+
+    Attributes
+    ----------
+    of, words, address
+        x, an array, and its place.
+    """
+
+    def __init__(self, x: tuple[Any, ...]) -> None:
+        found: list[int] = []
+        _collect(x, found)
+        self.of, self.words = x, np.array(found, np.int64)
+        self.address = self.words.ctypes.data
+
+
+def _collect(x, found):
+    for value in x:
+        if isinstance(value, np.ndarray):
+            if not value.flags.c_contiguous or value.dtype not in (float, np.int64):
+                raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
+            found += [value.ctypes.data, *value.shape]
+        elif isinstance(value, tuple):
+            _collect(value, found)
+        elif isinstance(value, float):
+            found.append(int(np.float64(value).view(np.int64)))
+        else:
+            found.append(int(value))
