@@ -7,7 +7,7 @@ function calls anew with each that calls it: behind an address large parts are c
 
 from __future__ import annotations
 
-import logging
+import pickle
 from functools import cache
 from importlib import import_module
 from types import FunctionType
@@ -19,13 +19,14 @@ from numba.extending import intrinsic, overload
 from .code_cache import cannot_keep, can_keep, key, nothing_collected
 from .source import MARKED
 
-logger = logging.getLogger(__name__)
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 #: Types of fields and arguments, by their annotations.
 SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(None): types.none}
 _DTYPES = {"f": types.float64, "i": types.int64}
+#: What reading or writing what is kept raises, where there is something else.
+_SPOILT = RuntimeError, OSError, EOFError, pickle.PickleError, KeyError, ValueError
 _registered: set[Any] = set()
 
 
@@ -118,7 +119,7 @@ def _kept(compiled):
         if can_keep():
             try:
                 return compiled(cache=True)
-            except (RuntimeError, OSError, EOFError, KeyError, ValueError, TypeError) as error:
+            except _SPOILT as error:
                 cannot_keep(error)
         return compiled()
 
