@@ -22,20 +22,7 @@ if TYPE_CHECKING:
 
 
 def bind_item(item: Item, layout: Layout) -> list[Item]:
-    """What an item is in the equations of a scene: loads, joints, force elements, supports.
-
-    Parameters
-    ----------
-    item
-        As it was given, on one beam, see :meth:`~skfem_ancf.Item.expand`.
-    layout
-        Of the scene.
-
-    Raises
-    ------
-    InputError
-        If the item does not keep to the protocol of its class.
-    """
+    """What an item is in the equations of a scene: loads, joints, force elements, supports."""
     if isinstance(item, Support):
         return [item.bind(layout)]
     if isinstance(item, Load):

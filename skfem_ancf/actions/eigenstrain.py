@@ -327,13 +327,7 @@ def _asked(name, f, x, y):
 
 
 def require_alone(loads: Sequence[Any]) -> None:
-    """Raise InputError where two stress-free strains of one beam do not add up.
-
-    Parameters
-    ----------
-    loads
-        Loads, bound.
-    """
+    """Raise InputError where two stress-free strains of one beam do not add up."""
     beams = [load.beam for load in loads if isinstance(load, EigenStrain)]
     for load in loads:
         if getattr(load, "alone", False) and sum(beam is load.beam for beam in beams) > 1:
@@ -387,25 +381,6 @@ def products(name: str, function: Callable[..., Any], beam: Beam
 
     Found by empirical interpolation: the function at some times, and its values at as many places
     as the factors; exact for what is such a sum.
-
-    Parameters
-    ----------
-    name
-        For messages.
-    function
-        Takes arrays x and y of one shape, and a time.
-    beam
-        The :class:`~skfem_ancf.Beam` on which it is wanted.
-
-    Returns
-    -------
-    list
-        Pairs of a function of place and one of time.
-
-    Raises
-    ------
-    InputError
-        If it takes more than a few products.
 
     References
     ----------

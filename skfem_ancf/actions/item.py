@@ -132,17 +132,7 @@ class Item(Immutable):
 
 
 def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
-    """Raise InputError unless rows, columns and values are entries of an n x n matrix.
-
-    Parameters
-    ----------
-    what
-        What messages call the matrix.
-    i, j, v
-        Rows, columns and values, shapes (k,).
-    n
-        Number of rows and columns of the matrix.
-    """
+    """Raise InputError unless rows, columns and values are entries of an n x n matrix."""
     i, j = np.asarray(i), np.asarray(j)
     v = require_finite(what, v, (None,))
     if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
@@ -157,13 +147,6 @@ def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
     """Call a check of derivatives at displacements at which nothing is zero by chance.
 
     At one of two it may fail: there may be a kink.
-
-    Parameters
-    ----------
-    check
-        A function of a displacement and of a step that is small to it; raises InputError.
-    sizes
-        What DOFs change by where things move by their size, shape (N,).
     """
     angles = np.arange(len(sizes))
     try:

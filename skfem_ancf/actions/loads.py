@@ -222,25 +222,7 @@ class Load(Item):
 
 
 def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
-    """A load on a beam, tried there: what it returns fits the beam.
-
-    Parameters
-    ----------
-    load
-        A :class:`Load`, as it was given.
-    beam
-        The :class:`~skfem_ancf.Beam` or :class:`~skfem_ancf.RigidBody` it acts on.
-
-    Returns
-    -------
-    Load
-        Sealed.
-
-    Raises
-    ------
-    InputError
-        If the load does not keep to the interface of :class:`Load`.
-    """
+    """A load on a beam, tried there: what it returns fits the beam."""
     if isinstance(beam, RigidBody) and not load.for_bodies:
         raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
                          "takes scene.gravity, point_force, follower_force, moment, springs and "
@@ -377,17 +359,7 @@ class PointForce(Load):
 
 
 def number_at(layout: Layout, at: Any, beam: Any) -> int:
-    """The number of a beam or body; if none is named, of the one that has a point.
-
-    Parameters
-    ----------
-    layout
-        Of the scene.
-    at
-        The point, or None.
-    beam
-        The beam or body, its name or its number, or None.
-    """
+    """The number of a beam or body; if none is named, of the one that has a point."""
     if beam is None and at is not None and len(layout.members) > 1:
         found = nearest_of(layout, at, members_at(layout, at))
         if len(found) == 1:

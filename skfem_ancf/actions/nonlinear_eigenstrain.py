@@ -28,19 +28,7 @@ SECTION, ROUND_OFF = 6, 1e-12
 
 
 def energy_lost(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> float:
-    """The integral of W(E) - W(E - factor E0).
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam` with sections.
-    u
-        Displacement of its coordinates, shape (N,).
-    eigen
-        E0 at the samples of each term as :func:`sampled` returns it, (ns, nelements).
-    factor
-        On E0.
-    """
+    """The integral of W(E) - W(E - factor E0)."""
     total = 0.0
     for t, E0 in zip(beam.kernel.tables, eigen):
         E = strains(t, u)
@@ -58,17 +46,7 @@ def pushed_at(t: Any, E0: Array, stresses: Array) -> Array:
 
 
 def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
-    """A stress-free strain where a term samples the strain, (ns, nelements).
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam` with sections.
-    integral
-        One of the kernel's :class:`~skfem_ancf.beam.kernels.section.Integral`.
-    eigen
-        The :class:`~skfem_ancf.actions.eigenstrain.EigenStrain`.
-    """
+    """A stress-free strain where a term samples the strain, (ns, nelements)."""
     term, layer, out = integral.term, integral.layer, []
     for row, name in enumerate(COMPONENTS):
         xi, eta = term.nodes(name), term.section_nodes
@@ -84,21 +62,6 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
     A section that bends freely under E0 has a plane eps_xx, and S_yy = 0: eps_yy is E0_yy - nu
     (eps_xx - E0_xx). It jumps between layers, and may be of any degree across, where eps_yy of an
     element is one polynomial. Less this part, E0 has no S_yy that resists the element.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam` with sections.
-    eigen
-        The :class:`~skfem_ancf.actions.eigenstrain.EigenStrain`.
-    layer, X, tind
-        The layer of all points, the points, shape (2, npoints) or (2, nelements, npoints), and
-        elements (nelements,), or None for all.
-
-    Returns
-    -------
-    ndarray
-        Shape (nelements, npoints).
     """
     across, degree = beam.across, beam.element.order - 1
     x, y = across.coordinates(X, tind)

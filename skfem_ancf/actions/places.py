@@ -54,37 +54,13 @@ class Vector:
         return self.start + np.sum(u[self.dofs] * self.weights, axis=1)
 
     def row(self, direction: ArrayLike, n: int) -> Array:
-        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,).
-
-        Parameters
-        ----------
-        direction
-            Shape (2,).
-        n
-            Number of all coordinates.
-
-        Returns
-        -------
-        ndarray
-            Shape (n,).
-        """
+        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,)."""
         out = np.zeros(n)
         np.add.at(out, self.dofs, np.asarray(direction)[:, None] * self.weights)
         return out
 
     def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
-        """The derivative of ``direction . vector`` by the coordinates.
-
-        Parameters
-        ----------
-        direction
-            Shape (2,).
-
-        Returns
-        -------
-        columns, values
-            Shapes (k,).
-        """
+        """The derivative of ``direction . vector`` by the coordinates."""
         return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
 
 
@@ -178,15 +154,7 @@ def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) 
 
 
 def members_at(layout: Layout, at: ArrayLike) -> list[int]:
-    """Numbers of the beams that have a material point at a place, and of bodies around it.
-
-    Parameters
-    ----------
-    layout
-        Of the scene.
-    at
-        The place (x, y) in the stress-free state, shape (2,), or the name of an end.
-    """
+    """Numbers of the beams that have a material point at a place, and of bodies around it."""
     found = []
     if not isinstance(at, str):
         at = as_point(at)
@@ -205,13 +173,6 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
 
 def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
     """Of beams that have a point those whose axes are nearest to it; others if a body has it, too.
-
-    Parameters
-    ----------
-    layout, at
-        As for :func:`members_at`: a point, shape (2,), or the name of a place.
-    found
-        What that returned.
     """
     beams: list[Any] = [layout.members[k] for k in found]
     if len(found) < 2 or isinstance(at, str) or any(isinstance(b, RigidBody) for b in beams):
@@ -222,28 +183,7 @@ def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
 
 
 def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
-    """Which beam or body a place is of, and the place there.
-
-    Parameters
-    ----------
-    layout
-        Of the scene.
-    place
-        (x, y): the material point there; (beam, (x, y)), or another place of a beam; a RigidBody,
-        for its centre of mass; ("ground", (x, y)); "right", for the end that one beam alone has.
-    where_none_is
-        Whose a point is where no beam and no body is: "ground", or None to raise InputError.
-
-    Returns
-    -------
-    which, at
-        As :func:`point` takes them.
-
-    Raises
-    ------
-    InputError
-        If there is no beam and no body, or more than one.
-    """
+    """Which beam or body a place is of, and the place there."""
     if isinstance(place, RigidBody):
         return place, None
     if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
@@ -271,17 +211,7 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
 
 
 def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
-    """A place for each of several beams: given once for all of them, or once for each.
-
-    Parameters
-    ----------
-    value
-        One place, or n of them: a tuple, a list, or the rows of an array of points, shape (n, 2).
-    what
-        What it is, for messages.
-    n
-        How many beams there are.
-    """
+    """A place for each of several beams: given once for all of them, or once for each."""
     if value is None:
         raise InputError(f"a joint needs {what}")
     value = points_of_rows(value)
@@ -294,15 +224,7 @@ def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
 
 
 def both_of(name: str, place: Any) -> tuple[Any, Any]:
-    """A beam or body and a place of it; a RigidBody alone is all of it.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    place
-        As (beam, place), or a RigidBody.
-    """
+    """A beam or body and a place of it; a RigidBody alone is all of it."""
     if isinstance(place, RigidBody):
         return place, None
     if not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place):
@@ -322,21 +244,7 @@ def several(beams: Any) -> tuple[Any, ...]:
 
 
 def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:
-    """Beams and places of a joint.
-
-    Parameters
-    ----------
-    layout
-        Of the scene.
-    places
-        One point (x, y), at which two beams or bodies or more meet; or for each of them a place, as
-        :func:`named_place` takes it.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two at the point.
-    """
+    """Beams and places of a joint."""
     if len(places) > 1:
         pairs = [named_place(layout, place) for place in places]
         return [which for which, _ in pairs], [at for _, at in pairs]

@@ -83,38 +83,6 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
     and the elements that contribute most to it are halved. It estimates the error of the elements'
     strain; that of the recovered strain, which is what State.strain returns, is smaller.
 
-    Parameters
-    ----------
-    scene
-        A scene whose supports and loads were given by names, points and functions, so that they
-        can be put on another mesh.
-    tol
-        Tolerance of both estimates.
-    max_elements
-        Largest number of elements of the finer mesh.
-    goal
-        "displacement" or "strain".
-    max_degree
-        Largest degree along the axis; that of the elements, or less, to halve elements alone.
-    **options
-        Those of :func:`~skfem_ancf.solvers.newton.solve_static`.
-
-    Returns
-    -------
-    State
-        The finer one of the last round, with ``error_estimate``, a dictionary with
-        "displacement" and "energy", or "strain", ``scene``, the scene on that mesh, and
-        ``refinements``, a tuple of :class:`Refinement` that says what was done.
-
-    Raises
-    ------
-    NameUnknown
-        If the goal is not known.
-    InputError
-        If the goal is "strain" and a beam's strain cannot be recovered.
-    ConvergenceError
-        If ``max_elements`` do not suffice; its ``state`` is the last State.
-
     References
     ----------
     Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM", Advances in
@@ -266,25 +234,7 @@ def _solve_for_strain(scene, tol, max_elements, **options):
 
 
 def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
-    """Squared L2 norm of recovered minus elements' strain, and of the strain, by element.
-
-    Parameters
-    ----------
-    state
-        A State.
-    beam
-        One of its beams.
-
-    Returns
-    -------
-    error, size
-        Shapes (nelements,).
-
-    Raises
-    ------
-    InputError
-        If the strain of the beam cannot be recovered.
-    """
+    """Squared L2 norm of recovered minus elements' strain, and of the strain, by element."""
     recovery = state.recovery(beam)
     if recovery is None:
         k = list(state.beams).index(beam)
@@ -304,20 +254,7 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
 
 
 def refine(scene: Any, marked: Sequence[ArrayLike]) -> tuple[Any, Callable[[Array], Array]]:
-    """The scene with elements halved, and the map of displacements onto it.
-
-    Parameters
-    ----------
-    scene
-        A scene.
-    marked
-        For each beam the numbers of the elements to halve, shapes (k,).
-
-    Returns
-    -------
-    scene, prolong
-        ``prolong(u)`` is the displacement u (N,) in the coordinates of the new scene.
-    """
+    """The scene with elements halved, and the map of displacements onto it."""
     beams = [b.replace(mesh=b.mesh.refined(np.asarray(m, dtype=int)))
              for b, m in zip(scene.beams, marked)]
 

@@ -42,13 +42,7 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 def parameters_of(item: type) -> Callable[[Method], Method]:
-    """Give a method the *Parameters* of the class of which it adds an instance.
-
-    Parameters
-    ----------
-    item
-        The class, whose constructor takes the arguments of the method.
-    """
+    """Give a method the *Parameters* of the class of which it adds an instance."""
     found = re.search(r"^Parameters\n-+\n.*?(?=^\w+\n-+\n|\Z)",
                       inspect.cleandoc(item.__doc__ or ""), re.DOTALL | re.MULTILINE)
 

@@ -47,22 +47,7 @@ class Plan(tuple):
 
 
 def make_plan(system: System, kind: str = "static", sensors: int = 0) -> Plan:
-    """The plan of a scene.
-
-    Parameters
-    ----------
-    system
-        The equations of the scene.
-    kind
-        "static", "linear" (``scene.solve_linear``) or "dynamic".
-    sensors
-        How many there are.
-
-    Raises
-    ------
-    NameUnknown
-        If the kind is not known.
-    """
+    """The plan of a scene."""
     require_option("kind of solution", kind, KINDS)
     return Plan([Item(*item) for part in (_energy, _matrices, _forces, _solution)
                  for item in part(system, kind)] + [Item(*_sensors(sensors, kind == "dynamic"))])

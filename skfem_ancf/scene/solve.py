@@ -38,19 +38,7 @@ LINEAR_SOLVES, SOLVED_AGAIN, CLOSE = 4, 50000, 1e-13
 
 def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
               damping: Damping | None) -> System:
-    """The equations of a scene.
-
-    Parameters
-    ----------
-    layout
-        Of the scene.
-    bound
-        What acts, bound to it.
-    fixed
-        Displacements at full load of degrees of freedom that are held, by their numbers.
-    damping
-        That of the whole scene, or None.
-    """
+    """The equations of a scene."""
     loads = [one for one in bound if isinstance(one, Load)]
     elements = [one for one in bound if isinstance(one, ForceElement)]
     return System(layout.beams, loads + _weights(layout, loads, elements),
@@ -68,15 +56,7 @@ def _weights(layout, loads, elements):
 
 
 def velocity_of(member: Beam | RigidBody, v: Any) -> Array:
-    """A velocity of the degrees of freedom of a beam or rigid body, shape (N,).
-
-    Parameters
-    ----------
-    member
-        The beam or rigid body.
-    v
-        As for :meth:`skfem_ancf.Scene.initial_velocity`.
-    """
+    """A velocity of the degrees of freedom of a beam or rigid body, shape (N,)."""
     if (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,):
         uniform = require_finite("v", v, (2,))
         return velocity_of(member, lambda x: np.multiply.outer(uniform, np.ones(x[0].shape)))
@@ -113,19 +93,7 @@ def solve_linear(system: System) -> State:
 
 
 def solve_static(system: System, u: Array | None, memory: Any = None, **options: Any) -> State:
-    """The equilibrium under the full load, without warnings, see :func:`warn_about`.
-
-    Parameters
-    ----------
-    system
-        The equations.
-    u
-        Displacement at the start, shape (N,); None for zero.
-    memory
-        Of the contacts at the start.
-    **options
-        Those of :func:`skfem_ancf.solvers.newton.solve_static`.
-    """
+    """The equilibrium under the full load, without warnings, see :func:`warn_about`."""
     require_options("solve_static", options, OPTIONS,
                     "; first_step=0.1 begins with a tenth of the load; with adapt= those of "
                     "scene.adapt.solve_adaptive too")
@@ -161,13 +129,7 @@ def warn_about(state: State) -> None:
 
 
 def critical_of(point: CriticalPoint, system: System) -> Any:
-    """What a CriticalPoint of a path of a system was made from.
-
-    Parameters
-    ----------
-    point, system
-        The point, and the system whose path is to branch there.
-    """
+    """What a CriticalPoint of a path of a system was made from."""
     if not isinstance(point, CriticalPoint) or point.kind != "bifurcation":
         raise InputError("branch must be a point of path.critical_points of kind 'bifurcation', "
                          f"got {shown(point)}")

@@ -241,20 +241,7 @@ class ForceElement(Item):
 
 
 def differences(function: Callable[[Array], Any], x: Array) -> Array:
-    """The derivative of a function of an array by central differences.
-
-    Parameters
-    ----------
-    function
-        Of an array of the shape of x.
-    x
-        Where, shape (...).
-
-    Returns
-    -------
-    ndarray
-        Shape (..., ...): that of the function's values, then that of x.
-    """
+    """The derivative of a function of an array by central differences."""
     step = STEP * max(1.0, float(np.abs(x).max(initial=0.0)))
     units = step * np.eye(x.size).reshape(x.size, *x.shape)
     columns = [(np.asarray(function(x + d)) - function(x - d)) / (2.0 * step) for d in units]
@@ -262,13 +249,7 @@ def differences(function: Callable[[Array], Any], x: Array) -> Array:
 
 
 def derivative(function: Callable[[Array], Any], x: Array) -> Array:
-    """As :func:`differences`, by complex steps where those agree; of a complex x by these alone.
-
-    Parameters
-    ----------
-    function, x
-        As there, x of shape (...).
-    """
+    """As :func:`differences`, by complex steps where those agree; of a complex x by these alone."""
     if np.iscomplexobj(x):
         raise TypeError("complex steps of complex steps")
     out = differences(function, x)
@@ -331,15 +312,7 @@ def _links(element, links):
 
 
 def try_force(bound: Any, sizes: Any = None) -> None:
-    """Raise InputError unless what a user-defined force element returns fits together.
-
-    Parameters
-    ----------
-    bound
-        A bound element.
-    sizes
-        What its places change by, shape (n, 2); their distance from the origin, or one, by default.
-    """
+    """Raise InputError unless what a user-defined force element returns fits together."""
     x = np.array([x.start for x in bound.links])
     n, zero = len(x), np.zeros_like(x)
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))

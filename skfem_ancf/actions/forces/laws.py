@@ -63,25 +63,13 @@ class Law:
         return float(scipy.integrate.quad(self, 0.0, s, epsabs=0.0, epsrel=1e-12, limit=200)[0])
 
     def work(self, a: float, b: float) -> float:
-        """What the potential gains from a to b, two states of one step.
-
-        Parameters
-        ----------
-        a, b
-            Elongations, angles.
-        """
+        """What the potential gains from a to b, two states of one step."""
         if self.energy is not None:
             return self.potential(b) - self.potential(a)
         return (b - a) * self.mean(a, b)
 
     def mean(self, a: float, b: float) -> float:
-        """The mean force from a to b, whose product with b - a is :meth:`work`.
-
-        Parameters
-        ----------
-        a, b
-            Elongations, or angles, at the start and the end of a step.
-        """
+        """The mean force from a to b, whose product with b - a is :meth:`work`."""
         if a == b:
             return self(a)
         x, w = gauss(POINTS)
@@ -94,15 +82,7 @@ class Law:
         return found
 
     def slope(self, s: float, scale: float = 1.0) -> float:
-        """Its derivative at s, by differences.
-
-        Parameters
-        ----------
-        s
-            Where.
-        scale
-            A length, or angle, beside which the step is small.
-        """
+        """Its derivative at s, by differences."""
         d = STEP * max(abs(s), scale)
         return (self(s + d) - self(s - d)) / (2.0 * d)
 
@@ -111,17 +91,7 @@ class Law:
 
 
 def number_or_law(name: str, given: Any, of: str) -> float | Law:
-    """A number that is not negative as it is, a function as a :class:`Law`.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    given
-        What was given.
-    of
-        What a function of it is a function of.
-    """
+    """A number that is not negative as it is, a function as a :class:`Law`."""
     if isinstance(given, Law):
         return given
     if callable(given) or isinstance(given, (tuple, list)):
@@ -139,55 +109,25 @@ def said(k: float | Law) -> str:
 
 
 def force_of(k: float | Law, s: float) -> float:
-    """What a number times s is, or the law at s.
-
-    Parameters
-    ----------
-    k, s
-        A number or a Law, and where.
-    """
+    """What a number times s is, or the law at s."""
     return k(s) if isinstance(k, Law) else k * s
 
 
 def potential_of(k: float | Law, s: float) -> float:
-    """Its integral from zero.
-
-    Parameters
-    ----------
-    k, s
-        A number or a Law, and where.
-    """
+    """Its integral from zero."""
     return k.potential(s) if isinstance(k, Law) else 0.5 * k * s * s
 
 
 def work_of(k: float | Law, a: float, b: float) -> float:
-    """Its integral between two states of one step.
-
-    Parameters
-    ----------
-    k, a, b
-        A number or a Law, and the states.
-    """
+    """Its integral between two states of one step."""
     return k.work(a, b) if isinstance(k, Law) else 0.5 * k * (b - a) * (b + a)
 
 
 def mean_of(k: float | Law, a: float, b: float) -> float:
-    """Its mean between two states of one step, whose product with b - a is its integral.
-
-    Parameters
-    ----------
-    k, a, b
-        A number or a Law, and the states.
-    """
+    """Its mean between two states of one step, whose product with b - a is its integral."""
     return k.mean(a, b) if isinstance(k, Law) else 0.5 * k * (a + b)
 
 
 def slope_of(k: float | Law, s: float, scale: float) -> float:
-    """Its derivative.
-
-    Parameters
-    ----------
-    k, s, scale
-        A number or a Law, where, and as for :meth:`Law.slope`.
-    """
+    """Its derivative."""
     return k.slope(s, scale) if isinstance(k, Law) else k

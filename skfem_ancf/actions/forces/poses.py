@@ -11,26 +11,12 @@ if TYPE_CHECKING:
 
 
 def carried(pose: Array, x: Array) -> Array:
-    """Where points of an obstacle are that were at x, shape (2, n), when it was given.
-
-    Parameters
-    ----------
-    pose
-        That of :meth:`~skfem_ancf.actions.obstacles.obstacle.Obstacle.pose`, shape (10,).
-    x
-        Points, shape (2, n).
-    """
+    """Where points of an obstacle are that were at x, shape (2, n), when it was given."""
     turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
     return turn @ (x - pose[4:6, None]) + pose[4:6, None] + pose[:2, None]
 
 
 def taken_back(pose: Array, x: Array) -> Array:
-    """The inverse of :func:`carried`.
-
-    Parameters
-    ----------
-    pose, x
-        As there, shapes (10,) and (2, n).
-    """
+    """The inverse of :func:`carried`."""
     turn = np.array([[pose[2], pose[3]], [-pose[3], pose[2]]])
     return turn @ (x - pose[4:6, None] - pose[:2, None]) + pose[4:6, None]

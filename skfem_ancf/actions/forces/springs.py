@@ -25,16 +25,7 @@ STILL = 1e-3
 
 
 def end_of(layout: Layout, place: Any) -> Vector:
-    """A material point, or one of the ground.
-
-    Parameters
-    ----------
-    layout
-        What :meth:`ForceElement.bind` was given.
-    place
-        (x, y): the material point there, or the point of the ground where no beam and no rigid
-        body is; a RigidBody, for its centre of mass; (beam, (x, y)); or ("ground", (x, y)).
-    """
+    """A material point, or one of the ground."""
     which, at = named_place(layout, place, GROUND)
     return point(layout, which, at)
 

@@ -112,17 +112,7 @@ class Forces:
         return tuple(np.concatenate(column) for column in zip(*found))
 
     def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
-        """What texts take.
-
-        Parameters
-        ----------
-        position
-            Where an entry (i, j) is in the band.
-        symmetric
-            The band has its lower half only.
-        handle
-            What finds elements of one's own.
-        """
+        """What texts take."""
         if not self.elements:
             return NO_FORCES
         at, of, weight, start = [], [], [], np.zeros(self.rows)
@@ -188,31 +178,13 @@ class Forces:
     # values
 
     def vectors(self, tables: ForceTables, u: Array) -> Array:
-        """The vectors' numbers at u.
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        u
-            Displacement of the coordinates, shape (N,).
-        """
+        """The vectors' numbers at u."""
         y = np.empty(self.rows)
         vectors_of(tables, u, 1.0, y)
         return y
 
     def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
-        """The potential of all elements; those without one count as zero.
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        u
-            Displacement of the coordinates, shape (N,).
-        t
-            Time, for obstacles that move.
-        """
+        """The potential of all elements; those without one count as zero."""
         y = self.vectors(tables, u)
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
@@ -224,17 +196,7 @@ class Forces:
         return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
 
     def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
-        """Ask sampled controls whose time it is.
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        u, v, t
-            Displacement of the coordinates and its rate, shape (N,), and time.
-        first
-            A motion begins.
-        """
+        """Ask sampled controls whose time it is."""
         y, w = self.vectors(tables, u), np.empty(self.rows)
         vectors_of(tables, v, 0.0, w)
         for element, (rows, _) in zip(self.own, self._slices):
@@ -252,15 +214,7 @@ class Forces:
         return self._place[:0]
 
     def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
-        """What resists on the first vector of each part, shape (2, parts).
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        u, v
-            Displacement of the coordinates and its rate, shape (N,).
-        """
+        """What resists on the first vector of each part, shape (2, parts)."""
         y, w, out = self.vectors(tables, u), np.empty(self.rows), np.zeros(self.rows)
         vectors_of(tables, v, 0.0, w)
         run_kinds(tables, np.int64(ELASTIC), y, y, 0.0, out)
@@ -270,17 +224,7 @@ class Forces:
         return (out + resisting)[:2 * n].reshape(2, n)
 
     def small_part_forces(self, tables: ForceTables, t: float, base: Array, d: Array) -> Array:
-        """As :meth:`part_forces` of elements on single points at rest, linearised.
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        t
-            Time.
-        base, d
-            A displacement of the coordinates, and what is added to it, shape (N,).
-        """
+        """As :meth:`part_forces` of elements on single points at rest, linearised."""
         n, w = len(self.parts), np.empty(self.rows)
         vectors_of(tables, d, 0.0, w)
         D = self.stiffness(tables, t, base, 0.0 * base, 0.0)[:16 * n].reshape(4, 4, n)
@@ -288,18 +232,7 @@ class Forces:
             "ijk,jk->ik", D[:2, :2], w[:2 * n].reshape(2, n))
 
     def turns(self, u: Array) -> Array:
-        """The angles of springs of sections, in (-pi, pi] about those without moment.
-
-        Parameters
-        ----------
-        u
-            Displacements of the coordinates, shape (n, N).
-
-        Returns
-        -------
-        ndarray
-            Shape (k, n).
-        """
+        """The angles of springs of sections, in (-pi, pi] about those without moment."""
         springs = [part for part in self.parts if part.kind == TORSION and part.numbers[0] > 0.0]
         out = np.empty((len(springs), len(u)))
         for row, part in zip(out, springs):
@@ -311,42 +244,19 @@ class Forces:
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
-        """The derivatives by the vectors, shape (size,).
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        t, u, v, factor
-            Time, displacement and velocity, shape (N,), and the factor on derivatives by
-            velocities.
-        """
+        """The derivatives by the vectors, shape (size,)."""
         D = np.zeros(self.size)
         element_stiffness(tables, t, u, v, factor, D)
         return D
 
     def firmnesses(self, tables: ForceTables, u: Array) -> Array:
-        """The largest stiffness of each element in any direction, shape (k,).
-
-        Parameters
-        ----------
-        tables
-            Those of :meth:`tables`.
-        u
-            Displacement of the coordinates, shape (N,).
-        """
+        """The largest stiffness of each element in any direction, shape (k,)."""
         D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
         return np.array([np.linalg.norm(D[at], 2) for _, _, at in self._blocks])
 
     def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
                 factor: float) -> tuple[Array, Array, Array]:
-        """The same by the coordinates: rows, columns and values.
-
-        Parameters
-        ----------
-        tables, t, u, v, factor
-            As for :meth:`stiffness`; u and v of shape (N,).
-        """
+        """The same by the coordinates: rows, columns and values."""
         D = self.stiffness(tables, t, u, v, factor)
         near, far = self._entries(False), self._entries(True)
         i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
@@ -356,19 +266,10 @@ class Forces:
 
     def add_own(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
-        """Elements of one's own: what :func:`skfem_ancf.core.callbacks.own_elements` is asked.
+        """User-defined elements, as :func:`skfem_ancf.core.callbacks.own_elements` asks.
 
-        Parameters
-        ----------
-        what
-            0: the mean force without velocity between places a and b. 1: what the velocities b
-            add to the force at a. 2: the derivatives by places, and by velocities with a factor.
-        t, factor
-            Time, and that factor.
-        a, b
-            Of all vectors, shape (rows,).
-        out
-            Added to, shape (rows,) or (size,): what resists, as an internal force.
+        ``what`` is 0: the mean force without velocity between places a and b; 1: what velocities b
+        add to the force at a; 2: the derivatives by places, and by velocities times a factor.
         """
         for element, (rows, places) in zip(self.own, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)

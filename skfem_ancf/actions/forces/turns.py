@@ -55,20 +55,7 @@ class Turns:
         return np.append(counted, self.angles(u[None])[0, self.moments:])
 
     def follow(self, last: Array, u: Array) -> Array:
-        """The angles at displacements one after the other.
-
-        Parameters
-        ----------
-        last
-            Those before, shape (k,).
-        u
-            Displacements, shape (n, N).
-
-        Returns
-        -------
-        ndarray
-            Shape (n, k).
-        """
+        """The angles at displacements one after the other."""
         if not self.number:
             return np.zeros((len(u), 0))
         return np.unwrap(np.vstack([last, self.angles(u)]), axis=0)[1:]

@@ -65,37 +65,13 @@ class Axis:
         return int(np.clip(np.floor(s), 0, self.beam.mesh.nelements - 1))
 
     def weights(self, s: float) -> tuple[Array, Array]:
-        """Coordinates of the scene, and their weights in the axis and its derivatives by s.
-
-        Parameters
-        ----------
-        s
-            The parameter; beyond an end the curve of the last element goes on.
-
-        Returns
-        -------
-        dofs, weights
-            Shapes (2, nb) and (4, nb): of the position and its first three derivatives.
-        """
+        """Coordinates of the scene, and their weights in the axis and its derivatives by s."""
         e = self.element(s)
         xi = (s - e - 0.5) ** np.arange(self._powers.shape[2])
         return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
 
     def between(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
-        """Weights at two parameters, and quotients of their differences.
-
-        Parameters
-        ----------
-        s0, s1
-            The parameters.
-
-        Returns
-        -------
-        dofs, weights, quotients
-            Shapes (2, 2 nb), (2, 2, 2 nb) and (2, 2 nb): at each parameter those of the position
-            and its derivative by the length of the stress-free axis, and their differences over
-            the length between; the derivatives where that is none.
-        """
+        """Weights at two parameters, and quotients of their differences."""
         (one, a), (two, b) = self.weights(s0), self.weights(s1)
         e, f = self.element(s0), self.element(s1)
         nb = one.shape[1]
@@ -113,28 +89,12 @@ class Axis:
         return dofs, weights, quotients
 
     def at(self, u: Array, s: float) -> Array:
-        """The position and its first three derivatives by s, shape (4, 2).
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        s
-            The parameter.
-        """
+        """The position and its first three derivatives by s, shape (4, 2)."""
         dofs, weights = self.weights(s)
         return weights @ self.places(u, dofs).T
 
     def nearest(self, u: Array, p: Array) -> float:
-        """The parameter of the point of the axis that is nearest to a point.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        p
-            The point, shape (2,).
-        """
+        """The parameter of the point of the axis that is nearest to a point."""
         q = self._start[self._all] + u[self.first + self._all]
         x = np.einsum("eck,ek,ks->ecs", q, self._scales, self._samples)
         gap = np.sum((x - p[:, None]) ** 2, axis=1)
@@ -152,13 +112,7 @@ class Axis:
         return s
 
     def places(self, u: Array, dofs: Array) -> Array:
-        """Coordinates of the axis, of the body with a displacement.
-
-        Parameters
-        ----------
-        u, dofs
-            Displacement of the scene's coordinates, shape (N,), and numbers of some of them.
-        """
+        """Coordinates of the axis, of the body with a displacement."""
         return self._start[dofs - self.first] + u[dofs]
 
     def length(self, s: float) -> float:

@@ -22,18 +22,7 @@ if TYPE_CHECKING:
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
-    """The entries of a Jacobian that are not zero.
-
-    Parameters
-    ----------
-    *equations
-        For each a list of pairs, Vector and direction (2,), whose scalar products it sums.
-
-    Returns
-    -------
-    rows, columns, values
-        Shapes (k,).
-    """
+    """The entries of a Jacobian that are not zero."""
     none = np.zeros(0, dtype=int)
     rows, columns, values = [none], [none], [np.zeros(0)]
     for k, terms in enumerate(equations):
@@ -472,28 +461,14 @@ def require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
 
 
 def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
-    """Names of the equations between the first of n beams and each of the others.
-
-    Parameters
-    ----------
-    names
-        Those between two beams.
-    n
-        How many beams there are.
-    """
+    """Names of the equations between the first of n beams and each of the others."""
     if n == 2:
         return tuple(names)
     return tuple(f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
 def angle_to(d: ArrayLike, e: ArrayLike) -> float:
-    """The angle from a plane vector e to another one d, in (-2 pi, 2 pi).
-
-    Parameters
-    ----------
-    d, e
-        Shapes (2,).
-    """
+    """The angle from a plane vector e to another one d, in (-2 pi, 2 pi)."""
     return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
 
 

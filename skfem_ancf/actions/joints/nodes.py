@@ -103,13 +103,7 @@ class Nodes(Joint):
         return [self.settled.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
 
     def leading(self, nodes: Array) -> Array:
-        """The ends that lead at some nodes, shape (k,).
-
-        Parameters
-        ----------
-        nodes
-            Numbers of the nodes, shape (k,).
-        """
+        """The ends that lead at some nodes, shape (k,)."""
         return self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
 
     def bind(self, layout: Layout) -> None:
@@ -131,18 +125,7 @@ class Nodes(Joint):
         self.frame = 1.0 / self.start
 
     def turns(self, u: Array) -> Array:
-        """The direction of each end's section, seen from that of the stress-free state.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-
-        Returns
-        -------
-        ndarray
-            Complex, shape (ends,): stretch times ``exp(i angle)``.
-        """
+        """The direction of each end's section, seen from that of the stress-free state."""
         d = u[self.directions]
         return 1.0 + self.frame * np.sum(self.weights * (d[0] + 1j * d[1]), axis=1)
 
@@ -211,13 +194,7 @@ class Nodes(Joint):
         return sparse.csr_array((np.arange(len(rows)), (rows, columns)))
 
     def derivative(self, u: Array, t: float) -> sparse.csr_array:
-        """The derivative of :meth:`value`, shape (m, N), of one pattern.
-
-        Parameters
-        ----------
-        u, t
-            Displacement of the scene's coordinates, shape (N,), and time.
-        """
+        """The derivative of :meth:`value`, shape (m, N), of one pattern."""
         at = self._places
         return sparse.csr_array((self._values(u, t)[at.data], at.indices, at.indptr),
                                 shape=(len(self.equations), len(u)))
@@ -255,33 +232,14 @@ class Nodes(Joint):
         return np.bincount(k, values * v[i] * v[j], len(self.equations))
 
     def split(self, multipliers: Array) -> tuple[Array, ...]:
-        """Forces (followers, 2) and moments (turned,) of followers, and those that hold nodes.
-
-        Parameters
-        ----------
-        multipliers
-            Of the equations, or what they are open by, shape (m,).
-
-        Returns
-        -------
-        tuple
-            Of shapes (followers, 2), (turned,), (held_x,), (held_y,) and (held_angle,).
-        """
+        """Forces (followers, 2) and moments (turned,) of followers, and those that hold nodes."""
         n = len(self.followers)
         sizes = [n, n, len(self.turned), len(self.held_x), len(self.held_y)]
         x, y, *others = np.split(multipliers, np.cumsum(sizes))
         return np.stack([x, y], axis=1), *others
 
     def reaction(self, place: Any, u: Array, multipliers: Array) -> tuple[Array, float, dict]:
-        """What holds some nodes: force, moment about the first of them, and both by name.
-
-        Parameters
-        ----------
-        place
-            Nodes, see :meth:`~skfem_ancf.mesh.frame_graph.Net.nodes_at`.
-        u, multipliers
-            Displacement of the scene's coordinates, shape (N,), and multipliers, (m,).
-        """
+        """What holds some nodes: force, moment about the first of them, and both by name."""
         out, nodes = np.zeros(self.held.shape), self.net.nodes_at(place)
         ends = self.held_x, self.held_y, self.held_angle
         for k, (at, part) in enumerate(zip(ends, self.split(multipliers)[2:])):
@@ -302,22 +260,7 @@ class Nodes(Joint):
 
     def held_motions(self, parts: Array, origin: Array, size: float,
                      number: int) -> sparse.csr_array:
-        """What nodes and supports hold of the motions of rigid parts, one row each.
-
-        Parameters
-        ----------
-        parts
-            What :meth:`parts` returns, shape (ends / 2,).
-        origin, size
-            Of the motions, two translations and a rotation of each part: shape (2,), and a length.
-        number
-            Of parts and other bodies.
-
-        Returns
-        -------
-        scipy.sparse.csr_array
-            Shape (rows, 3 number).
-        """
+        """What nodes and supports hold of the motions of rigid parts, one row each."""
         part = np.repeat(parts, 2)
         x, y = (self.net.points[:, self.nodes] - origin[:, None]) / size
         one = np.ones(len(x))
@@ -338,13 +281,7 @@ class Nodes(Joint):
             shape=(count, 3 * number))
 
     def describe(self, parts: Array) -> list[str]:
-        """Which rigid parts are meant, for messages.
-
-        Parameters
-        ----------
-        parts
-            What :meth:`parts` returns, shape (ends / 2,).
-        """
+        """Which rigid parts are meant, for messages."""
         _, first = np.unique(parts, return_index=True)
         if len(first) == 1:
             return [""]

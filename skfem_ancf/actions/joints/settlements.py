@@ -38,17 +38,7 @@ class Settlements:
                          for f, (_, k) in zip(self.functions, self.at)]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
-        """The same with nodes displaced by a number or a function of time.
-
-        Parameters
-        ----------
-        nodes
-            Numbers of the nodes, shape (m,).
-        k
-            Number in :data:`HELD`.
-        by
-            What they are displaced by.
-        """
+        """The same with nodes displaced by a number or a function of time."""
         numbers, new = self.numbers.copy(), {(int(node), k) for node in nodes}
         kept = [(f, at) for f, at in zip(self.functions, self.at) if at not in new]
         if callable(by):
@@ -63,17 +53,7 @@ class Settlements:
         return bool(np.any(self.numbers[:, k])) or any(way == k for _, way in self.at)
 
     def by(self, nodes: Array, k: int, times: Array) -> Array:
-        """What nodes are displaced by at some times, shape (n, m).
-
-        Parameters
-        ----------
-        nodes
-            Numbers of the nodes, increasing, shape (m,).
-        k
-            Number in :data:`HELD`.
-        times
-            Times, or load factors, shape (n,).
-        """
+        """What nodes are displaced by at some times, shape (n, m)."""
         out = np.multiply.outer(times, self.numbers[nodes, k])
         for sampled, (node, way) in zip(self._sampled, self.at):
             if way == k:

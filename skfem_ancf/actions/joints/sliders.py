@@ -349,15 +349,7 @@ class Slot(Joint):
 
 def slider(layout: Layout, at: Any, on: WhichMember, direction: ArrayLike | None = None,
            angle: bool = False, name: str | None = None) -> Joint:
-    """A :class:`Sleeve` on a beam, or a :class:`Slot` of a rigid body or the ground.
-
-    Parameters
-    ----------
-    layout
-        Of the scene.
-    at, on, direction, angle, name
-        As for these classes, direction of shape (2,).
-    """
+    """A :class:`Sleeve` on a beam, or a :class:`Slot` of a rigid body or the ground."""
     at = tuple(named_place(layout, at))
     if is_ground(on) or isinstance(layout.beam(on), RigidBody):
         if direction is None:

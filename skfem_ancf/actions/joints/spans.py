@@ -88,13 +88,7 @@ class Product:
         return self._times(x, self._y.rows[k]) + self._times(self._x.rows[k], y)
 
     def rate(self, j: int, v: Array) -> float:
-        """f_u(u_j, s_j) . v.
-
-        Parameters
-        ----------
-        j, v
-            Which displacement, 0 or 1, and a velocity, shape (n,).
-        """
+        """f_u(u_j, s_j) . v."""
         x, y = self._x, self._y
         return float(self._row(x.values[j, j], y.values[j, j], j) @ v)
 
@@ -147,18 +141,6 @@ class Span(NamedTuple):
         Both velocities are such that the joint stays closed. X is what ``-(multipliers . Phi'')
         (v_0 + v_1) / 4`` is where Phi is quadratic. What is linear in ``u_1 - u_0`` is written as
         such; the rest has ``s_1 - s_0`` as a factor, which is ``-G_u . (u_1 - u_0) / G_s``.
-
-        Parameters
-        ----------
-        multipliers
-            Shape (m,).
-        v0, v1
-            Velocities at both ends, of the columns, shape (n,).
-
-        Returns
-        -------
-        ndarray
-            Shape (n,).
         """
         place, v = self.place, v0 + v1
         passing = [place.rate(0, v0), place.rate(1, v1)]

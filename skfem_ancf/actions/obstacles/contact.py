@@ -56,21 +56,7 @@ class Contact:
 
 
 def contact_of(state: Any, obstacle: Any = None) -> Contact:
-    """The Contact of a state.
-
-    Parameters
-    ----------
-    state
-        A :class:`~skfem_ancf.results.State`.
-    obstacle
-        The number of an obstacle of the scene, in the order in which they were given; None for
-        all.
-
-    Raises
-    ------
-    InputError
-        If there are no obstacles, or none of that number.
-    """
+    """The Contact of a state."""
     contacts = state.system.forces.contacts
     if not contacts.obstacles:
         raise InputError("the scene has no obstacle: scene.obstacle(Circle((0, -1), 0.5)) adds one")

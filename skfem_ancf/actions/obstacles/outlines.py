@@ -16,40 +16,14 @@ CELLS = 160
 
 
 def circle(center: Array, radius: float, n: int) -> tuple[Array, Array]:
-    """Points of a circle and its pieces.
-
-    Parameters
-    ----------
-    center, radius
-        Of the circle; shape (2,).
-    n
-        Number of points.
-
-    Returns
-    -------
-    points, pieces
-        Shapes (2, n) and (n, 2).
-    """
+    """Points of a circle and its pieces."""
     angle, k = 2.0 * np.pi * np.arange(n) / n, np.arange(n)
     points = center[:, None] + radius * np.array([np.cos(angle), np.sin(angle)])
     return points, np.column_stack([k, np.roll(k, -1)])
 
 
 def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
-    """A line as one piece, as long as it is beside a box.
-
-    Parameters
-    ----------
-    point, normal
-        Of the line, shape (2,).
-    box
-        Lower left and upper right, one a column, shape (2, 2).
-
-    Returns
-    -------
-    points, pieces
-        Shapes (2, 2) and (1, 2).
-    """
+    """A line as one piece, as long as it is beside a box."""
     along = np.array([normal[1], -normal[0]])
     middle, half = box.mean(axis=1), 0.5 * np.hypot(*(box[:, 1] - box[:, 0]))
     foot = point + ((middle - point) @ along) * along
@@ -57,20 +31,7 @@ def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
 
 
 def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Array]:
-    """Where a distance is zero, by marching triangles on a grid.
-
-    Parameters
-    ----------
-    distance
-        Takes points (2, n), returns (n,).
-    box
-        Lower left and upper right of the grid, one a column, shape (2, 2).
-
-    Returns
-    -------
-    points, pieces
-        Shapes (2, 2 m) and (m, 2).
-    """
+    """Where a distance is zero, by marching triangles on a grid."""
     x, y = (np.linspace(low, high, CELLS + 1) for low, high in box)
     points = np.array(np.meshgrid(x, y)).reshape(2, -1)
     values = distance(points)

@@ -14,50 +14,20 @@ AROUND = 0.15
 
 
 def around(points: Array) -> Array:
-    """A box about points, with a margin.
-
-    Parameters
-    ----------
-    points
-        Shape (2, n).
-
-    Returns
-    -------
-    ndarray
-        Lower left and upper right, one a column, shape (2, 2).
-    """
+    """A box about points, with a margin."""
     low, high = points.min(axis=1), points.max(axis=1)
     margin = AROUND * float(np.max(high - low))
     return np.array([low - margin, high + margin]).T
 
 
 def obstacles_of(state: Any) -> list[Any]:
-    """The obstacles of a state's scene; none of what has no system.
-
-    Parameters
-    ----------
-    state
-        A :class:`~skfem_ancf.results.State`, or anything with beams.
-    """
+    """The obstacles of a state's scene; none of what has no system."""
     system = getattr(state, "system", None)
     return [] if system is None else list(system.forces.contacts.obstacles)
 
 
 def outlines(state: Any, box: Array) -> list[Array]:
-    """The surface of each obstacle at a state, as straight pieces.
-
-    Parameters
-    ----------
-    state
-        A :class:`~skfem_ancf.results.State`, or anything with beams.
-    box
-        Lower left and upper right of what is to be seen, one a column, shape (2, 2).
-
-    Returns
-    -------
-    list of ndarray
-        For each obstacle the ends of its pieces, shape (m, 2, 2): piece, end, coordinate.
-    """
+    """The surface of each obstacle at a state, as straight pieces."""
     out = []
     for one in obstacles_of(state):
         points, pieces = one.outline(box, state.load if state.t is None else state.t)
