@@ -47,9 +47,11 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
     times, rng = np.linspace(t_start, t_end, TIMES), np.random.default_rng(0)
     u, v = 1e-3 * rng.standard_normal((2, system.N)) * np.concatenate(
         [member.sizes for member in system.members])
-    force, inertia = system.internal_force(u, t_start), system.mass.multiply(u)
+    with system.forces.unheld():
+        force, inertia = system.internal_force(u, t_start), system.mass.multiply(u)
+        damping = system.damping_force(u, v, t_start) if system.damped else np.zeros(1)
     found = {"supports": np.append(system.constraints.fixed, system.constraints.values_at(times)),
-             "damping": system.damping_force(u, v, t_start) if system.damped else np.zeros(1)}
+             "damping": damping}
     for k, member in enumerate(system.members):
         part = system.of(member)
         found |= {f"mesh of member {k}": member.q0, f"stiffness of member {k}": force[part],

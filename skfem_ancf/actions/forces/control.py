@@ -20,6 +20,8 @@ from .texts import turned, turning
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from numpy.typing import ArrayLike
+
     from ...beam.layout import Layout
     from ...core.types import Array
     from ...beam.layout import WhichBeam
@@ -196,7 +198,7 @@ class Control(ForceElement):
         """Times of the samples and the values held, shape (n, 2) or (n, 3)."""
         return np.array([np.append(t, value) for t, value in self._held])
 
-    def hold(self, held: Array) -> None:
+    def hold(self, held: ArrayLike) -> None:
         """Take over what another run has held, as :attr:`held` gave it; (n, 2) or (n, 3)."""
         moment = self.kind == "moment"
         self._held[:] = [(float(row[0]), float(row[1]) if moment else row[1:])

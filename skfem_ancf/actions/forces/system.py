@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from functools import cached_property
 from .base import Part
 from .contacts import NO_CONTACTS, Contacts
 from .control import Control
@@ -14,7 +15,7 @@ from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_s
                     run_kinds, turned, vectors_of)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from ...core.types import Array
     from ..places import Vector
@@ -194,6 +195,18 @@ class Forces:
     def sampled(self) -> list[Control]:
         """Controls whose law is asked now and then, and its value held."""
         return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
+
+    @contextmanager
+    def unheld(self) -> Iterator[None]:
+        """As at the start of a motion: without what sampled controls hold."""
+        held = [control.held for control in self.sampled]
+        for control in self.sampled:
+            control.hold(())
+        try:
+            yield
+        finally:
+            for control, values in zip(self.sampled, held):
+                control.hold(values)
 
     def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
         """Ask sampled controls whose time it is."""
