@@ -91,22 +91,7 @@ class StrainTangent:
         return force[self.free]
 
     def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:
-        """The part of the tangent due to stresses, multipliers and loads.
-
-        Parameters
-        ----------
-        stress
-            Weighted stresses, of the shape (k,) of :attr:`stress`.
-        multipliers
-            Of the joints, shape (m,).
-        load
-            Load factor.
-
-        Returns
-        -------
-        sparse matrix
-            Shape (n, n), n free coordinates.
-        """
+        """The part (n, n) of the tangent due to stresses (k,), multipliers (m,) and loads."""
         u, _, t, time = self._at
         S = [_beam_geometric(beam, u[s], own) for beam, s, own in zip(
             self.system.beams, self.system.slices, np.split(stress, self._first))]
@@ -118,13 +103,7 @@ class StrainTangent:
         return S[self.free][:, self.free]
 
     def response(self) -> tuple[Array, Array, Array]:
-        """The stress and the multipliers that the full load causes by linear theory.
-
-        Returns
-        -------
-        du, stress, multipliers
-            Shapes (N,), that of ``stress``, and (m,).
-        """
+        """What the full load causes by linear theory: du (N,), stress (k,), multipliers (m,)."""
         system, u = self.system, self._at[0]
         du = np.zeros(system.N)
         du[system.constraints.fixed] = system.constraints.values(1.0)
@@ -139,14 +118,8 @@ class StrainTangent:
         """Correct the stress to what is in equilibrium, if the state is one to round-off.
 
         The normal force of a slender beam is E A times a strain that is all round-off. The
-        correction of the displacement is too small to matter; that of the stress is not.
-
-        Parameters
-        ----------
-        M
-            The mass matrix between the free coordinates, sparse, shape (n, n).
-        shift
-            A number for which ``K + shift M`` has an inverse.
+        correction of the displacement is too small to matter; that of the stress is not. The matrix
+        ``K + shift M``, with the mass (n, n) between free degrees of freedom, must have an inverse.
         """
         u, load, t, _ = self._at
         rest = (load * self.system.external_force(u, t)[self.free] - self.B.T @ self.stress
@@ -159,16 +132,9 @@ class StrainTangent:
             self._set_stress(self.stress + self.CB @ du[:, 0], self.multipliers + dm[:, 0])
 
     def condense(self, condensed: Condensed, shift: float) -> Condensed:
-        """Factors of the tangent of a frame, condensed to its nodes, with the mass times a number.
+        """Factors of ``K + shift M`` of a frame, condensed to its nodes; those of the last are kept.
 
-        Those of the last shift are kept.
-
-        Parameters
-        ----------
-        condensed
-            That of the system, which is left as it is.
-        shift
-            What the mass is multiplied by.
+        The ``condensed`` form of the system is left as it is.
         """
         (u, load, t, _), system = self._at, self.system
         if self._condensed[0] != shift or self._condensed[1] is not self.multipliers:
@@ -186,20 +152,7 @@ class StrainTangent:
         return is_symmetric(self.S, self.system.constraints.coordinate_sizes[self.free])
 
     def multiply(self, x: Array, S: csr_matrix | None = None) -> Array:
-        """The tangent times a vector or columns.
-
-        Parameters
-        ----------
-        x
-            Shape (n,) or (n, k), n free coordinates.
-        S
-            What to take in place of the geometric part, sparse, shape (n, n), or None.
-
-        Returns
-        -------
-        ndarray
-            Of the shape of x.
-        """
+        """The tangent times x, (n,) or (n, k); with S (n, n) in place of the geometric part."""
         return self.B.T @ (self.CB @ x) + (self.S if S is None else S) @ x
 
     @property
@@ -254,15 +207,7 @@ def _beam_geometric(beam, u, stress):
 
 
 def is_symmetric(S: csr_matrix, sizes: Array) -> bool:
-    """True if a sparse matrix is symmetric to round-off.
-
-    Parameters
-    ----------
-    S
-        The matrix, shape (n, n).
-    sizes
-        Of its coordinates, which have units of their own, shape (n,).
-    """
+    """True if a sparse matrix is symmetric to round-off, beside sizes (n,) of its variables."""
     D = sparse.diags(sizes)
     S = D @ S @ D
     gap = abs(S - S.T)
@@ -270,24 +215,7 @@ def is_symmetric(S: csr_matrix, sizes: Array) -> bool:
 
 
 def load_stiffness(system: Any, u: Array, load: float, t: float | None = None) -> csr_matrix:
-    """Minus the derivative of the loads by the coordinates.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u
-        Displacement of the coordinates, shape (N,).
-    load
-        Load factor.
-    t
-        Time of amplitudes, or None.
-
-    Returns
-    -------
-    sparse matrix
-        Shape (N, N).
-    """
+    """Minus the derivative (N, N) of the loads at u (N,), for a load factor and a time or None."""
     K = sparse.csr_matrix((system.N, system.N))
     for item in system.loads:
         if item.constant:
@@ -410,21 +338,9 @@ class Inverse:
 
     def solve_both(self, b: Array, c: Array | None = None,
                    accepted: float = ACCEPTED) -> tuple[Array, Array]:
-        """x and l for columns b and ``J x = c``.
+        """x (n, k) and l (m, k) for columns b and ``J x = c``, 0 by default.
 
-        Parameters
-        ----------
-        b
-            Shape (n, k), n free coordinates.
-        c
-            Shape (m, k); zero by default.
-        accepted
-            Largest size of the last correction, relative to x in the energy norm.
-
-        Returns
-        -------
-        x, l
-            Shapes (n, k) and (m, k).
+        The size of the last correction is ``accepted`` at most, relative to x in the energy norm.
         """
         c = np.zeros((self._tangent.size[1], b.shape[1])) if c is None else c
         x, l, good = self._refined(b, c, accepted)

@@ -64,7 +64,7 @@ def text_of(law: LawTables) -> Any:
 
 @source
 def law_evaluate(law, strain, out):
-    """Second Piola-Kirchhoff stress, moduli or energy per volume.
+    """Second Piola-Kirchhoff stress, moduli or energy per volume of a law that is not linear.
 
     Parameters
     ----------
@@ -77,20 +77,6 @@ def law_evaluate(law, strain, out):
         energy (1, ...).
     """
     n, size = strain.shape[1], strain.shape[2]
-    if law.kind == LINEAR:
-        for c in range(3):
-            x, y, z = law.D[c, 0], law.D[c, 1], law.D[c, 2]
-            for p in lanes(n):
-                for e in lanes(size):
-                    S = x * strain[0, p, e] + y * strain[1, p, e] + z * strain[2, p, e]
-                    if len(out) == 3:
-                        out[c, p, e] = S
-                    elif len(out) == 9:
-                        out[3 * c, p, e], out[3 * c + 1, p, e], out[3 * c + 2, p, e] = x, y, z
-                    else:
-                        W = 0.5 * strain[c, p, e] * S
-                        out[0, p, e] = W + (out[0, p, e] if c else 0.0)
-        return
     x = room(strain.shape, strain)
     for c in range(3):  # the strain of the law: with its shear corrected
         y = law.scale[c]

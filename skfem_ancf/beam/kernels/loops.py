@@ -247,7 +247,9 @@ def add_geometric(t, first, d, T, K):
             np.dot(np.ascontiguousarray(T.T), both, P)
         for e in range(len(K)):
             if len(t.G) > 1:
-                products(t.rows, t.G[t.at[first + e, OF_G]], both)
+                if t.at[first + e, OF_G] != last:
+                    last = t.at[first + e, OF_G]
+                    products(t.rows, t.G[last], both)
                 np.dot(T[:, e].copy(), both, P[e])
             one = K[e]
             for k in range(m):
