@@ -132,7 +132,7 @@ class StrainTangent:
             self._set_stress(self.stress + self.CB @ du[:, 0], self.multipliers + dm[:, 0])
 
     def condense(self, condensed: Condensed, shift: float) -> Condensed:
-        """Factors of ``K + shift M`` of a frame, condensed to its nodes; those of the last are kept.
+        """Factors of ``K + shift M`` of a frame, condensed to its nodes; the last are kept.
 
         The ``condensed`` form of the system is left as it is.
         """
