@@ -1,4 +1,4 @@
-"""The elements that hold points of the stress-free body, many points at once."""
+"""The elements that hold points of the reference configuration, many points at once."""
 
 from __future__ import annotations
 
@@ -257,5 +257,5 @@ class Finder:
             f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
             f"{'the body' if chain is None else 'the line that was named'}"
             f"{more if len(outside) > 1 else ''}: points are named by their place in the "
-            f"stress-free beam of height {mesh.height:.6g}, whose axis runs from "
+            f"reference configuration of height {mesh.height:.6g}, whose axis runs from "
             f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")

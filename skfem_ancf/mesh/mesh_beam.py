@@ -44,7 +44,7 @@ MAX_SUBDIVISION = 1000
 
 @dataclass(repr=False, eq=False)
 class MeshBeam(NumberedMesh):
-    """A planar beam in its stress-free state, divided into elements along its axis.
+    """The reference configuration of a planar beam, divided into elements along its axis.
 
     A mesh does not change; its methods return other meshes.
 
@@ -158,7 +158,7 @@ class MeshBeam(NumberedMesh):
     def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
                    height: float | Callable[[Array], ArrayLike],
                    dr: Callable[[Array], ArrayLike] | None = None) -> MeshBeam:
-        """A beam that is curved in its stress-free state.
+        """A beam with a curved reference configuration.
 
         Parameters
         ----------
@@ -582,7 +582,7 @@ class MeshBeam(NumberedMesh):
     # pictures and files
 
     def to_meshquad(self, nx: int = 8, ny: int = 4) -> MeshQuad:
-        """A ``skfem.MeshQuad`` of the stress-free body.
+        """A ``skfem.MeshQuad`` of the reference configuration.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What names a place on a beam: a boundary, a point of the stress-free body, a function, facets."""
+"""What names a place on a beam: a boundary, a material point, a function, facets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: How far off a section a point may be that names it, relative to an element next to it.
 NEAR = 1e-6
 
-KINDS = ("the name of a boundary, a point (x, y) of the stress-free body, a function of the points "
+KINDS = ("the name of a boundary, a material point (x, y), a function of the points "
          "x that returns truth values, or numbers of facets as an array of integers")
 
 
@@ -65,8 +65,8 @@ def as_point(point: Any, mesh: Any = None) -> Array:
     if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and not any(
             isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x) for x in point):
         return require_finite("a material point", point, (2,))
-    raise MeshError("a material point has two coordinates (x, y), its place in the stress-free "
-                    f"body, or is the name of an end, as 'right', got {shown(point)}")
+    raise MeshError("a material point has two coordinates (x, y), its place in the reference "
+                    f"configuration, or is the name of an end, as 'right', got {shown(point)}")
 
 
 def on_other_mesh(place: object) -> bool:
@@ -84,8 +84,8 @@ def facets_of(mesh: Any, place: Place) -> Array:
     This is the one rule for every method that takes a place:
 
     * a name is that of a boundary,
-    * two numbers in a tuple, a list or an array of floats are a point (x, y) of the stress-free
-      body: the section of a node on which it lies,
+    * two numbers in a tuple, a list or an array of floats are a material point (x, y): the
+      section of a node on which it lies,
     * a function takes points x, shape (2, n), and returns n truth values: the facets with their
       middle there,
     * an array of integers holds numbers of facets,
@@ -151,7 +151,7 @@ def node_of(mesh: Any, place: Place) -> int:
 
 
 def section_at(mesh: Any, point: ArrayLike) -> int:
-    """The node on whose section a point (2,) of the stress-free body lies.
+    """The node on whose section a material point (2,) lies.
 
     It may be off by 1e-6 of the shorter element next to it. Raises MeshError if there is none, or
     more than one.
