@@ -70,6 +70,7 @@ def auto(needs_compiled, monkeypatch):
 
     monkeypatch.setattr(backend, "LOADED", {})
     monkeypatch.setattr(backend, "PROBLEMS", [])
+    monkeypatch.setattr(backend, "ITERATION", 1e-2)  # of larger meshes than are solved here
     monkeypatch.setattr(jit, "entry", entry)
     monkeypatch.setattr(loops, "part", lambda name: 0)
     monkeypatch.setattr(code_cache, "on_disk", lambda *names: not names)
@@ -85,7 +86,7 @@ def test_small_tasks_run_in_numpy_however_many(auto):
     s, loads = auto
     for _ in range(40):
         s.solve_static()
-    s.integrate(0.05, 1e-3)
+    s.integrate(0.01, 1e-3)
     assert not loads
     assert "would take about" not in s.plan()["compiled loop"].reason
     assert "NumPy takes about" in s.plan()["compiled loop"].reason
@@ -109,9 +110,9 @@ def test_what_lies_on_disk_is_loaded_for_tasks_longer_than_loading(auto, monkeyp
     s, loads = auto
     monkeypatch.setattr(code_cache, "on_disk", lambda *names: True)
     s.solve_static()
-    s.integrate(0.1, 1e-3)
+    s.integrate(0.01, 1e-3)
     assert not loads
-    s.integrate(0.4, 1e-3)
+    s.integrate(0.05, 1e-3)
     assert loads == ["steps"] and not capsys.readouterr().err
 
 
@@ -147,7 +148,7 @@ def test_no_clock_decides(auto, monkeypatch):
 
         with monkeypatch.context() as patch:
             patch.setattr(s.system.machine, "of", of)
-            s.integrate(0.2, 1e-3)
+            s.integrate(0.02, 1e-3)
         return taken
 
     s, loads = auto

@@ -30,10 +30,10 @@ PARTS = "StrainTables", "elements", "contacts"
 PROBLEMS: list[str] = []
 #: Seconds that compiling takes, about: kernels, force elements and contact, each if a scene has it,
 #: and what calls them; and loading what lies on disk.
-COMPILING = {"StrainTables": 20.0, "elements": 7.0, "contacts": 19.0,
-             "equilibrium": 22.0, "steps": 35.0, "evaluate": 5.0}
+COMPILING = {"StrainTables": 40.0, "elements": 7.0, "contacts": 19.0,
+             "equilibrium": 30.0, "steps": 45.0, "evaluate": 5.0}
 #: The same for what is compiled where it is used, not beforehand.
-WHERE_USED = {"collocate": 35.0}
+WHERE_USED = {"collocate": 45.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds that NumPy takes for an iteration, about, and what each element adds to them.
