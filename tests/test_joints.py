@@ -66,7 +66,7 @@ def test_joints_are_tables_where_they_say_so(joint):
     joint, scene = joint
     tables = scene.system.machine.tables
     m = scene.system.constraints.m
-    assert scene.system.constraints.quadratic_at((0.0, 0.37)) == (joint.tabled or not m)
+    assert scene.system.constraints._quadratic_at((0.0, 0.37)) == (joint.tabled or not m)
     assert bool(tables.plain.joints.own) == bool(m and not joint.tabled)
 
 

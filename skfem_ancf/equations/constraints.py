@@ -248,27 +248,27 @@ class Constraints:
         """
         if not self.joints:
             return (*2 * _NO_ENTRIES[:1], *_NO_ENTRIES[1:])
-        return self.in_order([joint.second_entries(self.N) for joint in self.joints])
+        return self._in_order([joint.second_entries(self.N) for joint in self.joints])
 
     @cached_property
     def tabled(self) -> bool:
         """True if :attr:`slopes`, :attr:`seconds` and offsets give Phi and its derivatives."""
         if all(map(ours, self.joints)):
             return all(joint.tabled for joint in self.joints)
-        return self.quadratic_at((0.0, 0.37))
+        return self._quadratic_at((0.0, 0.37))
 
-    def quadratic_at(self, times: Iterable[float]) -> bool:
+    def _quadratic_at(self, times: Iterable[float]) -> bool:
         """True if Phi and its derivative are those of the tables: user-defined ones may not be."""
         sizes = self.coordinate_sizes
         of_equations, rng = self.equation_sizes(*self.slopes), np.random.default_rng(0)
         k, i, j, v = self.seconds
         for t in times:
             u = 0.1 * sizes * rng.standard_normal(self.N)
-            slope = self.to_sparse(*self._slopes_at(t))
-            J = slope + self.to_sparse(k, i, v * u[j])
+            slope = self._to_sparse(*self._slopes_at(t))
+            J = slope + self._to_sparse(k, i, v * u[j])
             offset = np.concatenate([one.offset(np.array([t]), self.N)[0] for one in self.joints])
             phi = np.concatenate([one.value(u, t) for one in self.joints])
-            gap = J - self.to_sparse(*self.in_order(one.entries(u, t) for one in self.joints))
+            gap = J - self._to_sparse(*self._in_order(one.entries(u, t) for one in self.joints))
             if not (np.all(np.abs(offset + 0.5 * (J + slope) @ u - phi) <= 1e-9 * of_equations)
                     and (abs(gap) @ sizes <= 1e-9 * (abs(J) @ sizes)).all()):
                 return False
@@ -289,7 +289,7 @@ class Constraints:
         if self._still[1]:
             return self.slopes
         found = [joint.slope_entries(np.array([t]), self.N) for joint in self.joints]
-        return self.in_order((rows, columns, values[0]) for rows, columns, values in found)
+        return self._in_order((rows, columns, values[0]) for rows, columns, values in found)
 
     @property
     def drives(self) -> bool:
@@ -301,7 +301,7 @@ class Constraints:
 
         Sparse where the multipliers are many.
         """
-        return (self.to_dense if self.few else self.to_sparse)(*self._entries(u, t))
+        return (self.to_dense if self.few else self._to_sparse)(*self._entries(u, t))
 
     def to_dense(self, rows: Array, columns: Array, values: Array) -> Array:
         """A matrix (m, N) by its entries (k,)."""
@@ -309,13 +309,13 @@ class Constraints:
         np.add.at(J, (rows, columns), values)
         return J
 
-    def to_sparse(self, rows: Array, columns: Array, values: Array) -> sparse.csr_array:
+    def _to_sparse(self, rows: Array, columns: Array, values: Array) -> sparse.csr_array:
         """The same as a scipy.sparse array."""
         return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
 
     def sparse_jacobian(self, u: Array, t: float) -> sparse.csr_array:
         """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
-        return self.to_sparse(*self._entries(u, t))
+        return self._to_sparse(*self._entries(u, t))
 
     def jacobian_entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         """Rows, columns and values (k,) of :meth:`jacobian`; entries of one place are summed."""
@@ -329,21 +329,21 @@ class Constraints:
         As :meth:`~skfem_ancf.actions.joints.Joint.slope_entries` of the joints has them.
         """
         found = [joint.slope_entries(np.zeros(1), self.N) for joint in self.joints]
-        return self.in_order((rows, columns, values[0]) for rows, columns, values in found)
+        return self._in_order((rows, columns, values[0]) for rows, columns, values in found)
 
     @cached_property
     def _at_rest(self):
         """The matrix of :attr:`slopes`, sparse where the coordinates are many."""
-        return (self.to_dense if self.few and self.N <= DENSE else self.to_sparse)(*self.slopes)
+        return (self.to_dense if self.few and self.N <= DENSE else self._to_sparse)(*self.slopes)
 
     def _entries(self, u, t):
         """Rows, columns and values of :meth:`full_jacobian`."""
         if not self.tabled:
-            return self.in_order(joint.entries(u, t) for joint in self.joints)
+            return self._in_order(joint.entries(u, t) for joint in self.joints)
         (k, i, j, v), slopes = self.seconds, self._slopes_at(t)
         return tuple(np.append(a, b) for a, b in zip(slopes, (k, i, v * u[j])))
 
-    def in_order(self, entries: Iterable[tuple]) -> tuple[Array, ...]:
+    def _in_order(self, entries: Iterable[tuple]) -> tuple[Array, ...]:
         """Tables of the joints one behind the other, their rows those of all equations.
 
         Parameters
@@ -359,7 +359,7 @@ class Constraints:
 
     def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
         """As :meth:`full_jacobian`, zero at fixed coordinates."""
-        return (self.to_dense if self.few else self.to_sparse)(*self.jacobian_entries(u, t))
+        return (self.to_dense if self.few else self._to_sparse)(*self.jacobian_entries(u, t))
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
         """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
@@ -386,7 +386,8 @@ class Constraints:
 
     def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
         """Discrete gradients of :meth:`constraint` in a step, shape (m, N)."""
-        return self.to_dense(*self.in_order(joint.mean_entries(u0, u1, t) for joint in self.joints))
+        return self.to_dense(*self._in_order(
+            joint.mean_entries(u0, u1, t) for joint in self.joints))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
