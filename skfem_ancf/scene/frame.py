@@ -8,6 +8,7 @@ import numpy as np
 
 from ..actions.axial import LineLoad
 from ..beam.beam import Beam
+from ..beam.rigid import RigidBody
 from ..beam.kinematics import direction
 from ..results.arguments import displacement
 from ..elements import ElementBeamCable
@@ -17,9 +18,10 @@ from ..core.errors import (InputError, require_finite, require_finite_scalar, re
                            require_unmasked)
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
-from ..actions.loads import DeadLoad, EndMoment, Load
+from ..actions.loads import DeadLoad, EndMoment, Load, number_at
 from ..mesh.frame_files import net_from_meshio
 from ..mesh.frame_graph import Net, mapping_of
+from ..mesh.places import as_point
 from .scene import Scene
 
 if TYPE_CHECKING:
@@ -522,6 +524,35 @@ class Frame(Scene):
         self._put(*(NodeMoment(int(end), M, int(k), amplitude)
                     for k, end in zip(*self._ends_at(boundary))))
         return self
+
+    def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                       amplitude: TimeFunction = None, line: int | None = None) -> Frame:
+        """A force that turns with the tangent of a line: a :class:`~skfem_ancf.FollowerForce`.
+
+        Parameters
+        ----------
+        force, at, beam, amplitude
+            As for :meth:`Scene.follower_force`.
+        line
+            The number of the line whose tangent it is, where several meet.
+
+        Returns
+        -------
+        Frame
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If the axes of several lines are nearest to the point and none is named.
+        """
+        points = self.system.points
+        if line is not None:
+            beam, line = points.chain_of(line, beam)
+        elif not isinstance(beam, RigidBody):
+            one = self.layout.beam(number_at(self.layout, at, beam))
+            points.find(as_point(at, one.mesh), one, ask=True)
+        return super().follower_force(force, at, beam, amplitude, line)
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
                   amplitude: TimeFunction = None) -> Frame:
