@@ -18,6 +18,7 @@ from numba.extending import intrinsic, overload
 
 from .code_cache import cannot_keep, can_keep, key, nothing_collected
 from .source import MARKED
+from .words import Words
 
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
@@ -51,12 +52,12 @@ def _register(function, found):
 
 def type_of(hint: Any) -> Any:
     """Numba's type of an annotation: a number, an array as ``F1``, or a class of named tuples."""
-    code = getattr(hint, "__metadata__", [None])[0]
-    if code:
-        return types.Array(_DTYPES[code[0]], int(code[1]), "C")
-    if hint in SCALARS:
-        return SCALARS[hint]
-    return types.NamedTuple([type_of(x) for x in _hints(hint)], hint)
+    kind = getattr(hint, "__metadata__", [hint])[0]
+    if isinstance(kind, str):
+        return types.Array(_DTYPES[kind[0]], int(kind[1]), "C")
+    if kind in SCALARS:
+        return SCALARS[kind]
+    return types.NamedTuple([type_of(x) for x in _hints(kind)], kind)
 
 
 @cache
@@ -67,6 +68,9 @@ def _hints(kind):
 def entry(function: Any, args: Any) -> Any:
     """The compiled function for Python, compiled or taken from disk.
 
+    Named tuples are given as their words: Numba takes longer to unpack a hundred arrays than a
+    small scene takes to solve.
+
     Parameters
     ----------
     function
@@ -74,8 +78,39 @@ def entry(function: Any, args: Any) -> Any:
     args
         What it is called with: it takes arguments of these types only.
     """
-    signature = tuple(typeof(x) for x in args)
-    return _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(function)))
+    names: dict[str, Any] = {"function": function}
+    given = [f"a{k}" for k in range(len(args))]
+    for k, x in enumerate(args):
+        if isinstance(x, tuple):
+            names[f"read{k}"], given[k] = reader(type(x)), f"read{k}(a{k})"
+    arguments = ", ".join(f"a{k}" for k in range(len(args)))
+    code = f"def run({arguments}):\n    return function({', '.join(given)})\n"
+    exec(compile(code, function.__code__.co_filename, "exec"), names)  # noqa: S102
+    run = names["run"]
+    run.__name__, run.__module__ = function.__name__, function.__module__
+    signature = tuple(types.int64 if isinstance(x, tuple) else typeof(x) for x in args)
+    compiled = _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(run)))
+    known: dict[int, Words] = {}
+
+    def call(*args):
+        words = [_words(x, known) if isinstance(x, tuple) else x for x in args]
+        return compiled(*[x.address if type(x) is Words else x for x in words])
+
+    return call
+
+
+#: Tuples whose words are kept for the next call.
+LAST = 16
+
+
+def _words(x, known):
+    found = known.pop(id(x), None)
+    if found is None or found.of is not x:
+        found = Words(x)
+    known[id(x)] = found
+    if len(known) > LAST:
+        del known[next(iter(known))]
+    return found
 
 
 def address(function: Any, hints: Any, name: str = "", kept: bool = True) -> int:
@@ -170,16 +205,16 @@ def reader(kind: Any) -> Any:
     def read(kind, at):
         names[kind.__name__], fields = kind, []
         for hint in _hints(kind):
-            code = getattr(hint, "__metadata__", [None])[0]
-            if code:
+            code = getattr(hint, "__metadata__", [hint])[0]
+            if isinstance(code, str):
                 shape = "".join(f"w[{at + 1 + k}], " for k in range(int(code[1])))
                 fields.append(f"carray({code[0]}(w[{at}]), ({shape}))")
                 at += 1 + int(code[1])
-            elif hint in SCALARS:
-                fields.append(f"{'x' if hint is float else 'w'}[{at}]")
+            elif code in SCALARS:
+                fields.append(f"{'x' if code is float else 'w'}[{at}]")
                 at += 1
             else:
-                one, at = read(hint, at)
+                one, at = read(code, at)
                 fields.append(one)
         return f"{kind.__name__}({', '.join(fields)})", at
 

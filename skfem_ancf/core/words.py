@@ -36,7 +36,7 @@ def _collect(x, found):
         if isinstance(value, np.ndarray):
             if not value.flags.c_contiguous or value.dtype not in (float, np.int64):
                 raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
-            found += [value.ctypes.data, *value.shape]
+            found += [value.__array_interface__["data"][0], *value.shape]
         elif isinstance(value, tuple):
             _collect(value, found)
         elif isinstance(value, float):

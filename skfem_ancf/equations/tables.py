@@ -2,7 +2,7 @@
 
 from copy import copy
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 from weakref import ref
 
 import numpy as np
@@ -58,15 +58,15 @@ class Equations(NamedTuple):
         :attr:`skfem_ancf.equations.constraints.Constraints.coordinate_sizes`.
     """
 
-    body: Any
+    body: Annotated[Any, FlatBody]
     loads: LoadTables
     joints: JointTables
     fixed: I1
     free: F1
     K: Band
-    viscous: Any
+    viscous: Annotated[Any, FlatBody]
     forces: ForceTables
-    copies: Any
+    copies: Annotated[Any, FlatBody]
     sizes: F1
 
 
