@@ -11,14 +11,14 @@ import pickle
 from functools import cache
 from importlib import import_module
 from types import FunctionType
-from typing import Any, get_type_hints
+from typing import Any
 
 from numba import carray, cfunc, njit, types, typeof
 from numba.extending import intrinsic, overload
 
 from .code_cache import cannot_keep, can_keep, key, nothing_collected
 from .source import MARKED
-from .words import Words
+from .words import Words, hints
 
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
@@ -57,12 +57,7 @@ def type_of(hint: Any) -> Any:
         return types.Array(_DTYPES[kind[0]], int(kind[1]), "C")
     if kind in SCALARS:
         return SCALARS[kind]
-    return types.NamedTuple([type_of(x) for x in _hints(kind)], kind)
-
-
-@cache
-def _hints(kind):
-    return tuple(get_type_hints(kind, include_extras=True).values())
+    return types.NamedTuple([type_of(x) for x in hints(kind)], kind)
 
 
 def entry(function: Any, args: Any) -> Any:
@@ -204,7 +199,7 @@ def reader(kind: Any) -> Any:
 
     def read(kind, at):
         names[kind.__name__], fields = kind, []
-        for hint in _hints(kind):
+        for hint in hints(kind):
             code = getattr(hint, "__metadata__", [hint])[0]
             if isinstance(code, str):
                 shape = "".join(f"w[{at + 1 + k}], " for k in range(int(code[1])))

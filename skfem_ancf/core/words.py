@@ -5,7 +5,8 @@ Of a number the word is the number, of an array its address and shape, of a tupl
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cache
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -31,15 +32,21 @@ class Words:
         self.address = self.words.ctypes.data
 
 
+@cache
+def hints(kind: Any) -> tuple[Any, ...]:
+    """What the fields of a class of named tuples are."""
+    return tuple(get_type_hints(kind, include_extras=True).values())
+
+
 def _collect(x, found):
-    for value in x:
+    for value, hint in zip(x, hints(type(x))):
         if isinstance(value, np.ndarray):
             if not value.flags.c_contiguous or value.dtype not in (float, np.int64):
                 raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
             found += [value.__array_interface__["data"][0], *value.shape]
         elif isinstance(value, tuple):
             _collect(value, found)
-        elif isinstance(value, float):
+        elif hint is float:
             found.append(int(np.float64(value).view(np.int64)))
         else:
             found.append(int(value))
