@@ -360,3 +360,18 @@ def test_energies_of_many_displacements_at_once(kind, monkeypatch):
     kernel = _energetic(kind).kernel
     u = 1e-4 * np.random.default_rng(1).standard_normal((17, kernel.N))
     assert_allclose(kernel.energy(u), [kernel.energy(x) for x in u], rtol=1e-12)
+
+
+def test_tables_of_one_beam_with_equal_samples_stay_apart():
+    """Two of the three parts of "strain-split" have the same samples, beside another beam."""
+    law = StVenantKirchhoff(1000.0, 0.3, 1.0)
+    a, b = (Beam(MeshBeam.init_line([x, x + 0.5], 0.1), element, law, 0.1, formulation)
+            for x, element, formulation in ((0.0, ElementBeamANCF(1), "strain-split"),
+                                            (0.5, ElementBeamCable(3), "assumed")))
+    system = Scene(a, b).system
+    u, d = 0.01 * np.random.default_rng(0).standard_normal((2, system.N))
+    system.assemble(u)
+    change = [np.imag(beam.kernel.force(u[s] + 1e-30j * d[s])) / 1e-30
+              for beam, s in zip(system.beams, system.slices)]
+    change = np.concatenate(change)
+    assert np.allclose(system.K.tocsc() @ d, change, rtol=0, atol=1e-12 * np.abs(change).max())

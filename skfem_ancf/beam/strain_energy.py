@@ -59,8 +59,9 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = Fal
               for beam, s in zip(beams, slices)]
     if joined and len(beams) > 1:
         alike: dict[Any, list[StrainTables]] = {}
-        for k, t in enumerate(t for its in tables for t in its):
-            alike.setdefault(_samples(t) if t.law.kind == LINEAR else k, []).append(t)
+        # elements of one table add to different degrees of freedom: those of one beam stay apart
+        for k, (j, t) in enumerate(pair for its in tables for pair in enumerate(its)):
+            alike.setdefault((j, _samples(t)) if t.law.kind == LINEAR else k, []).append(t)
         tables = [[together(some) for some in alike.values()]]
     return _body(tables, lambda t: t.rows.shape[1])
 
