@@ -351,8 +351,8 @@ def test_other_scenes_are_refused(tmp_path, monkeypatch):
     copies = stages(monkeypatch, path)
     build().integrate(0.02, 2.5e-3, checkpoint=path, every=3)
     assert build().resume(copies[1]).t[-1] == pytest.approx(0.02)
-    for change, part in (({"E": 1.1e5}, "stiffness of member 0"), ({"ne": 3}, "mesh of member 0"),
-                         ({"width": 0.2}, "mass of member 0"), ({"element": 3}, "mesh of member 0"),
+    for change, part in (({"E": 1.1e5}, "stiffness of beam 0"), ({"ne": 3}, "mesh of beam 0"),
+                         ({"width": 0.2}, "mass of beam 0"), ({"element": 3}, "mesh of beam 0"),
                          ({"g": -9.82}, "load 0"), ({"at": (0.6, 0)}, "load 1"),
                          ({"joint": (1, 1)}, "joint 0"), ({"f": np.sin}, "amplitude of load 1"),
                          ({"f": None}, "amplitude of load 1"), ({"hold": "clamp"}, "supports")):
@@ -375,8 +375,8 @@ def test_functions_of_places_and_layers_are_compared(tmp_path):
     build().integrate(5e-3, 2.5e-3, checkpoint=path)
     assert build().resume(path).t[-1] == pytest.approx(5e-3)
     for change, part in (({"k": 6.0}, "force element 0"), ({"depth": 0.4}, "obstacle 0"),
-                         ({"top": 900.0}, "mass of member 0"),
-                         ({"E": 1.1e5}, "stiffness of member 0"),
+                         ({"top": 900.0}, "mass of beam 0"),
+                         ({"E": 1.1e5}, "stiffness of beam 0"),
                          ({"own": 2e5}, "force element 2")):
         with pytest.raises(CheckpointError, match=f"of another scene, .*{part}"):
             build(**change).resume(path)

@@ -49,28 +49,27 @@ def add_multiple(c, x, y):
 def factorize(A):
     if A.top > 0:
         return _exchanging(A)
-    flat, ld, n, both = A.flat, A.ld, A.flat.size // A.ld, A.ld // 2
+    flat, ld, n, both = A.flat, A.ld, A.flat.size // A.ld, A.ld // 2 if A.top < 0 else 0
     for j in range(n):
         at, m = j * ld, min(A.width, n - 1 - j)
-        d, column = flat[at], flat[at:at + m + 1]
-        other = flat[at + both:at + both + m + 1] if A.top < 0 else column
+        d = flat[at]
         if not abs(d) > 0.0 or not abs(d) < np.inf:
             return False
+        inverse = 1.0 / d
         for k in range(1, m + 1):
-            row = flat[at + k * ld:at + k * ld + m + 1 - k]
-            before, c = row[0], other[k] / d
+            row, before, c = at + k * ld, flat[at + k * ld], flat[at + both + k] * inverse
             for i in range(m + 1 - k):
-                row[i] -= c * column[k + i]
-            if abs(row[0]) < LOST * abs(before):
+                flat[row + i] -= c * flat[at + k + i]
+            if abs(flat[row]) < LOST * abs(before):
                 return False
-            if A.top < 0:
-                row, c = flat[at + k * ld + both:at + k * ld + both + m + 1 - k], column[k] / d
+            if both > 0:
+                row, c = row + both, flat[at + k] * inverse
                 for i in range(m + 1 - k):
-                    row[i] -= c * other[k + i]
+                    flat[row + i] -= c * flat[at + both + k + i]
         for k in range(1, m + 1):
-            column[k] /= d
-            if A.top < 0:
-                other[k] /= d
+            flat[at + k] *= inverse
+            if both > 0:
+                flat[at + both + k] *= inverse
     return True
 
 
@@ -145,21 +144,19 @@ def factorize_complex(A, width):
     n = half // ld
     for j in range(n):
         at, m = j * ld, min(width, n - 1 - j)
-        re, im = A[at:at + m + 1], A[half + at:half + at + m + 1]
-        a, b = re[0], im[0]
+        a, b = A[at], A[half + at]
         size = a * a + b * b
         if not size > 0.0 or not size < np.inf:
             return False
         for k in range(1, m + 1):
-            x, y, to = re[k], im[k], at + k * ld
-            c, d = (x * a + y * b) / size, (y * a - x * b) / size
-            p, q = A[to:to + m + 1 - k], A[half + to:half + to + m + 1 - k]
+            re, im, p = at + k, half + at + k, at + k * ld
+            c, d = (A[re] * a + A[im] * b) / size, (A[im] * a - A[re] * b) / size
             for i in range(m + 1 - k):
-                p[i] -= c * re[k + i] - d * im[k + i]
-                q[i] -= c * im[k + i] + d * re[k + i]
+                A[p + i] -= c * A[re + i] - d * A[im + i]
+                A[half + p + i] -= c * A[im + i] + d * A[re + i]
         for k in range(1, m + 1):
-            x, y = re[k], im[k]
-            re[k], im[k] = (x * a + y * b) / size, (y * a - x * b) / size
+            x, y = A[at + k], A[half + at + k]
+            A[at + k], A[half + at + k] = (x * a + y * b) / size, (y * a - x * b) / size
     return True
 
 

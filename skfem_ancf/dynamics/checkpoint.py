@@ -53,9 +53,10 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
     found = {"supports": np.append(system.constraints.fixed, system.constraints.values_at(times)),
              "damping": damping}
     for k, member in enumerate(system.members):
-        part = system.of(member)
-        found |= {f"mesh of member {k}": member.q0, f"stiffness of member {k}": force[part],
-                  f"mass of member {k}": inertia[part]}
+        part, kind = system.of(member), "rigid body" if member in system.bodies else "beam"
+        name = f"{kind} {k if member.name is None else member.name}"
+        found |= {f"mesh of {name}": member.q0, f"stiffness of {name}": force[part],
+                  f"mass of {name}": inertia[part]}
     for k, load in enumerate(system.loads):
         found[f"load {k}"] = np.append(load.force(u[system.of(load)]), system.of(load).start)
         if load.amplitude is not None:

@@ -111,7 +111,7 @@ class NumberedMesh(Immutable, Mesh2D):
         return elements
 
     def elements_satisfying(self, test: Callable[[Array], Array]) -> Array:
-        return satisfying(test, self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0])
+        return satisfying(test, self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0], "elements")
 
     def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
                           normal: ArrayLike | None = None) -> Array:

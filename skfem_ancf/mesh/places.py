@@ -215,13 +215,13 @@ def _numbered(mesh: Any, facets: Array) -> Array:
     return facets
 
 
-def satisfying(test: Callable[[Array], Any], x: Array) -> Array:
-    """Numbers of the points x (2, n) for which a function returns True."""
-    found = ask(f"the function that names a place, of x of shape {x.shape},", test, x)
+def satisfying(test: Callable[[Array], Any], x: Array, what: str = "a place") -> Array:
+    """Numbers of the points x (2, n) for which a function that names ``what`` returns True."""
+    found = ask(f"the function that names {what}, of x of shape {x.shape},", test, x)
     chosen = np.asarray(found)
     if is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool:
         raise CallbackError(
-            "a function that names a place takes points x of shape (2, n) and returns n truth "
+            f"a function that names {what} takes points x of shape (2, n) and returns n truth "
             f"values, as lambda x: x[0] > 1; for n = {x.shape[1]} it returned {chosen.dtype} of "
             f"shape {chosen.shape}")
     return np.nonzero(chosen)[0].astype(np.int32)
