@@ -363,7 +363,7 @@ class Integrator:
             (at, multipliers), mass = self._nodes[0].at, self._nodes[1].at
             found |= {"at": at, "multipliers at": multipliers}
             found |= {} if mass is None else {"mass at": mass}
-        elif self.ready:
+        if self.ready:
             found |= self._factors()
         return {name: np.array(array) for name, array in found.items()}
 
@@ -373,18 +373,18 @@ class Integrator:
             stored(arrays, name, self.arrays()[name])
         self._state[:], self.dt = arrays["state"], float(arrays["dt"])
         self.substeps = int(arrays["substeps"])
+        if self.ready:
+            for name, array in self._factors().items():
+                array[...] = stored(arrays, name, array)
+                if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < len(
+                        array):
+                    raise CheckpointError("the exchanges of rows are none")
         if self._nodes:
             steps, mass = self._nodes
             if self.ready:
                 steps.factorize(arrays["at"], arrays["multipliers at"])
             if "mass at" in arrays:
                 mass.factorize(arrays["mass at"])
-        elif self.ready:
-            for name, array in self._factors().items():
-                array[...] = stored(arrays, name, array)
-                if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < len(
-                        array):
-                    raise CheckpointError("the exchanges of rows are none")
 
     def _factors(self) -> dict[str, Array]:
         """The arrays of the factors of steps, by name."""
