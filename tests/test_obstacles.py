@@ -391,7 +391,7 @@ def test_a_stiffness_that_is_given_stays():
     scene = taut_belt(stiffness=2e6)
     state = scene.solve_static()
     pushed = state.contact()
-    assert not np.any(state._memory) and pushed.penetration > h_of(scene)
+    assert not np.any(state.memory) and pushed.penetration > h_of(scene)
     deepest = np.argmin(pushed.gap)
     assert pushed.pressure[deepest] == pytest.approx(-2e6 * pushed.gap[deepest], rel=1e-3)
 
@@ -496,7 +496,7 @@ def test_states_own_what_they_remember_of_obstacles():
     scene.obstacle(Line((0, -0.05)), method="augmented", stiffness=1e9, friction=0.5)
     memory = scene.system.forces.contacts.tables.memory
     state = scene.solve_static(first_step=0.5)
-    assert not np.any(memory) and np.any(state._memory)
+    assert not np.any(memory) and np.any(state.memory)
 
     def said(one):
         one = one.replace(message="again")  # which keeps nothing of what it was asked
@@ -1022,7 +1022,7 @@ def held_at(points, A, u, v):
     (Gauss(1), 3.0), (Gauss(2), 4.1), (Gauss(3), 5.6), (Radau(), 4.3)], ids=repr)
 def test_how_fast_a_mass_leaves_that_is_held_at_the_points_of_steps(scheme, most):
     """As the refusal says; it comes with the speed 1 to a wall, anywhere within a step."""
-    method = scheme._table.method
+    method = scheme.table.method
     A, speeds = np.linalg.inv(method.first), []
     for u in np.linspace(0.001, 0.999, 100):
         v = -1.0
