@@ -339,7 +339,7 @@ def oscillator():
     joints = JointTables(none, none, none, np.zeros(0), none, none, np.zeros(0), 0)
     M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
     forces = Forces([], 1, 0).tables(lambda i, j: i, True, 0)
-    equations = Equations(body, spring, joints, none, one, A, None, body, forces, body, one)
+    equations = Equations(body, spring, joints, none, one, A, body, forces, body, one)
     rows, dampers = Rows(row, row, row, row), Dampers(0, 0, 0, 0.0, A, row)
     return equations, Matrices(M, mass, A, A, rows, dampers)
 

@@ -115,13 +115,13 @@ def one_step(scheme, u, v, x):
 def test_estimates_are_the_errors_of_vibrations(scheme):
     """The root mean square of some hundred steps, against the exact solution from each start."""
     x, u, v = 0.5, 1.0, 0.0
-    old = Motion(0.0, *(np.array([a]) for a in (u, v, -x * x * u, 0.0)), np.zeros(0))
+    old = Motion(0.0, *(np.array([a]) for a in (u, v, -x * x * u, 0.0)), np.zeros(0), np.zeros(0))
     estimates, errors = [], []
     for n in range(1, 200):
         (u1, v1, stages), z = one_step(scheme, u, v, x), (u - 1j * v / x) * np.exp(1j * x)
         memory = {"stages": stages, "start": np.array([[u], [v]])}
-        new = Motion(float(n), *(np.array([a]) for a in (u1, v1, -x * x * u1, 0.0)), np.zeros(0),
-                     before=1.0, memory=None if stages is None else memory)
+        new = Motion(float(n), *(np.array([a]) for a in (u1, v1, -x * x * u1, 0.0)),
+                     *np.zeros((2, 0)), before=1.0, memory=None if stages is None else memory)
         estimates.append(scheme.local_error(old, new, 1.0)[0])
         errors.append(u1 - z.real)
         old, u, v = new, u1, v1
@@ -344,7 +344,8 @@ def test_interpolation_is_of_fourth_order():
     u, v = by_scipy(scene, times, rtol=1e-13, atol=1e-14)
     from skfem_ancf.dynamics import Motion
 
-    motions = {round(t, 6): Motion(t, a, b, a, a, np.zeros(0)) for t, a, b in zip(times, u, v)}
+    motions = {round(t, 6): Motion(t, a, b, a, a, *np.zeros((2, 0)))
+               for t, a, b in zip(times, u, v)}
     errors = []
     for h in (0.08, 0.04, 0.02):
         found = interpolate(motions[0.3], motions[round(0.3 + h, 6)], 0.3 + 0.25 * h)

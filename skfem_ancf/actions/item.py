@@ -62,12 +62,13 @@ class Item(Immutable):
 
     >>> import numpy as np
     >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.actions.places import point
     >>> class Quartic(Item):
     ...     def __init__(self, k, at):
     ...         self.k, self.at = k, at
     ...     def bind(self, layout):
     ...         bound = super().bind(layout)
-    ...         bound.point = layout.point(self.at)
+    ...         bound.point = point(layout, None, self.at)
     ...         bound.dofs = bound.point.dofs
     ...         return bound
     ...     def energy(self, u, t):

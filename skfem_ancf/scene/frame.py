@@ -531,7 +531,9 @@ class Frame(Scene):
 
         Parameters
         ----------
-        force, at, beam, amplitude
+        force, at
+            The force in the reference configuration and its place (x, y), shape (2,).
+        beam, amplitude
             As for :meth:`Scene.follower_force`.
         line
             The number of the line whose tangent it is, where several meet.

@@ -147,7 +147,7 @@ class Model:
     def _bound(self, item):
         """An entry, of which nothing is kept yet."""
         if not isinstance(item, Item):
-            raise InputError(f"a scene takes an Item, as a Spring, a Load or a Joint, got "
+            raise InputError(f"the item must be an Item, as a Spring, a Load or a Joint, got "
                              f"{shown(item)}: derive yours from skfem_ancf.Item")
         bound = [part for one in item.expand(self.layout) for part in bind_item(one, self.layout)]
         given = item._with(**{name: self._numbered(value) for name, value in vars(item).items()

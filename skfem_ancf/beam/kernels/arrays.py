@@ -226,7 +226,8 @@ def add_geometric(t, first, d, T, K):
 @step
 def add_to_band(t, first, K, to, halves):
     """Add matrices of elements to a band, of two halves to both."""
-    K = _with_left(K)
+    # what is symmetric is so to the bit: a translation then meets no round-off
+    K = _with_left(K if halves else 0.5 * (K + K.transpose(0, 2, 1)))
     j, i = np.triu_indices(K.shape[1])
     at = t.start[first:first + len(K), None] * to.ld + (j * (to.ld - 1) + i)
     left = np.searchsorted(j, K.shape[1] // 2)  # as for forces

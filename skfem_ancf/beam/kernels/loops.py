@@ -312,8 +312,9 @@ def add_to_band(t, begin, K, to, halves):
             at = (first + j) * to.ld - j
             for i in range(j, 2):
                 flat[at + i] += one[q + i, q + j]
-            for i in range(n):
-                flat[at + 2 + i] -= one[i, q + j]
+            for i in range(n):  # of what is symmetric the entries of the lower half, to the bit
+                one_half = halves or i >= q + j
+                flat[at + 2 + i] -= one[i, q + j] if one_half else one[q + j, i]
             for i in range(j, 2 if halves else 0):
                 flat[at + half + i] += one[q + j, q + i]
             for i in range(n if halves else 0):
