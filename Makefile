@@ -43,8 +43,8 @@ test: $(VENV)/test.stamp
 # and with the least versions of all others, all that solves.
 LEAST := $(VENV)/least
 GENERIC := compiled doors locking stability statics
-ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io mapping mesh package \
-  paper places points pyvista readme rooms stress visuals
+ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io items mapping mesh package \
+  paper places points pulleys pyvista readme rooms stress units verification visuals
 
 test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic NUMBA_BOUNDSCHECK=1 \
