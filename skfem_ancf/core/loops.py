@@ -49,27 +49,28 @@ def add_multiple(c, x, y):
 def factorize(A):
     if A.top > 0:
         return _exchanging(A)
-    flat, ld, n, both = A.flat, A.ld, A.flat.size // A.ld, A.ld // 2 if A.top < 0 else 0
+    n, halves = A.flat.size // A.ld, 2 if A.top < 0 else 1
+    # entry i of half h of column j; an index that is no sum of unknown sign needs no check
+    L = A.flat.reshape(n, halves, A.ld // halves)
     for j in range(n):
-        at, m = j * ld, min(A.width, n - 1 - j)
-        d = flat[at]
+        m, d = min(A.width, n - 1 - j), L[j, 0, 0]
         if not abs(d) > 0.0 or not abs(d) < np.inf:
             return False
         inverse = 1.0 / d
         for k in range(1, m + 1):
-            row, before, c = at + k * ld, flat[at + k * ld], flat[at + both + k] * inverse
+            before, c = L[j + k, 0, 0], L[j, halves - 1, k] * inverse
             for i in range(m + 1 - k):
-                flat[row + i] -= c * flat[at + k + i]
-            if abs(flat[row]) < LOST * abs(before):
+                L[j + k, 0, i] -= c * L[j, 0, k + i]
+            if abs(L[j + k, 0, 0]) < LOST * abs(before):
                 return False
-            if both > 0:
-                row, c = row + both, flat[at + k] * inverse
+            if halves > 1:
+                c = L[j, 0, k] * inverse
                 for i in range(m + 1 - k):
-                    flat[row + i] -= c * flat[at + both + k + i]
+                    L[j + k, 1, i] -= c * L[j, 1, k + i]
         for k in range(1, m + 1):
-            flat[at + k] *= inverse
-            if both > 0:
-                flat[at + both + k] *= inverse
+            L[j, 0, k] *= inverse
+            if halves > 1:
+                L[j, 1, k] *= inverse
     return True
 
 
