@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..beam.kinematics import folded
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
                            require_finite_scalar, require_flag, require_function,
                            require_positive, shown, warn)
@@ -244,8 +243,7 @@ def _go(run, file, progress):
                 bar.update(run.y.t - before)
                 if inverted is None and (run.steps >= looked or run.done):
                     looked, u = run.steps + LOOKED, run.y.u
-                    if system.inverted(u) or any(folded(beam, u[system.of(beam)])
-                                                 for beam in system.beams):
+                    if system.inverted(u) or system.folded(u):
                         inverted = run.y.t
                 if file is not None:
                     file.update()

@@ -12,6 +12,7 @@ from scipy import sparse
 from ..actions.forces.system import Forces
 from ..actions.forces.texts import add_resisting_force
 from ..actions.joints.director import UnitDirector
+from ..beam.kinematics import folded
 from ..beam.points import Points
 from ..core.errors import InputError
 from ..core.linalg import BandMatrix
@@ -224,6 +225,10 @@ class System:
         """True if a body is turned inside out somewhere."""
         return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices)
                    if b.has_sections)
+
+    def folded(self, u: Array) -> bool:
+        """True if the axis turns back within an element of a beam."""
+        return any(folded(b, u[s]) for b, s in zip(self.beams, self.slices))
 
     def stiffness_at_rest(self) -> sparse.csr_array:
         """The stiffness of force elements in the reference configuration, shape (N, N)."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..beam.kinematics import folded
 from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite, require_flag,
                            require_integer, require_option, require_positive)
 from ..core.linalg import NO_FACTORS
@@ -367,8 +366,7 @@ class Search:
         """Raise StepFailed unless what is free is held, and no axis turns back in an element."""
         if self.held_by_loads and not stability.is_held(self.system, result.u, result.multipliers):
             raise StepFailed("the loads do not hold what the supports leave free")
-        if self.rules.method == "auto" and any(
-                folded(b, result.u[self.system.of(b)]) for b in self.system.beams):
+        if self.rules.method == "auto" and self.system.folded(result.u):
             again = self._folded is not None and np.allclose(
                 result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
             self._folded = self._folded or result
