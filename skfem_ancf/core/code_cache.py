@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 
+class NotCompiled(Exception):
+    """A user's function that Numba cannot compile."""
+
+
 @cache
 def _stamp() -> str:
     """Of all that is compiled: Numba looks at the file of a function, not at what it calls."""
@@ -64,8 +68,8 @@ def can_keep() -> bool:
 @cache
 def _warn_of(path):
     warn(f"compiled code is not kept in {str(path)!r}: each process compiles anew. Make "
-                  "the folder writable, or set the environment variable NUMBA_CACHE_DIR to another "
-                  "one", CompilationWarning)
+         "the folder writable, or set the environment variable NUMBA_CACHE_DIR to another one",
+         CompilationWarning)
 
 
 def cannot_keep(reason: object) -> None:

@@ -180,6 +180,18 @@ def solve_complex(A, width, x, y):
         x[j], y[j] = (c * a + d * b) / size - p, (d * a - c * b) / size - q
 
 
+@source
+def _eliminate_column(A, b, j):
+    """Take multiples of row j from those below, so that column j ends at the diagonal."""
+    n = b.size
+    for i in range(j + 1, n):
+        c = A[i, j] / A[j, j]
+        if c != 0.0:
+            for k in range(j, n):
+                A[i, k] -= c * A[j, k]
+            b[i] -= c * b[j]
+
+
 def dense_solve(A, b):
     n = b.size
     for j in range(n):
@@ -193,12 +205,7 @@ def dense_solve(A, b):
             for k in range(n):
                 A[j, k], A[p, k] = A[p, k], A[j, k]
             b[j], b[p] = b[p], b[j]
-        for i in range(j + 1, n):
-            c = A[i, j] / A[j, j]
-            if c != 0.0:
-                for k in range(j, n):
-                    A[i, k] -= c * A[j, k]
-                b[i] -= c * b[j]
+        _eliminate_column(A, b, j)
     for j in range(n - 1, -1, -1):
         for k in range(j + 1, n):
             b[j] -= A[j, k] * b[k]
@@ -236,12 +243,7 @@ def solve_dependent(S, b):
         for i in range(m):
             S[i, j], S[i, q] = S[i, q], S[i, j]
         order[j], order[q] = order[q], order[j]
-        for i in range(j + 1, m):
-            c = S[i, j] / S[j, j]
-            if c != 0.0:
-                for k in range(j, m):
-                    S[i, k] -= c * S[j, k]
-                b[i] -= c * b[j]
+        _eliminate_column(S, b, j)
     free = m - rank
     x = np.zeros((free + 1, m))
     for k in range(free):

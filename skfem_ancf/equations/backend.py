@@ -202,7 +202,7 @@ class Machine:
         return run
 
     def _give_up(self, text, error):
-        if type(error).__name__ == "NotCompiled":
+        if isinstance(error, code_cache.NotCompiled):
             self._plain = str(error)
             logger.info(self._plain)
             return

@@ -11,6 +11,7 @@ from ..beam.kernels.law import text_of
 from ..beam.kernels.strain import evaluate
 from ..beam.kernels.tables import StrainTables
 from ..beam.strain_energy import FlatBody
+from ..core.code_cache import NotCompiled
 from ..core.jit import address, caller, reader
 from ..core.origin import ours
 from ..core.source import F1, F3
@@ -67,10 +68,6 @@ def part(name: str) -> int:
 def law(function: Any) -> int:
     """The address of a material law; one of another package is compiled in each process."""
     return address(function, _LAW, f"_{function.__module__}", ours(function))
-
-
-class NotCompiled(Exception):
-    """A user's function that Numba cannot compile."""
 
 
 def flat(plain: Equations) -> tuple[Equations, list[Words]]:
