@@ -26,7 +26,7 @@ LARGER = {
 MOST_CODE, MOST_NAMES = 500, 40
 #: Files of kernels, and what has more names.
 LARGER_FILES = {"dynamics/steps.py", "dynamics/stages.py", "beam/kernels/section.py",
-                "beam/kernels/base.py", "actions/forces/contact_texts.py"}
+                "beam/kernels/base.py"}
 LARGER_CLASSES = {"Constraints", "System"}
 
 

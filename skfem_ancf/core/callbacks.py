@@ -58,7 +58,7 @@ def own_elements(handle, what, t, factor, a, b, out):
 @primitive("skfem_ancf.core.loops")
 def own_poses(handle, t, span, poses):
     """Where obstacles are that move, see
-    :meth:`skfem_ancf.actions.forces.contacts.Contacts.put`."""
+    :meth:`skfem_ancf.actions.contact.contacts.Contacts.put`."""
     owner(handle).put(t, span, poses)
 
 

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..actions.forces.contact_texts import ANCHORED, HOLDS, REACHES, hardened
+from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from ..actions.forces.contacts import Contacts
+    from ..actions.contact.contacts import Contacts
     from ..core.types import Array
 
 #: How near a point lies that is held at first, and how far it is held, relative to the height.
@@ -57,11 +57,11 @@ def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
         Displacement, shape (N,), and time.
     """
     flags, most, pressed = [], 0.0, 0.0
-    for (_, group), _, found in contacts.look(u, t, False):
-        flags.append(found[0] < NEAR * group.height)
+    for (_, group), _, gap in contacts.look(u, t):
+        flags.append(gap < NEAR * group.height)
         whole = group.areas.sum()
         most = max(most, group.areas[flags[-1]].sum() / whole)
-        pressed = max(pressed, group.areas[found[0] < 0.0].sum() / whole)
+        pressed = max(pressed, group.areas[gap < 0.0].sum() / whole)
     return flags if most > PART and most > 2.0 * pressed else None
 
 
@@ -79,10 +79,11 @@ def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
     memory = contacts.tables.memory
     before = memory.copy()
     try:
-        memory[ANCHORED], memory[HOLDS] = 0.0, 1.0
+        memory[ANCHORED], memory[BILATERAL] = 0.0, 1.0
         for k, ((_, group), flag) in enumerate(zip(contacts.groups, flags)):
-            far = FAR * group.height * hardened(contacts.tables, contacts.header(k))
-            contacts.reach(k)[0], memory[REACHES + k] = far * flag, far
+            pair = contacts.pair(k)
+            far = FAR * group.height * hardening(contacts.tables, pair)
+            pair.memory[MULTIPLIER], memory[LARGEST + k] = far * flag, far
         yield
     finally:
         memory[:] = before
@@ -99,8 +100,8 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
         Displacement, shape (N,), and time of a body that they hold.
     """
     out = contacts.firmness.copy()
-    for k, ((_, group), _, found) in enumerate(contacts.look(u, t, False)):
-        deep = np.maximum(-found[0], 0.0)
+    for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
+        deep = np.maximum(-gap, 0.0)
         if np.any(deep):
             mean = group.areas @ deep / group.areas[deep > 0.0].sum()
             out[k] = min(group.firmest, (1.0 + out[k]) * mean / (LET_GO * group.height)) - 1.0
@@ -121,9 +122,9 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
     """
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
-    for k, ((_, group), _, found) in enumerate(contacts.look(u, t, False)):
+    for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
         part = (1.0 + now[k]) / (1.0 + out[k])  # what this pressure leaves if it is not harder
-        deep, stores = -part * float(found[0].min()) / group.height, part * share
+        deep, stores = -part * float(gap.min()) / group.height, part * share
         if deep > DEEP or (deep > SEEN and stores > STORED):
             more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
             out[k] = max(1.0, min(group.firmest, (1.0 + out[k]) * more)) - 1.0

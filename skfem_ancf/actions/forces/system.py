@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .base import Part
-from .contacts import NO_CONTACTS, Contacts
+from ..contact.contacts import NO_CONTACTS, Contacts
 from .control import Control
 from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness, potential,
                     run_kinds, turned, vectors_of)
@@ -46,7 +46,7 @@ class Forces:
     masses
         Those that add to the mass.
     contacts
-        The obstacles, a :class:`~skfem_ancf.actions.forces.contacts.Contacts`.
+        The obstacles, a :class:`~skfem_ancf.actions.contact.contacts.Contacts`.
     resists
         True if velocities may cause a force.
     """

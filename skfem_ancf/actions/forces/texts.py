@@ -15,9 +15,10 @@ from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import own_elements, own_poses
 from ...core.source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
-from .contact_texts import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
-                            ContactTables, Question, run_contacts)
-from .contact_texts import RESISTING as RUBBING
+from ..contact.kernels import run_contacts
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
+                              ContactTables, Question)
+from ..contact.tables import RESISTING as RUBBING
 
 #: Kinds of elements.
 SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))  # Numba compiles for each int
@@ -62,7 +63,7 @@ class ForceTables(NamedTuple):
     own
         Handle of what has elements of one's own; 0 for none.
     contacts
-        The obstacles, a :class:`~skfem_ancf.actions.forces.contact_texts.ContactTables`.
+        The obstacles, a :class:`~skfem_ancf.actions.contact.tables.ContactTables`.
     address
         That of the compiled :func:`of_kinds`; 0 for plain
         texts.
@@ -152,7 +153,7 @@ def add_resisting_force(tables, t, u, v, f):
 @source
 def add_contact(contacts, asked, u, v, out):
     """Add what is asked of obstacles, a
-    :class:`~skfem_ancf.actions.forces.contact_texts.Question`."""
+    :class:`~skfem_ancf.actions.contact.tables.Question`."""
     if contacts.number > 0:
         if contacts.moving > 0:
             own_poses(contacts.own, asked.t, asked.span, contacts.poses)

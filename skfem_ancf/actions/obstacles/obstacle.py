@@ -12,9 +12,9 @@ from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, requ
                             require_integer, require_not_negative, require_option, require_positive,
                             shown, warn)
 from ..forces.base import ForceElement, Part
-from ..forces.contacts import Contacts, Group
+from ..contact.contacts import Contacts, Group
 from ..places import Vector
-from ..forces.poses import carried, taken_back
+from ..contact.poses import carried, taken_back
 from ...beam.kernels.section import beam_gradients
 from ...core.quadrature import gauss_lobatto
 from .shapes import Shape
@@ -58,7 +58,7 @@ class Obstacle(ForceElement):
 
     Each point of a rule on the surface is pressed out of the shape with ``stiffness`` times the
     depth to which it is in it, per area of the stress-free surface; see
-    :mod:`skfem_ancf.actions.forces.contact_texts`. Of a cable the surface is its axis, moved by
+    :mod:`skfem_ancf.actions.contact.laws`. Of a cable the surface is its axis, moved by
     half of the height along the normal.
 
     Parameters
@@ -196,13 +196,13 @@ class Obstacle(ForceElement):
         self.shape = self.shape.fitted(places, height)
         self.groups = tuple(groups)
         contacts = Contacts([self])
-        for (_, group), x, found in contacts.look(np.zeros(layout.N), 0.0):
-            deepest = int(np.argmin(found[0]))
+        for _, x, gap in contacts.look(np.zeros(layout.N), 0.0):
+            deepest = int(np.argmin(gap))
             place = x[:, deepest] + contacts.origin
-            if not found[0, deepest] >= -CUT * height:
+            if not gap[deepest] >= -CUT * height:
                 raise InputError(
                     f"{self!r} cuts the body at the start: the point "
-                    f"{shown(place.tolist())} of its surface is {-found[0, deepest]:.4g} "
+                    f"{shown(place.tolist())} of its surface is {-gap[deepest]:.4g} "
                     "deep in it. Move the obstacle, or the body to where it is")
         self._require_outside(beams)
         return [Vector(np.zeros(2))]
@@ -258,7 +258,7 @@ class Obstacle(ForceElement):
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         elements = np.arange(mesh.nelements) if tind is None else tind
         h, n, m = mesh.height, len(elements), X.shape[1]
-        offsets, slopes = np.zeros((n, m)), None
+        offsets, slopes = np.zeros((n, m)), np.zeros((0, n * m))
         at, starts = X, np.zeros((4, n, m))
         if not beam.has_sections:
             offsets[:] = mapping.offset(X, elements)
@@ -297,11 +297,9 @@ def _joined(groups):
     """Some groups of one beam as one."""
     first = groups[0]
     arrays = {name: np.concatenate([getattr(group, name) for group in groups], axis=-1)
-              for name in ("first", "weights", "areas", "offsets", "starts")}
-    slopes = None if first.slopes is None else np.concatenate(
-        [group.slopes for group in groups], axis=-1)
+              for name in ("first", "weights", "slopes", "areas", "offsets", "starts")}
     numbers = np.max([group.numbers for group in groups], axis=0)  # but for the radius the same
-    return first._replace(**arrays, slopes=slopes, numbers=numbers,
+    return first._replace(**arrays, numbers=numbers,
                           elements=sum(group.elements for group in groups))
 
 

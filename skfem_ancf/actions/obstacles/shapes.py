@@ -10,7 +10,8 @@ import numpy as np
 from ...core.errors import (CallbackError, InputError, ask, require_finite, require_flag,
                             require_function, require_not_negative, require_positive, shown,
                             warnings_as_errors)
-from ..forces.contact_texts import OUTLINE, OWN, outline
+from ..contact.gap import outline
+from ..contact.tables import CUSTOM, OUTLINE
 from ...core.immutable import Immutable
 from .outlines import circle, clipped, contour
 
@@ -38,7 +39,7 @@ class Shape(Immutable):
     Attributes
     ----------
     kind
-        Its number in :mod:`skfem_ancf.actions.forces.contact_texts`.
+        Its number in :mod:`skfem_ancf.actions.contact.tables`.
     numbers
         What the texts take, shape (n,).
     pivot
@@ -53,7 +54,7 @@ class Shape(Immutable):
         thickness; infinite if there is no other side, large if that is not known.
     """
 
-    kind = OWN
+    kind = CUSTOM
     bend = inner = np.inf
     numbers: Any = np.zeros(0)
     pivot: Any = np.zeros(2)
@@ -355,7 +356,7 @@ class SignedDistance(Shape):
     1.0
     """
 
-    kind = OWN
+    kind = CUSTOM
     inner = UNKNOWN
 
     def __init__(self, f: Callable[..., Any], gradient: Callable[..., Any] | None = None,

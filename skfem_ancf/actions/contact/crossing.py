@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .contact_texts import OWN, RADIUS, STIFFNESS, outline, places, surface
+from .gap import outline, places, surface
 from .poses import taken_back
+from .tables import CUSTOM, RADIUS, STIFFNESS
 
 if TYPE_CHECKING:
     from ...core.types import Array
@@ -97,7 +98,7 @@ class _Path:
         self._which, self._group = contacts.groups[k]
         self.obstacle, self._poses = contacts.obstacles[self._which], poses
         self._contacts, self._numbers = contacts, contacts.numbers(self._which)
-        self._header = contacts.header(k)
+        self._pair = contacts.pair(k)
         self._tables, group = contacts.tables, self._group
         first = group.first[::group.points]
         self._dofs = first[:, None] + np.arange(2 * len(group.weights))
@@ -106,11 +107,11 @@ class _Path:
         self._start, self._mean, self._spread = middle[:2], middle[2::2], middle[3::2]
         bound, half = np.abs(group.weights), len(group.weights) // 2
         self._bound = self._spread = self._spread.max(axis=1)[1:]
-        if group.slopes is not None:  # normals turn by no more than twice the change of a slope
+        if len(group.slopes):  # normals turn by no more than twice the change of a slope
             turned = 2.0 * np.abs(group.offsets * group.slopes)
             bound, self._bound = bound + turned, self._bound + turned.max(axis=1)[1:]
         self._most = (bound[:half] + bound[half:]).max(axis=1)
-        self._by_time = self.obstacle.moves or self.obstacle.shape.kind == OWN
+        self._by_time = self.obstacle.moves or self.obstacle.shape.kind == CUSTOM
         self._turns = 0.0 if self.obstacle.angle is None else 2.0
         self.deepest = self.gone = 0.0
 
@@ -212,8 +213,8 @@ class _Path:
     def _points(self, at, u, t):
         """Points of the surface, seen from the obstacle; shape (2, n)."""
         z, x = np.empty((4, at.size)), np.empty((2, at.size))
-        places(self._tables.ints, self._tables.floats, self._header, u, 1.0, at, z, 0)
-        surface(self._tables.floats, self._header, at, z, 0, x)
+        places(self._pair, u, 1.0, at, z)
+        surface(self._pair, at, z, x)
         self._tables.counts[1] += at.size
         return self._seen(x, t)
 
@@ -229,7 +230,7 @@ class _Path:
     def _asked(self, x, t, whole=False):
         """The distance of points, seen from the obstacle, and its gradient if whole; (6, n)."""
         shape, out = self.obstacle.shape, np.empty((6, x.shape[1]))
-        if shape.kind != OWN:
+        if shape.kind != CUSTOM:
             outline(self._numbers, whole, np.ascontiguousarray(x), out)
         elif whole:
             out[:] = shape.derivatives(x + self._contacts.origin[:, None], t)

@@ -1,0 +1,423 @@
+"""The obstacles of a scene in its equations: their tables, and what steps leave behind."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...core.band import Band
+from ...core.callbacks import handle_of
+from ...core.errors import InputError
+from .active_set import project, projected, projection
+from .crossing import Passage, middle_of
+from .gap import distances, places, surface
+from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, of_contacts, push, resist, rub,
+                      states, way)
+from .poses import taken_back
+from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, LARGEST, NOW, POSE,
+                     POSES, PRESSURES, PROJECTED, RATE, SETTLE, SLOTS, STIFFNESS, TANGENT, WIDTH,
+                     ContactTables, Pair, Question, pair_of)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from ...core.types import Array
+
+
+#: Penetration, relative to the height, from which on an obstacle is too soft, and that which a
+#: stiffness is said for.
+SUNK, FIRM = 0.5, 0.1
+#: Part of the stiffness with which an equilibrium is found where the whole does not lead to it.
+EASED = 1e-2
+#: Why steps of several points do not hold a body on a wall: at each of them it would be held, and
+#: be thrown off by what is beyond.
+BY_POINTS = ("its steps do not correct pressures: held at their points, a body that is stopped "
+             "would leave up to 3, 4.1 or 5.6 times as fast as it came by 1, 2 or 3 points of "
+             "Gauss, 4.3 times by those of Radau")
+#: Of scenes without obstacles.
+NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(LARGEST),
+                            np.zeros(0), np.zeros(2, np.int64), 0, 0)
+
+
+class Group(NamedTuple):
+    """The points of one beam that may touch one obstacle, those of an element side by side.
+
+    Attributes
+    ----------
+    first, weights, slopes
+        First degree of freedom of the element of each point, (n,), weights of its pairs of degrees
+        of freedom, (pairs, n), and those of the slope of the axis; (0, n) with sections.
+    areas, offsets, starts
+        Area, distance from the axis, (n,), and place and slope without displacement, (4, n).
+    elements, points
+        How many elements, and points of each.
+    depth, height
+        How deep a way from one state to the next may cut the obstacle; the beam's height.
+    numbers
+        By the numbers of :mod:`skfem_ancf.actions.contact.tables`, shape (9,).
+    firmest
+        How many times as stiff it is made at most where it is too soft.
+    """
+
+    first: Any
+    weights: Any
+    slopes: Any
+    areas: Any
+    offsets: Any
+    starts: Any
+    elements: int
+    points: int
+    depth: float
+    height: float
+    numbers: Any
+    firmest: float
+
+
+class Contacts:
+    """The obstacles of a scene.
+
+    Places are seen from the middle of the bodies, in tables and memory: far from the origin of the
+    scene's coordinates friction would feel their round-off. Arguments of its methods are
+    displacements and velocities ``u, v``, shape (N,), and the time ``t``, in statics the load
+    factor.
+
+    Parameters
+    ----------
+    elements
+        Force elements, bound: those with ``groups`` are obstacles.
+
+    Attributes
+    ----------
+    obstacles, groups
+        These, and pairs of the number of an obstacle and a :class:`Group`.
+    origin
+        From where places are seen, shape (2,).
+    tables
+        A :class:`~skfem_ancf.actions.contact.tables.ContactTables`.
+    moving, own, anchored, augmented
+        True if an obstacle moves, has a shape of the caller's, friction, or takes the augmented
+        Lagrangian.
+    """
+
+    def __init__(self, elements: Sequence[Any]) -> None:
+        self.obstacles = [element for element in elements if element.groups]
+        groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
+        self.origin = np.zeros(2)
+        if groups:
+            x = np.concatenate([group.starts[:2] for _, group in groups], axis=1)
+            self.origin = 0.5 * (x.min(axis=1) + x.max(axis=1))
+        start = np.append(self.origin, np.zeros(2))[:, None]
+        self.groups = [(k, group._replace(starts=group.starts - start)) for k, group in groups]
+        self.moving = any(one.moves for one in self.obstacles)
+        self.own = any(one.shape.kind == CUSTOM for one in self.obstacles)
+        self.anchored = any(one.friction > 0.0 for one in self.obstacles)
+        self.augmented = any(one.method == "augmented" for one in self.obstacles)
+        self.tables = self._tables() if groups else NO_CONTACTS
+        self.put(0.0, 0.0, self.tables.poses)
+
+    def _tables(self):
+        n = len(self.groups)
+        headers, ints, floats = np.zeros((n, HEADER), dtype=np.int64), [], []
+        memory, cache, at, after = LARGEST + 2 * n, 0, 0, HEADER * n
+        for number, (k, group) in enumerate(self.groups):
+            shape, points, pairs = self.numbers(k), len(group.first), len(group.weights)
+            low = int(group.first.min())
+            span = int(group.first.max()) + 2 * pairs - low
+            headers[number] = (self.obstacles[k].shape.kind, k, group.elements, group.points, pairs,
+                               len(group.slopes) > 0, len(shape), after, at, memory, cache, low,
+                               span)
+            ints.append(group.first)
+            floats.append(np.concatenate([x.ravel() for x in (
+                group.weights, group.slopes, group.areas, group.offsets, group.starts,
+                middle_of(group), group.numbers, shape)]))
+            memory, after, at = memory + 4 * points, after + points, at + floats[-1].size
+            cache += SLOTS * (span + POSE + group.elements + PROJECTED * points)
+        return ContactTables(
+            n, np.concatenate([headers.ravel(), *ints]).astype(np.int64), np.concatenate(floats),
+            np.zeros(POSES * len(self.obstacles)), np.zeros(memory), np.full(cache, np.nan),
+            np.zeros(2 + n, np.int64), int(self.moving or self.own), handle_of(self),
+            ANCHORS * self.anchored + PRESSURES * self.augmented)
+
+    def pair(self, k: int) -> Pair:
+        """Views of the tables for group k."""
+        return pair_of(self.tables, k)
+
+    def numbers(self, k: int) -> Array:
+        """Those of the shape of obstacle k, its corners seen from the origin."""
+        numbers = self.obstacles[k].shape.numbers.copy()
+        numbers[3:].reshape(-1, 5)[:, :2] -= self.origin
+        return numbers
+
+    def pose(self, k: int, t: float, rates: bool = True) -> Array:
+        """Where obstacle k is, its pivot seen from the origin; shape (10,)."""
+        pose = self.obstacles[k].pose(t, rates)
+        pose[4:6] -= self.origin
+        return pose
+
+    # what kernels ask
+
+    def put(self, t: float, span: float, poses: Array) -> None:
+        """Write the poses of all obstacles at a time, and at both ends of a span about it."""
+        for k in range(len(self.obstacles)):
+            rows = poses[k * POSES:(k + 1) * POSES].reshape(-1, POSE)
+            rows[:] = self.pose(k, t)
+            if span > 0.0:
+                rows[1:] = self.pose(k, t - 0.5 * span), self.pose(k, t + 0.5 * span)
+
+    def ask(self, obstacle: int, t: float, x: Array, out: Array) -> None:
+        """Distance, gradient and second derivatives of a shape of the caller's, (6, n)."""
+        out[:] = self.obstacles[obstacle].shape.derivatives(x + self.origin[:, None], t)
+
+    # memory
+
+    @property
+    def lasting(self) -> int:
+        """What is kept from step to step; 0 for nothing."""
+        return self.tables.lasting
+
+    @contextmanager
+    def lent(self, memory: Array | None = None) -> Iterator[None]:
+        """For the time of an evaluation points have the memory of a state, or none of one.
+
+        States own their memories; tables have one only while a state, or a way of steps, asks
+        something. So the order in which states are asked does not matter.
+        """
+        before = self.tables.memory.copy()
+        try:
+            self.put_back(memory)
+            yield
+        finally:
+            self.put_back(before)
+
+    @contextmanager
+    def eased(self) -> Iterator[None]:
+        """For the time of an evaluation there is no friction or, if there is none, less stiffness.
+
+        Iterations converge there that do not with the whole, to a place that is close to theirs.
+        """
+        memory, numbers = self.tables.memory, [
+            self.pair(k).numbers for k in range(len(self.groups))]
+        before, sticks = [x[STIFFNESS] for x in numbers], memory[ANCHORED]
+        try:
+            memory[ANCHORED] = 0.0
+            for x in numbers:
+                x[STIFFNESS] *= 1.0 if sticks else EASED
+            yield
+        finally:
+            memory[ANCHORED] = sticks
+            for x, k in zip(numbers, before):
+                x[STIFFNESS] = k
+
+    def put_back(self, memory: Array | None) -> None:
+        """Go on with what :meth:`remember` gave, or with nothing: no anchors, no multipliers."""
+        if self.obstacles:
+            self.tables.memory[:] = 0.0 if memory is None else memory
+
+    def remember(self) -> Array | None:
+        """What steps have left behind, shape (n,); None where there is nothing of it."""
+        memory = self.tables.memory
+        return memory.copy() if np.any(memory) else None
+
+    def of_state(self, state: Any) -> Array | None:
+        """What points of a State of this scene remember; None if its obstacles are others."""
+        if state is None:
+            return None
+        ours, theirs = self.tables, state.system.forces.contacts.tables
+        same = np.array_equal(ours.ints, theirs.ints) and np.array_equal(ours.floats, theirs.floats)
+        return state.memory if same else None
+
+    def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
+        """Points stick from here on, without multipliers, or go on with what they remember.
+
+        Returns
+        -------
+        ndarray or None
+            The memory that steps begin with, shape (n,).
+        """
+        if not self.obstacles:
+            return None
+        self.put_back(memory)
+        self.tables.memory[RATE] = 0.0
+        if memory is None and self.anchored:
+            self.settle(u, t)
+            self.tables.memory[ANCHORED] = 1.0
+        return self.remember()
+
+    @property
+    def firmness(self) -> Array:
+        """How much stiffer than by default obstacles are, shape (groups,), a view; 0: not."""
+        first = LARGEST + len(self.groups)
+        return self.tables.memory[first:first + len(self.groups)]
+
+    def harden(self, firmness: Array, u: Array, t: float) -> None:
+        """Make obstacles stiffer than by default; what sticks to anchors left at u pulls as before.
+        """
+        for k, ((which, _), x, _) in enumerate(self.look(u, t)):
+            part, memory = (1.0 + self.firmness[k]) / (1.0 + firmness[k]), self.pair(k).memory
+            points = taken_back(self.pose(which, t, False), x)
+            memory[1:3] = points + part * (memory[1:3] - points)
+            memory[3] *= part
+        self.firmness[:] = firmness
+
+    def settle(self, u: Array, t: float) -> float:
+        """Anchors go after points that have slipped; the work of friction since they did so last.
+        """
+        return float(self._ask(SETTLE, u, t)) if self.anchored else 0.0
+
+    def augment(self, u: Array, t: float) -> int:
+        """Update multipliers; how many points are too deep, or too far off with a pressure."""
+        return int(self._ask(AUGMENT, u, t))
+
+    def _ask(self, what, u, t):
+        self._place(t)
+        out = np.zeros(1)
+        of_contacts(self.tables, Question(what, t, 0.0, 0.0, 0, 0), u, u, out)
+        return out[0]
+
+    # what some solvers do not take
+
+    def require_path(self) -> None:
+        """Raise InputError where there is no path by arc length."""
+        for one in self.obstacles:
+            if one.friction > 0.0 or one.moves or one.method != "penalty":
+                raise InputError(f"continuation knows obstacles that rest, without friction and by "
+                                 f"penalty, not {one!r}: use solve_static")
+
+    def require_penalty(self, scheme: Any, kick: float) -> None:
+        """Raise InputError if the augmented Lagrangian would drive what it holds.
+
+        A force that stops a body at the end of a step acts on in those that follow, by the weights
+        that a scheme gives to accelerations: from the speed 1 it makes up to ``kick - 1``, with
+        ``(1 - alpha_m) / ((1 - alpha_f) beta)``; infinite of steps of points.
+        """
+        reason = BY_POINTS if kick == np.inf else (
+            f"a body that is stopped in a step would leave up to {kick - 1.0:.2g} times as fast as "
+            "it came")
+        for one in self.obstacles:
+            if one.method == "augmented" and kick > 2.0 + 1e-9:
+                raise InputError(
+                    f"{scheme!r} does not take method='augmented' of {one!r}: {reason}. Take "
+                    "'energy-momentum', which keeps to its balance of energy, "
+                    "GeneralizedAlpha(0), or method='penalty'")
+
+    def require_free(self, u: Array, what: str, instead: str) -> None:
+        """Raise InputError if a linear solution enters an obstacle."""
+        if any(gap.min() < 0.0 for _, _, gap in self.look(u, 1.0)):
+            raise InputError(f"{what} knows no contact, and its solution enters an obstacle: use "
+                             f"{instead}")
+
+    # values
+
+    def _place(self, t):
+        if self.moving or self.own:
+            self.put(t, 0.0, self.tables.poses)
+
+    def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
+        """Where the points of all groups are.
+
+        Returns
+        -------
+        list
+            For each group its number of obstacle and :class:`Group`, the points (2, n) seen from
+            the origin, and their gaps, (n,).
+        """
+        self._place(t)
+        out = []
+        for k, group in enumerate(self.groups):
+            pair, at = self.pair(k), np.arange(len(group[1].first))
+            z, x, found = (np.empty((rows, at.size)) for rows in (4, 2, 6))
+            places(pair, u, 1.0, at, z)
+            surface(pair, at, z, x)
+            distances(self.tables.own, pair, NOW, False, x, found)
+            out.append((group, x, found[0]))
+        return out
+
+    def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
+        """What obstacles do to points; without velocities in statics.
+
+        Returns
+        -------
+        list
+            For each group its number of obstacle, points (2, n), forces on them (2, n), pressures
+            and gaps, (n,).
+        """
+        self._place(t)
+        out = []
+        for k, (which, group) in enumerate(self.groups):
+            pair, at = self.pair(k), np.arange(len(group.first))
+            w, slot = np.zeros((ROWS, at.size)), projection(self.tables, pair, NOW, u)
+            project(self.tables, pair, NOW, slot, u, at)
+            gap = projected(pair, slot)[GAP].copy()
+            states(self.tables, pair, slot, slot, at, w)
+            push(self.tables, pair, at, w)
+            rub(self.tables, pair, True, at, w)
+            force, pressure = -w[PUSH:PUSH + 2], w[PRESSURE] / group.areas
+            if v is not None and group.numbers[DAMPING] > 0.0:
+                places(pair, v, 0.0, at, w[RATES:DEPTH])
+                way(w)
+                resist(self.tables, pair, 0.0, at, w)
+                force = force - w[PUSH:PUSH + 2]
+            out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure, gap))
+        return out
+
+    def potential(self, u: Array, t: float) -> float:
+        """The potential of the penetration; the augmented Lagrangian, which leaves none, has none.
+        """
+        total = 0.0
+        for firmness, ((which, group), _, gap) in zip(self.firmness, self.look(u, t)):
+            if self.obstacles[which].method == "augmented":
+                continue
+            width = group.numbers[WIDTH]
+            S = (np.maximum(-gap, 0.0) ** 3 - np.maximum(-gap - width, 0.0) ** 3) / (6.0 * width)
+            total += (1.0 + firmness) * group.numbers[STIFFNESS] * float(group.areas @ S)
+        return total
+
+    def entries(self, t: float, u: Array, bandwidth: int) -> tuple[Array, Array, Array]:
+        """The derivative of the force by the degrees of freedom: rows, columns and values."""
+        if not self.groups:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
+        ld = 2 * bandwidth + 1
+        A = Band(np.zeros(ld * len(u)), np.zeros(0, dtype=np.int32), ld, bandwidth, bandwidth)
+        self._place(t)
+        asked = Question(TANGENT, t, 0.0, 0.0, ld, bandwidth)
+        of_contacts(self.tables, asked, u, u, A.flat)
+        at, = np.nonzero(A.flat)
+        j, i = np.divmod(at, ld)
+        return i + j - bandwidth, j, A.flat[at]
+
+    # what bodies pass through, and what they are pressed into
+
+    @cached_property
+    def sweeps(self) -> bool:
+        """True if there is an obstacle that bodies may pass through between two instants."""
+        return any(group.depth < np.inf for _, group in self.groups)
+
+    @cached_property
+    def sweep(self) -> Passage:
+        """What looks for obstacles that a body has passed through from one instant to the next."""
+        return Passage(self)
+
+    def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
+        """Which obstacle a body has passed through between displacements and times, in words."""
+        if not self.obstacles:
+            return None
+        done, text = self.sweep.first(np.array([a[0], b[0]]), None, np.array([a[1], b[1]]))
+        return None if done else f"a body has passed through {text}"
+
+    def sunk(self, u: Array, t: float) -> list[str]:
+        """Which bodies are deep in obstacles of the default stiffness, in words."""
+        out: list[str] = []
+        seen = self.look(np.array(u), t) if self.groups else []
+        for firmness, ((which, group), _, gap) in zip(self.firmness, seen):
+            one, deep, h = self.obstacles[which], -float(gap.min()), group.height
+            if one.penalty is None and deep > SUNK * h:
+                k = (1.0 + firmness) * group.numbers[STIFFNESS]
+                firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both sides of it are in
+                out.append(
+                    f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: it is "
+                    f"pressed harder than its stiffness, {k:.3g}, holds. Give "
+                    f"stiffness={firm:.2g}, with which this pressure leaves a tenth of the height")
+        return out

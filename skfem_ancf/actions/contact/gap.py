@@ -1,0 +1,161 @@
+"""Points of the surface of beams, and their gap: the signed distance from an obstacle.
+
+A point of the surface is ``X = x + c n(s)``: a place x of the body, and for cables, whose surface
+is no coordinate, the normal n of the slope s of the axis at a distance c. The gap is negative in
+the obstacle; its gradient is the normal at the closest point of the outline.
+"""
+
+import numpy as np
+
+from ...core.callbacks import own_distance
+from ...core.source import lanes, source
+from .tables import CUSTOM, KIND, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE, START
+
+TINY = 1e-200
+#: The least square of a slope: sections have none, and levers of no length.
+SHORT = 1e-30
+
+
+@source
+def _interpolate(weights, first, u, at, p, q):
+    """Add both components of what u adds to vectors at some points."""
+    for k in range(weights.shape[0]):
+        row = weights[k]
+        for i in lanes(at.size):
+            dof, w = first[at[i]] + 2 * k, row[at[i]]
+            p[i] += w * u[dof]
+            q[i] += w * u[dof + 1]
+
+
+@source
+def places(pair, u, factor, at, z):
+    """Places and slopes (4, n) of points, those without displacement times a factor."""
+    for c in range(4):
+        row = pair.points[START + c]
+        for i in lanes(at.size):
+            z[c, i] = factor * row[at[i]]
+    _interpolate(pair.weights, pair.first, u, at, z[0], z[1])
+    _interpolate(pair.slopes, pair.first, u, at, z[2], z[3])
+
+
+@source
+def middles(pair, u, factor, x, radius):
+    """The middle of each element's points (2, n), and how far from it they may be.
+
+    Of the places without displacement, times the factor, and what u adds to them.
+    """
+    n, half, largest = x.shape[1], pair.header[PAIRS] // 2, pair.numbers[RADIUS]
+    m = pair.first.size // n
+    first, p, q = pair.first[::m], pair.middles[0], pair.middles[1]
+    for e in lanes(n):
+        x[0, e], x[1, e], radius[e] = factor * p[e], factor * q[e], largest
+    for k in range(pair.header[PAIRS]):
+        p, q, same = pair.middles[2 + 2 * k], pair.middles[3 + 2 * k], 1.0 * (k == half)
+        for e in lanes(n):
+            a, b = u[first[e] + 2 * k], u[first[e] + (2 * k + 1)]
+            x[0, e] += p[e] * a
+            x[1, e] += p[e] * b
+            # both places of an element together are a translation
+            c, d = a - same * u[first[e]], b - same * u[first[e] + 1]
+            radius[e] += q[e] * np.sqrt(c * c + d * d)
+
+
+@source
+def surface(pair, at, z, x):
+    """The points of the surface (2, n), of places and slopes."""
+    offset = pair.points[OFFSET]
+    for i in lanes(at.size):
+        s, t = z[2, i], z[3, i]
+        c = offset[at[i]] / np.sqrt(np.maximum(s * s + t * t, SHORT))
+        x[0, i], x[1, i] = z[0, i] - c * t, z[1, i] + c * s
+
+
+@source
+def levers(pair, at, z, lever):
+    """The derivative of the surface by the slope: xs, xt, ys, yt."""
+    offset = pair.points[OFFSET]
+    for i in lanes(at.size):
+        s, t = z[2, i], z[3, i]
+        square = np.maximum(s * s + t * t, SHORT)
+        c = offset[at[i]] / square / np.sqrt(square)
+        lever[0, i], lever[1, i] = c * s * t, -c * s * s
+        lever[2, i], lever[3, i] = c * t * t, -c * s * t
+
+
+@source
+def carried(q, p, x, y):
+    """Points that go with an obstacle from the pose p to the pose q."""
+    cos, sin = q[2] * p[2] + q[3] * p[3], q[3] * p[2] - q[2] * p[3]
+    a, b = x - p[0] - p[4], y - p[1] - p[5]
+    return q[0] + q[4] + cos * a - sin * b, q[1] + q[5] + sin * a + cos * b
+
+
+@source
+def distances(own, pair, which, whole, x, out):
+    """Gap, its gradient and second derivatives xx, xy, yy at points x, shape (6, n).
+
+    Derivatives where ``whole`` is true.
+    """
+    pose, y, side = pair.poses[which], np.empty(x.shape), pair.numbers[SIDE]
+    cos, sin = pose[2], pose[3]
+    for i in lanes(x.shape[1]):
+        a, b = x[0, i] - pose[0] - pose[4], x[1, i] - pose[1] - pose[5]
+        y[0, i], y[1, i] = cos * a + sin * b + pose[4], cos * b - sin * a + pose[5]
+    if pair.header[KIND] == CUSTOM:
+        own_distance(own, pair.header[OBSTACLE], pose[9], y, out)
+    else:
+        outline(pair.shape, whole, y, out)
+    for i in lanes(x.shape[1]):
+        out[0, i] *= side
+    if not whole:
+        return
+    for i in lanes(x.shape[1]):
+        a, b = side * out[1, i], side * out[2, i]
+        p, q, r = side * out[3, i], side * out[4, i], side * out[5, i]
+        out[1, i], out[2, i] = cos * a - sin * b, sin * a + cos * b
+        c, d = 0.5 * (p + r), 0.5 * (p - r)
+        e, f = (cos * cos - sin * sin) * d - 2.0 * cos * sin * q, 2.0 * cos * sin * d + (
+            cos * cos - sin * sin) * q
+        out[3, i], out[4, i], out[5, i] = c + e, f, c - e
+
+
+@source
+def outline(shape, whole, y, out):
+    """Closest point projection on a polygon with rounded corners.
+
+    Its numbers: radius of the corners, where edges begin and end in parts of their lengths, then of
+    each corner: place, edge to the next, 1 or -1 if it is convex or not. Next to an edge it is a
+    line, next to a corner a circle.
+    """
+    radius, low, high = shape[0], shape[1], shape[2]
+    n, best = (shape.size - 3) // 5, np.empty(y.shape[1])
+    for i in lanes(y.shape[1]):
+        best[i] = 1e300
+    for c in range(6 if whole else 1):
+        for i in lanes(y.shape[1]):
+            out[c, i] = 0.0
+    for k in range(n):
+        p, after = shape[3 + 5 * k:8 + 5 * k], shape[7 + 5 * ((k + 1) % n)]
+        px, py, before = p[0], p[1], p[4]
+        ex, ey = p[2], p[3]
+        square = np.maximum(ex * ex + ey * ey, TINY)
+        nx, ny = ey / np.sqrt(square), -ex / np.sqrt(square)
+        for i in lanes(y.shape[1]):
+            a, b = y[0, i] - px, y[1, i] - py
+            s = np.minimum(np.maximum((a * ex + b * ey) / square, low), high)
+            c, d = a - s * ex, b - s * ey
+            far = c * c + d * d
+            new = 1.0 * (far < best[i])
+            best[i] = np.minimum(best[i], far)
+            inner = 1.0 * (s > low) * (s < high)
+            corner = (1.0 - inner) * (before * (s < 0.5) + after * (s >= 0.5))
+            size = np.maximum(np.sqrt(far), TINY)
+            out[0, i] += new * (inner * (nx * a + ny * b) + corner * size - radius - out[0, i])
+            if whole:
+                bend = corner / size
+                gx, gy = inner * nx + bend * c, inner * ny + bend * d
+                out[1, i] += new * (gx - out[1, i])
+                out[2, i] += new * (gy - out[2, i])
+                out[3, i] += new * (bend * gy * gy - out[3, i])
+                out[4, i] -= new * (bend * gx * gy + out[4, i])
+                out[5, i] += new * (bend * gx * gx - out[5, i])

@@ -1,0 +1,369 @@
+"""What contact adds to the equations: forces, tangents, friction, multipliers.
+
+Each active point has a force on its place and slope, (4,), and the derivative of that, (4, 4); both
+go to the degrees of freedom by the weights of the point. Where a motion keeps the energy, the
+force is a mean between two states whose work is the change of the potential: the discrete gradient
+of Gonzalez (1996) of the gap, times the slope of S between them. In a mean the spring of friction
+is that of the end, so that what vibrates on it comes to rest.
+
+A motion takes few corrections of multipliers if the stiffness is not small beside that of the mass
+in a step: it is grown by ``INERTIA`` over the square of the step.
+"""
+
+import numpy as np
+
+from ...core.source import lanes, primitive, source
+from ..tables import add_each
+from .active_set import near_points, project, projected, projection, stride, touching
+from .gap import SHORT, TINY, carried, distances, levers, places, surface
+from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_slope,
+                   return_mapping, slip_of)
+from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, BILATERAL,
+                     DAMPED_TANGENT, DAMPING, END, FORCE, FRICTION, GAP, LARGEST, MULTIPLIER, NOW,
+                     OFFSET, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING, STIFFNESS, TOLERANCE,
+                     WIDTH, hardening, pair_of)
+
+#: A change of places, relative to an element, below which a mean is that of the middle.
+CLOSE = 1e-5
+#: Rows of active points: place and slope in the middle of a mean; their way, or velocity; the
+#: penetration at both ends; the surface at the end; its way, or velocity; the surface in the
+#: middle, its gap with derivatives, and its derivative by the slope; the force on it, and the
+#: derivative of that; the pressure and its derivative; what the force's work misses, by the square
+#: of the way.
+(MIDDLE, RATES, DEPTH, LAST, WAY, PLACE, FOUND, LEVER, PUSH, K, PRESSURE, SLOPE, MISSING,
+ ROWS) = 0, 4, 8, 10, 12, 14, 16, 22, 26, 28, 32, 33, 34, 35
+NX, NY = FOUND + 1, FOUND + 2
+
+
+@source
+def of_contacts(tables, asked, u, v, out):
+    """Add what is asked of all pairs, a :class:`~skfem_ancf.actions.contact.tables.Question`."""
+    for k in range(tables.number):
+        _of_pair(tables, pair_of(tables, k), asked, u, v, out)
+
+
+@primitive("skfem_ancf.equations.loops")
+def run_contacts(tables, asked, u, v, out):
+    """As :func:`of_contacts`; compiled once, and not anew in each function that calls it."""
+    of_contacts(tables, asked, u, v, out)
+
+
+@source
+def _of_pair(tables, pair, asked, u, v, out):
+    """Add what is asked, of the points that touch."""
+    what, same = asked.what, asked.span == 0.0
+    if what == ALONG:
+        out[1] = max(out[1], stride(pair, v))
+    resists = what == RESISTING or what == DAMPED_TANGENT
+    if resists and pair.numbers[DAMPING] == 0.0:
+        return
+    begin = projection(tables, pair, NOW if same else BEGIN, u)
+    end = begin if same else projection(tables, pair, END, v)
+    at = near_points(tables, pair, what, begin, end)
+    if at.size == 0:
+        return
+    project(tables, pair, NOW if same else BEGIN, begin, u, at)
+    if not same:
+        project(tables, pair, END, end, v, at)
+    if what < SETTLE:
+        at = touching(tables, pair, begin, end, at)
+    if at.size == 0:
+        return
+    w = np.empty((ROWS, at.size))
+    states(tables, pair, begin, end, at, w)
+    if what == AUGMENT:
+        _augment(tables, pair, at, w, out)
+        return
+    if resists or what == ALONG:
+        places(pair, v, 0.0, at, w[RATES:DEPTH])
+        way(w)
+    if resists:
+        resist(tables, pair, asked.factor, at, w)
+    else:
+        push(tables, pair, at, w)
+        if what == FORCE:
+            _keep_work(pair, w)
+        if what == SETTLE:
+            _settle(tables, pair, same, at, w, out)
+            return
+        rub(tables, pair, same, at, w)
+    if what == FORCE or what == RESISTING:
+        _add_force(pair, at, w, out)
+    else:
+        S = np.zeros((16, at.size))
+        _stiffness(pair, at, w, S)
+        if what == ALONG:
+            _add_along(w, S, out)
+        else:
+            _add_stiffness(pair, asked, at, S, out)
+
+
+@source
+def states(tables, pair, begin, end, at, w):
+    """Fill the rows of points up to the derivative by the slope, by two projections."""
+    a, b, multiplier = projected(pair, begin), projected(pair, end), pair.memory[MULTIPLIER]
+    part = 1.0 / hardening(tables, pair)
+    for c in range(4):
+        for i in lanes(at.size):
+            w[RATES + c, i] = b[c, at[i]] - a[c, at[i]]
+            w[MIDDLE + c, i] = a[c, at[i]]
+    for i in lanes(at.size):
+        more = part * multiplier[at[i]]
+        w[DEPTH, i], w[DEPTH + 1, i] = more - a[GAP, at[i]], more - b[GAP, at[i]]
+        w[LAST, i], w[LAST + 1, i] = b[4, at[i]], b[5, at[i]]
+    if begin != end and tables.moving > 0:
+        _carry(pair, a, at, w)
+    if begin != end:
+        for c in range(4):
+            for i in lanes(at.size):
+                w[MIDDLE + c, i] += 0.5 * w[RATES + c, i]
+    surface(pair, at, w[MIDDLE:RATES], w[PLACE:FOUND])
+    levers(pair, at, w[MIDDLE:RATES], w[LEVER:PUSH])
+    distances(tables.own, pair, NOW, True, w[PLACE:FOUND], w[FOUND:LEVER])
+    way(w)
+
+
+@source
+def _carry(pair, a, at, w):
+    """Move points with the obstacle, from where it was or will be to where it is."""
+    for i in lanes(at.size):
+        x, y = carried(pair.poses[NOW], pair.poses[BEGIN], a[4, at[i]], a[5, at[i]])
+        p, q = x - a[4, at[i]], y - a[5, at[i]]
+        x, y = carried(pair.poses[NOW], pair.poses[END], w[LAST, i], w[LAST + 1, i])
+        w[MIDDLE, i] += p
+        w[MIDDLE + 1, i] += q
+        w[RATES, i] += x - w[LAST, i] - p
+        w[RATES + 1, i] += y - w[LAST + 1, i] - q
+        w[LAST, i], w[LAST + 1, i] = x, y
+
+
+@source
+def way(w):
+    """How points of the surface move, of the rates of their places and slopes."""
+    for k in range(2):
+        for i in lanes(w.shape[1]):
+            w[WAY + k, i] = (w[RATES + k, i] + w[LEVER + 2 * k, i] * w[RATES + 2, i]
+                             + w[LEVER + 2 * k + 1, i] * w[RATES + 3, i])
+
+
+# laws
+
+
+@source
+def push(tables, pair, at, w):
+    """The force of the pressure, and its derivative."""
+    area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], pair.numbers[WIDTH]
+    part = hardening(tables, pair)
+    stiffness, holds = pair.numbers[STIFFNESS] * part, tables.memory[BILATERAL] / part
+    for i in lanes(at.size):
+        a, b, scale, pulls = w[DEPTH, i], w[DEPTH + 1, i], stiffness * area[at[i]], holds * (
+            multiplier[at[i]])
+        mean = mean_pressure(a, b, width) - pulls
+        p, c = scale * mean, scale * mean_pressure_slope(a, b, width, mean)
+        x, y = w[NX, i], w[NY, i]
+        w[PUSH, i], w[PUSH + 1, i], w[PRESSURE, i], w[SLOPE, i] = -p * x, -p * y, p, c
+        w[MISSING, i] = 0.0
+        w[K, i], w[K + 3, i] = c * x * x - p * w[FOUND + 3, i], c * y * y - p * w[FOUND + 5, i]
+        w[K + 1, i] = c * x * y - p * w[FOUND + 4, i]
+        w[K + 2, i] = w[K + 1, i]
+
+
+@source
+def _keep_work(pair, w):
+    """By how much of their way forces miss that their work is what the potential changes by."""
+    close = (CLOSE * pair.numbers[RADIUS]) ** 2
+    for i in lanes(w.shape[1]):
+        square = (w[RATES, i] * w[RATES, i] + w[RATES + 1, i] * w[RATES + 1, i]
+                  + w[RATES + 2, i] * w[RATES + 2, i] + w[RATES + 3, i] * w[RATES + 3, i])
+        missing = (w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
+                   - w[PUSH, i] * w[WAY, i] - w[PUSH + 1, i] * w[WAY + 1, i])
+        w[MISSING, i] = missing * (square > close) / np.maximum(square, TINY)
+
+
+@source
+def _tangential(tables, pair):
+    """The coefficient of friction, zero where nothing sticks, and the stiffness per area."""
+    firmness = tables.memory[LARGEST + tables.number + pair.k]
+    return (pair.numbers[FRICTION] * tables.memory[ANCHORED],
+            pair.numbers[STICKING] * (1.0 + firmness))
+
+
+@source
+def rub(tables, pair, same, at, w):
+    """Add friction by Coulomb's law, and its derivative."""
+    friction, sticking = _tangential(tables, pair)
+    if friction == 0.0:
+        return
+    area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
+    # what vibrates on the springs comes to rest: in a mean by itself
+    calms = 1.0 if same and tables.memory[RATE] > 0.0 else 0.0
+    for i in lanes(at.size):
+        nx, ny = w[NX, i], w[NY, i]
+        slip = slip_of(pose, nx, ny, w[LAST, i], w[LAST + 1, i], memory[ANCHOR_X, at[i]],
+                       memory[ANCHOR_Y, at[i]])
+        k = sticking * area[at[i]]
+        trial = k * (slip + calms * (slip - memory[SLIP, at[i]]))
+        T, sticks = return_mapping(trial, friction * w[PRESSURE, i])
+        change = friction * np.sign(trial) * (1.0 - sticks) * w[SLOPE, i]
+        c = (1.0 + calms if same else 2.0) * k * sticks
+        w[PUSH, i] -= T * ny
+        w[PUSH + 1, i] += T * nx
+        w[K, i] += c * ny * ny + change * ny * nx - T * w[FOUND + 4, i]
+        w[K + 1, i] += change * ny * ny - c * nx * ny - T * w[FOUND + 5, i]
+        w[K + 2, i] += T * w[FOUND + 3, i] - c * nx * ny - change * nx * nx
+        w[K + 3, i] += c * nx * nx - change * nx * ny + T * w[FOUND + 4, i]
+
+
+@source
+def resist(tables, pair, factor, at, w):
+    """The force of damping in proportion to the pressure, and its derivative."""
+    area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
+    stiffness, width = pair.numbers[STIFFNESS] * hardening(tables, pair), pair.numbers[WIDTH]
+    for i in lanes(at.size):
+        k, a, nx, ny = stiffness * area[at[i]], w[DEPTH, i], w[NX, i], w[NY, i]
+        loss = damping_loss(pose, damping, nx, ny, w[PLACE, i], w[PLACE + 1, i], w[WAY, i],
+                            w[WAY + 1, i])
+        p = k * mean_pressure(a, a, width)
+        c = factor * p * damping * (loss < 1.0) - loss * k * pressure_slope(a, width)
+        w[PUSH, i], w[PUSH + 1, i], w[MISSING, i] = p * loss * nx, p * loss * ny, 0.0
+        w[K, i], w[K + 1, i] = c * nx * nx, c * nx * ny
+        w[K + 2, i], w[K + 3, i] = c * ny * nx, c * ny * ny
+
+
+# what steps leave behind
+
+
+@source
+def _settle(tables, pair, same, at, w, out):
+    """Anchors follow points that slip, to where these just do not; ``out[0]`` grows by the work."""
+    friction, sticking = _tangential(tables, pair)
+    area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
+    augmented, lost, where = pair.numbers[TOLERANCE] > 0.0, np.empty(at.size), 0 * at
+    for i in lanes(at.size):
+        nx, ny, x, y = w[NX, i], w[NY, i], w[LAST, i], w[LAST + 1, i]
+        slip = slip_of(pose, nx, ny, x, y, memory[ANCHOR_X, at[i]], memory[ANCHOR_Y, at[i]])
+        k, limit, gone = sticking * area[at[i]], friction * w[PRESSURE, i], w[WAY + 1, i] * nx - (
+            w[WAY, i] * ny)
+        if same:
+            gone = slip - memory[SLIP, at[i]]
+        calms = 1.0 if same and tables.memory[RATE] > 0.0 else 0.0
+        T, _ = return_mapping(k * (slip + calms * gone), limit)
+        after, _ = return_mapping(slip, limit / k)
+        lost[i] = T * gone
+        if augmented:
+            lost[i] += w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
+        x, y = x + after * ny - pose[0] - pose[4], y - after * nx - pose[1] - pose[5]
+        memory[SLIP, at[i]] = after
+        memory[ANCHOR_X, at[i]] = pose[2] * x + pose[3] * y + pose[4]
+        memory[ANCHOR_Y, at[i]] = pose[2] * y - pose[3] * x + pose[5]
+    add_each(out, where, lost)
+
+
+@source
+def _augment(tables, pair, at, w, out):
+    """Multipliers grow by the penetration, and shrink by the gap, where these are too large."""
+    tolerance, multiplier = pair.numbers[TOLERANCE], pair.memory[MULTIPLIER]
+    if tolerance == 0.0:
+        return
+    where, far, square = 0 * at, np.empty(at.size), np.empty(at.size)
+    k = hardening(tables, pair)
+    for i in lanes(at.size):
+        before = multiplier[at[i]] / k
+        change = np.maximum(w[DEPTH, i], 0.0) - before
+        far[i] = 1.0 * (np.abs(change) > tolerance)
+        after = k * (before + far[i] * change)
+        multiplier[at[i]] = after
+        square[i] = after * after
+    add_each(out, where, far)
+    largest = tables.memory[LARGEST + pair.k:LARGEST + pair.k + 1]
+    largest[0] = 0.0
+    add_each(largest, where, square)
+    largest[0] = np.sqrt(largest[0])  # no less than it
+
+
+# from points to degrees of freedom
+
+
+@source
+def _add_force(pair, at, w, out):
+    """Add the forces on points of the surface to those on degrees of freedom."""
+    value, turn, where = np.empty(at.size), np.empty(at.size), pair.first[at]
+    for c in range(2):
+        for i in lanes(at.size):
+            turn[i] = (w[LEVER + c, i] * w[PUSH, i] + w[LEVER + 2 + c, i] * w[PUSH + 1, i]
+                       + w[MISSING, i] * w[RATES + 2 + c, i])
+        for a in range(pair.weights.shape[0]):
+            row = pair.weights[a]
+            for i in lanes(at.size):
+                value[i] = row[at[i]] * (w[PUSH + c, i] + w[MISSING, i] * w[RATES + c, i])
+            if pair.slopes.shape[0] > 0:
+                row = pair.slopes[a]
+                for i in lanes(at.size):
+                    value[i] += row[at[i]] * turn[i]
+            add_each(out[2 * a + c:], where, value)
+
+
+@source
+def _stiffness(pair, at, w, S):
+    """The derivative of the force on place and slope by these; entry (c, d) in row 4 c + d."""
+    offset = pair.points[OFFSET]
+    for c in range(2):
+        for d in range(2):
+            for i in lanes(at.size):
+                S[4 * c + d, i] = w[K + 2 * c + d, i]
+    if pair.slopes.shape[0] == 0:
+        return
+    for c in range(2):
+        for d in range(2):
+            for i in lanes(at.size):
+                # K L and L^T K
+                S[4 * c + 2 + d, i] = (w[K + 2 * c, i] * w[LEVER + d, i]
+                                       + w[K + 2 * c + 1, i] * w[LEVER + 2 + d, i])
+                S[4 * (2 + d) + c, i] = (w[LEVER + d, i] * w[K + c, i]
+                                         + w[LEVER + 2 + d, i] * w[K + 2 + c, i])
+    for c in range(2):
+        for d in range(2):
+            for i in lanes(at.size):
+                S[4 * (2 + c) + 2 + d, i] = (w[LEVER + c, i] * S[2 + d, i]
+                                             + w[LEVER + 2 + c, i] * S[6 + d, i])
+    for i in lanes(at.size):  # and the second derivative of the surface by the slope
+        s, t, p, q = w[MIDDLE + 2, i], w[MIDDLE + 3, i], w[PUSH, i], w[PUSH + 1, i]
+        square = np.maximum(s * s + t * t, SHORT)
+        c = offset[at[i]] / square / square / np.sqrt(square)
+        across, both = -c * (q * s - p * t), c * (p * s + q * t)
+        mixed = both * (s * s - t * t) - across * s * t
+        S[10, i] += across * t * t - 2.0 * both * s * t
+        S[11, i] += mixed
+        S[14, i] += mixed
+        S[15, i] += across * s * s + 2.0 * both * s * t
+
+
+@source
+def _add_along(w, S, out):
+    """Add the derivative of the work along the rates to ``out[0]``."""
+    value, where = np.empty(w.shape[1]), np.zeros(w.shape[1], np.int64)
+    for a in range(4):
+        for b in range(4):
+            for i in lanes(value.size):
+                value[i] = S[4 * a + b, i] * w[RATES + a, i] * w[RATES + b, i]
+            add_each(out, where, value)
+
+
+@source
+def _add_stiffness(pair, asked, at, S, flat):
+    """Add the derivatives to a band: the lower half alone where that is all there is."""
+    value, where = np.empty(at.size), asked.ld * pair.first[at]
+    n = 2 * pair.weights.shape[0]
+    for a in range(n):
+        p, c = pair.weights[a // 2], 4 * (a % 2)
+        for b in range(n if asked.top > 0 else a + 1):
+            q, d = pair.weights[b // 2], b % 2
+            for i in lanes(at.size):
+                value[i] = p[at[i]] * q[at[i]] * S[c + d, i]
+            if pair.slopes.shape[0] > 0:
+                g, h = pair.slopes[a // 2], pair.slopes[b // 2]
+                for i in lanes(at.size):
+                    value[i] += (p[at[i]] * h[at[i]] * S[c + 2 + d, i]
+                                 + g[at[i]] * (q[at[i]] * S[8 + c + d, i]
+                                               + h[at[i]] * S[10 + c + d, i]))
+            add_each(flat[b * asked.ld + asked.top + a - b:], where, value)

@@ -1,0 +1,72 @@
+"""Laws of contact, of numbers and arrays alike.
+
+Of the penetration ``a`` each point has the potential ``k A S(a)`` with its area A in the
+stress-free body and::
+
+    S(a) = (<a>^3 - <a - w>^3) / (6 w),   <a> = max(a, 0)
+
+which is ``a^2 / 2`` but for a transition of the width w that makes it twice continuously
+differentiable. A mean between two states takes the slope of S between them: its work is the change
+of the potential. Of the augmented Lagrangian ``a = m - g`` with the gap g and the multiplier m over
+the stiffness, which grows by the penetration that is left until the surface holds the point.
+
+Friction is a spring along the surface from an anchor to the point, which gives way at Coulomb's
+limit.
+"""
+
+import numpy as np
+
+from ...core.source import source
+from .gap import TINY
+
+
+@source
+def pressure_slope(a, width):
+    """S''(a)."""
+    return (np.maximum(a, 0.0) - np.maximum(a - width, 0.0)) / width
+
+
+@source
+def mean_pressure(a, b, width):
+    """(S(b) - S(a)) / (b - a), and S'(a) where they are the same: without differences of S."""
+    return (_mean_cube(a, b) - _mean_cube(a - width, b - width)) / (6.0 * width)
+
+
+@source
+def _mean_cube(a, b):
+    """(<b>^3 - <a>^3) / (b - a)."""
+    p, q = np.maximum(a, 0.0), np.maximum(b, 0.0)
+    same = np.abs(b - a) < TINY
+    share = (q - p) / (b - a + same) * (1.0 - same) + same * (a > 0.0)
+    return (p * p + p * q + q * q) * share
+
+
+@source
+def mean_pressure_slope(a, b, width, pressure):
+    """Twice its derivative by b, where the mean with what holds on both sides is ``pressure``."""
+    jump = b - a
+    apart = 1.0 * (np.abs(jump) > 1e-3 * (width + np.abs(a) + np.abs(b)))
+    return (pressure_slope(0.5 * (a + b), width) * (1.0 - apart)
+            + 2.0 * (mean_pressure(b, b, width) - pressure) * apart / (jump + (1.0 - apart)))
+
+
+@source
+def return_mapping(trial, limit):
+    """The traction of friction by a trial traction, and 1 where it sticks, 0 where it slips."""
+    return np.minimum(np.maximum(trial, -limit), limit), 1.0 * (np.abs(trial) < limit)
+
+
+@source
+def slip_of(pose, nx, ny, x, y, anchor_x, anchor_y):
+    """How far a point is from its anchor, along the surface of an obstacle."""
+    p, q = x - pose[0] - pose[4], y - pose[1] - pose[5]
+    a, b = anchor_x - pose[4], anchor_y - pose[5]
+    return (q - pose[3] * a - pose[2] * b) * nx - (p - pose[2] * a + pose[3] * b) * ny
+
+
+@source
+def damping_loss(pose, damping, nx, ny, x, y, vx, vy):
+    """The part of the pressure that the velocity away takes (Hunt and Crossley), at most all."""
+    p = vx + pose[8] * (y - pose[1] - pose[5]) - pose[6]
+    q = vy - pose[8] * (x - pose[0] - pose[4]) - pose[7]
+    return np.minimum(damping * (p * nx + q * ny), 1.0)

@@ -1,0 +1,169 @@
+"""What the kernels of contact take: points of beams, obstacles, and what steps leave behind.
+
+A contact pair is the surface of one beam with one obstacle. Its arrays lie one behind the other in
+those of :class:`ContactTables`; :func:`pair_of` gives them their names.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.source import F1, I1, shaped, source
+
+#: Shapes of obstacles: circles and lines are polygons.
+OUTLINE, CUSTOM = range(2)
+#: What is asked of all pairs, see :class:`Question`.
+FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
+#: Of a pair: kind and number of its obstacle, elements, points of each element, pairs of degrees of
+#: freedom of each, whether normals depend on slopes, how many numbers the shape has; where its
+#: integers, numbers, memory and projections begin; the first of its degrees of freedom, and how
+#: many there are.
+(KIND, OBSTACLE, ELEMENTS, POINTS, PAIRS, SLOPES, SHAPE, INTS, FLOATS, MEMORY, CACHE, LOWEST,
+ SPAN) = range(13)
+HEADER = 13
+#: Numbers of a pair: penalty stiffness, width of the transition, friction, tangential stiffness,
+#: damping, what a step in time adds to the stiffness, largest distance of a point from the middle
+#: of its element without displacement, 1 or -1 outside or inside of the shape, and the penetration
+#: that the augmented Lagrangian leaves, zero for the penalty.
+STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, INERTIA, RADIUS, SIDE, TOLERANCE = range(9)
+NUMBERS = 9
+#: Rows of the points without displacement: area, distance from the axis, place and slope.
+AREA, OFFSET, START = range(3)
+#: Rows of the points' memory: the multiplier of the augmented Lagrangian over the stiffness, the
+#: anchor of friction in the obstacle's frame, and how far the point was from it.
+MULTIPLIER, ANCHOR_X, ANCHOR_Y, SLIP = range(4)
+#: Pose of an obstacle: displacement, cosine and sine of its angle, the point about which it turns,
+#: its velocities, and the time. There are three: at a time, and at the begin and end of a mean.
+POSE, POSES = 10, 30
+NOW, BEGIN, END = map(np.int64, range(3))
+#: Memory of all pairs: 1 if points stick to anchors; 1 / dt^2 of the last step in time; 1 if points
+#: with multipliers are held on both sides; for each pair the largest multiplier, then by how much
+#: it is stiffer than by default; then the points' memories.
+ANCHORED, RATE, BILATERAL, LARGEST = range(4)
+#: What is kept from step to step: anchors, multipliers.
+ANCHORS, PRESSURES = 1, 2
+#: Projections of points: place and slope, point of the surface, gap, and whether it is known.
+GAP, KNOWN, PROJECTED = 6, 7, 8
+#: Displacements of which the projections are kept.
+SLOTS = 2
+
+
+class Question(NamedTuple):
+    """What is asked of all pairs.
+
+    Attributes
+    ----------
+    what
+        FORCE: the mean force from u to v. RESISTING: that of friction and damping at u by the
+        velocity v. TANGENT: the derivative of FORCE by the end of the mean, twice unless there is
+        no span, to a band. DAMPED_TANGENT: that of RESISTING by velocities times the factor,
+        and by places. ALONG: the derivative of the work of FORCE at u along a direction v to
+        ``out[0]``, and the largest way of an element along it, in lengths of elements, into
+        ``out[1]``. SETTLE: anchors follow after a step from u to v, whose friction and augmented
+        pressures add their work to ``out[0]``. AUGMENT: multipliers of points at u are updated, and
+        the number of those that change is added to ``out[0]``.
+    t, span
+        A time, and for a mean how long it is about it; zero at u alone.
+    factor
+        Of derivatives by velocities.
+    ld, top
+        Layout of the band.
+    """
+
+    what: int
+    t: float
+    span: float
+    factor: float
+    ld: int
+    top: int
+
+
+class ContactTables(NamedTuple):
+    """The obstacles of a scene.
+
+    Attributes
+    ----------
+    number
+        Of pairs; 0 for a scene without obstacles.
+    ints, floats
+        Headers of the pairs and degrees of freedom; numbers of points and shapes.
+    poses
+        Of each obstacle, at the time asked last.
+    memory
+        What steps leave behind.
+    cache
+        Projections of points at the displacements that were asked last.
+    counts
+        Elements searched, points projected, and the slot of the cache that each pair used last.
+    moving, own
+        Whether poses depend on time; handle of what knows them, and shapes of the caller's.
+    lasting
+        Sum of what is kept from step to step: ANCHORS, PRESSURES.
+    address
+        That of the compiled function; 0 in NumPy.
+    """
+
+    number: int
+    ints: I1
+    floats: F1
+    poses: F1
+    memory: F1
+    cache: F1
+    counts: I1
+    moving: int
+    own: int
+    lasting: int = 0
+    address: int = 0
+
+
+class Pair(NamedTuple):
+    """The surface of one beam with one obstacle: views of the arrays of :class:`ContactTables`.
+
+    ``first`` is the first degree of freedom of each point's element, (n,); ``weights`` and
+    ``slopes`` those of pairs of degrees of freedom in its place and slope, (pairs, n); ``middles``
+    places and weights of the elements' middles.
+    """
+
+    k: Any
+    header: Any
+    first: Any
+    weights: Any
+    slopes: Any
+    points: Any
+    middles: Any
+    numbers: Any
+    shape: Any
+    poses: Any
+    memory: Any
+    cache: Any
+
+
+@source
+def pair_of(tables, k):
+    """The pair number k."""
+    h, floats = tables.ints[k * HEADER:(k + 1) * HEADER], tables.floats
+    elements, pairs, slopes = h[ELEMENTS], h[PAIRS], h[PAIRS] * h[SLOPES]
+    n, at = elements * h[POINTS], h[FLOATS]
+    points = at + (pairs + slopes) * n
+    middles = points + 6 * n
+    numbers = middles + (2 + 2 * pairs) * elements
+    pose, slot = h[OBSTACLE] * POSES, h[SPAN] + POSE + elements + PROJECTED * n
+    return Pair(
+        k, h, tables.ints[h[INTS]:h[INTS] + n],
+        shaped(floats[at:at + pairs * n], (pairs, n)),
+        shaped(floats[at + pairs * n:points], (slopes, n)),
+        shaped(floats[points:middles], (6, n)),
+        shaped(floats[middles:numbers], (2 + 2 * pairs, elements)),
+        floats[numbers:numbers + NUMBERS],
+        floats[numbers + NUMBERS:numbers + NUMBERS + h[SHAPE]],
+        shaped(tables.poses[pose:pose + POSES], (3, POSE)),
+        shaped(tables.memory[h[MEMORY]:h[MEMORY] + 4 * n], (4, n)),
+        shaped(tables.cache[h[CACHE]:h[CACHE] + SLOTS * slot], (SLOTS, slot)))
+
+
+@source
+def hardening(tables, pair):
+    """How many times the stiffness is as large as given, by what a load has found or in a step."""
+    numbers = pair.numbers
+    return (1.0 + tables.memory[LARGEST + tables.number + pair.k]
+            + numbers[INERTIA] * tables.memory[RATE] / numbers[STIFFNESS])
