@@ -1,16 +1,12 @@
 """Graded meshes: the estimate against the true error, and elements where the error is."""
 
+import exact
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import exact
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, Scene,
-                        StVenantKirchhoff)
-from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.results.state import State
-from skfem_ancf.scene.adapt import refine
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, Scene, StVenantKirchhoff)
 
 
 def cantilever(element, n, x=None):
@@ -34,58 +30,6 @@ def test_estimate_bounds_the_true_error(element, fine, tolerances):
         assert max(estimate.values()) <= tol
         assert error < estimate["displacement"] and energy < estimate["energy"]
     assert error > 1e-3 * estimate["displacement"]  # an estimate, not just a bound
-
-
-def test_elements_go_where_the_beam_bends():
-    """The end beyond the load moves rigidly: its elements stay long."""
-    mesh = MeshBeam.init_line(np.linspace(0, 10, 5), 0.1)
-    beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e9, 0.3), 0.1)
-    scene = Scene(beam).clamp("left", thickness="free").point_force((0, -300.0), at=(2.5, 0))
-    state = scene.solve_static(adapt=1e-3)
-    x = state.beams[0].mesh.p[0]
-    assert np.sum(x <= 2.5) > 8
-    assert np.diff(x[x >= 2.5]).min() >= 8 * np.diff(x[x <= 2.5]).max()
-    uniform = np.linspace(0, 10, 1 + int(10 / np.diff(x).min()))
-    assert len(x) < 0.5 * len(uniform)
-    assert state.scene is not scene and scene.beams[0].mesh.nelements == 4
-
-
-def test_elements_go_where_a_load_jumps():
-    """It bends all elements up to there, none of them as much as it is off by."""
-    EI = 2e8 * 0.01**4 / 12
-
-    def bent(element, x):
-        beam = Beam(MeshBeam.init_line(x, 0.01), element, StVenantKirchhoff(2e8, 0.3), 0.01)
-        return Scene(beam).clamp("left").line_load(
-            lambda x: (0.0 * x[0], np.where(x[0] < 0.37, -5.0 * EI, 0.0)))
-
-    known = bent(ElementBeamCable(9), [0, 0.185, 0.37, 1]).solve_static().displacement((1, 0))
-    state = bent(ElementBeamCable(3), np.linspace(0, 1, 5)).solve_static(adapt=1e-4)
-    assert_allclose(state.displacement((1, 0)), known, rtol=0, atol=1e-4)
-    x = state.beams[0].mesh.p[0]
-    assert len(x) < 200 and abs(x[np.argmin(np.diff(x))] - 0.37) < 1e-2
-
-
-def test_too_few_elements_keep_the_last_state():
-    with pytest.raises(ConvergenceError, match="max_elements") as caught:
-        cantilever(ElementBeamANCF(2), 4).solve_static(adapt=1e-6, max_elements=30)
-    assert 30 <= caught.value.state.beams[0].mesh.nelements < 120
-    with pytest.raises(InputError, match="adapt must be positive"):
-        cantilever(ElementBeamANCF(2), 4).solve_static(adapt=0)
-
-
-@pytest.mark.parametrize("name", [*ELEMENTS, "cable-3", "cable-5"])
-def test_refined_space_holds_the_coarse_one(name):
-    element = ElementBeamCable(int(name[-1])) if name.startswith("cable") else ELEMENTS[name]()
-    mesh = MeshBeam.init_line([0, 0.3, 0.5, 1], 0.1, angle=0.4)
-    scene = Scene(Beam(mesh, element, StVenantKirchhoff(2.0, 0.3), 0.3))
-    fine, prolong = refine(scene, [[0, 2]])
-    u = 0.05 * np.random.default_rng(0).standard_normal(scene.layout.N)
-    a, b = State(scene.system, u), State(fine.system, prolong(u))
-    heights = [0.5] if element.order == 0 else [0.3, 0.6, 0.2]
-    for xi, eta in zip((0.2, 0.6, 0.9), 3 * heights):
-        for p in mesh.mapping().F(np.array([[xi], [eta]]))[:, :, 0].T:
-            assert_allclose(b.displacement(p), a.displacement(p), rtol=0, atol=1e-12)
 
 
 def test_scene_is_put_on_other_beams():
@@ -130,23 +74,6 @@ def test_degrees_need_fewer_coordinates_than_halved_elements():
     assert N[15] <= 70 and N[15] < 0.6 * N[7] and N[15] < 0.6 * N[5]
 
 
-def test_elements_are_halved_where_the_solution_is_rough():
-    """A force inside: the shear force jumps at it, which no degree shows."""
-    def scene(n, degree):
-        mesh = MeshBeam.init_line(np.linspace(0, 1, n + 1), 0.01)
-        beam = Beam(mesh, ElementBeamCable(degree), StVenantKirchhoff(2e8, 0.3), 0.01)
-        return Scene(beam).clamp("left").point_force((0, -0.3), at=(0.5, 0))
-
-    fine = scene(64, 5).solve_static().displacement((1, 0))
-    state = scene(2, 5).solve_static(adapt=1e-6)
-    assert np.hypot(*(state.displacement((1, 0)) - fine)) < 1e-6
-    kinds = [r.kind for r in state.refinements]
-    assert kinds[0] == "degree" and "split" in kinds and kinds[-1] == "split"
-    assert state.beams[0].element.axis_degree <= 7
-    x = state.beams[0].mesh.p[0]
-    assert np.min(np.diff(x)) < 0.3 * np.max(np.diff(x)) and 0.5 in x
-
-
 def test_beams_are_refined_one_by_one():
     """Two beams, one of them of an element that has no other degree."""
     def beam(x, element, name):
@@ -166,25 +93,6 @@ def test_beams_are_refined_one_by_one():
     fine.clamp("left", beam=0).gravity((0, -3.0)).joint("weld", beams=(0, 1), at=("right", "left"))
     assert_allclose(state.displacement((1, 0), 1), fine.solve_static().displacement((1, 0), 1),
                     atol=1e-4)
-
-
-@pytest.mark.parametrize("element", [ElementBeamCable(13), ElementBeamANCFCubic(2),
-                                     ElementBeamANCFHermite(3, 5, "gauss-lobatto")], ids=repr)
-def test_raised_elements(element):
-    raised = element.raised()
-    assert raised.axis_degree == element.axis_degree + 2 and raised.order == element.order
-    assert set(element.dofnames) < set(raised.dofnames)
-    assert ElementBeamCable(15).raised() is None and ElementBeamANCF(2).raised() is None
-
-
-def test_elements_of_ones_own_keep_their_degree():
-    class Own(ElementBeamCable):
-        pass
-
-    class OwnSections(ElementBeamANCFHermite):
-        pass
-
-    assert Own(5).raised() is None and OwnSections(2, 5).raised() is None
 
 
 def test_a_curve_is_followed_and_not_its_first_elements():

@@ -4,22 +4,15 @@ from math import factorial
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
-from scipy.linalg import eigh
-from scipy.sparse import csr_matrix
-from skfem import (Basis, BilinearForm, ElementVector, FacetBasis, Functional,
-                   InteriorFacetBasis, LinearForm, condense, enforce, mpc, penalize, solve)
-from skfem.helpers import ddot, div, dot, eye, sym_grad, trace
-from skfem.models.poisson import laplace, mass, unit_load
-
 from conftest import MESHES
-from skfem_ancf import ElementBeamANCF, InputError, MeshBeam, MeshError
-from skfem_ancf.mesh.reference_cell import ElementBeamP1
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csr_matrix
+from skfem import (Basis, BilinearForm, ElementVector, FacetBasis, Functional, LinearForm, condense,
+                   enforce, mpc, penalize, solve)
+from skfem.helpers import ddot, div, dot, eye, sym_grad, trace
+from skfem.models.poisson import laplace
 
-
-@Functional
-def square(w):
-    return w["u"] ** 2
+from skfem_ancf import ElementBeamANCF, MeshBeam, MeshError
 
 
 @pytest.fixture
@@ -30,23 +23,6 @@ def beam():
 
 
 # coordinates by name
-
-def test_number_and_places_of_the_coordinates(element, mesh):
-    basis = Basis(mesh, ElementVector(element))
-    assert basis.N == 2 * element.nodal_dofs * mesh.nvertices
-    assert basis.element_dofs.shape == (4 * element.nodal_dofs, mesh.nelements)
-    for k, (y, _, _) in enumerate(element.functionals):
-        place = mesh.p + y * mesh.height * mesh.p_Y
-        for component in (0, 1):
-            dofs = basis.nodal_dofs[2 * k + component]
-            assert_allclose(basis.doflocs[:, dofs], place, atol=1e-14)
-
-
-def test_matrices_are_banded():
-    """Numbering along the axis: the half bandwidth is that of one element, after refining too."""
-    for m in (MESHES["straight"]().refined(2), MESHES["arc"]().refined([0]).refined([2])):
-        basis = Basis(m, ElementVector(ElementBeamANCF(3)), intorder=4)
-        assert np.max(np.ptp(basis.element_dofs, axis=0)) == 19
 
 
 @pytest.mark.parametrize("name, node", [("left", 0), ("right", 3)])
@@ -65,16 +41,6 @@ def test_dofs_of_an_end(beam, name, node):
     assert_array_equal(dofs.drop("no such"), dofs)
     assert len(dofs.keep("no such")) == 0
     assert_array_equal(beam.get_dofs(name, skip=["r^1"]).all(), beam.nodal_dofs[1:, node])
-
-
-@pytest.mark.parametrize("kwargs, message", [
-    (dict(facets="root"), "unknown boundary 'root'; known: 'left', 'right', 'bottom', 'top'"),
-    (dict(facets={"left", "root"}), "unknown boundary 'root'"),
-    (dict(elements="root"), "unknown subdomain 'root'; known: 'tip'"),
-    (dict(elements=[3]), "numbered 0 to 2, got 3")])
-def test_unknown_dofs(beam, kwargs, message):
-    with pytest.raises(InputError, match=message):
-        beam.get_dofs(**kwargs)
 
 
 # functions of the space
@@ -108,19 +74,6 @@ def test_projection_is_exact_in_the_space(element, name):
     assert_allclose((q - exact)[basis.nodal_dofs].T * size, 0, atol=atol)
 
 
-def test_projection_converges():
-    """Cubic along the axis: fourth order, for a function of X alone."""
-    errors = []
-    for n in (4, 8, 16):
-        basis = Basis(MeshBeam.init_line(np.linspace(0, 3, n + 1), 0.1), ElementBeamANCF(1),
-                      intorder=12)
-        u = basis.interpolate(basis.project(lambda x: np.sin(x[0])))
-        errors.append(np.sqrt(square.assemble(
-            basis, u=u - np.sin(basis.global_coordinates()[0])) / 0.1))
-    assert errors[-1] < 2e-6
-    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
-
-
 @pytest.mark.parametrize("name", ["unequal", "inclined", "s-curve"])
 def test_probes(element, name):
     """Values anywhere: inside, on surfaces, between elements, at the ends."""
@@ -141,33 +94,7 @@ def test_probes(element, name):
     assert_allclose(vector.interpolator(both)(x), [in_the_space(x)] * 2, atol=1e-12)
 
 
-def test_probes_outside(beam):
-    with pytest.raises(MeshError, match=r"point \(0.7, 0.11\) is outside the body"):
-        beam.probes(np.array([[0.2, 0.7], [0.0, 0.11]]))
-
-
 # kinds of bases
-
-def test_parts_of_the_mesh(element, mesh):
-    whole = Basis(mesh, element)
-    M = mass.assemble(whole)
-    parts = sum(mass.assemble(Basis(mesh, element, elements=[e])) for e in range(mesh.nelements))
-    assert_allclose(parts.toarray(), M.toarray(), atol=1e-15)
-    last = whole.with_elements([mesh.nelements - 1])
-    assert last.nelems == 1 and last.N == whole.N
-    assert_allclose(last.dx, whole.dx[-1:])
-    q = np.random.default_rng(1).random(whole.N)
-    assert_allclose(last.interpolate(q), whole.interpolate(q)[-1:], atol=1e-14)
-
-
-def test_boundary(beam):
-    lengths = {name: beam.boundary(name).dx.sum() for name in beam.mesh.boundaries}
-    assert lengths == pytest.approx({"left": 0.2, "right": 0.2, "bottom": 1.5, "top": 1.5})
-    assert beam.boundary().dx.sum() == pytest.approx(3.4)
-    n = {name: beam.boundary(name).normals[:, 0, 0] for name in beam.mesh.boundaries}
-    for name, expected in (("left", [-1, 0]), ("right", [1, 0]), ("bottom", [0, -1]),
-                           ("top", [0, 1])):
-        assert_allclose(n[name], expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["unequal", "inclined", "arc", "s-curve, cubic sections"])
@@ -186,36 +113,7 @@ def test_divergence_theorem(element, name):
     assert_allclose(flux.assemble(own, u=q), part, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["unequal", "inclined", "arc", "s-curve"])
-def test_fields_are_continuous_across_sections(element, name):
-    """Both sides of a section have the same values and the same derivative along it."""
-    mesh = MESHES[name]()
-    sides = [InteriorFacetBasis(mesh, element, side=k, intorder=8) for k in (0, 1)]
-    assert_array_equal(sides[0].find, np.arange(1, mesh.nelements))
-    assert_array_equal(sides[1].tind - sides[0].tind, 1)
-    assert_allclose(sides[0].normals, sides[1].normals, atol=1e-14)
-    assert_allclose(sides[0].dx.sum(1), mesh.height, rtol=1e-12)
-    q = np.random.default_rng(3).standard_normal(sides[0].N)
-    a, b = (s.interpolate(q) for s in sides)
-    assert_allclose(a, b, atol=1e-12)
-    along = np.einsum("iep,ie->ep", a.grad - b.grad, mesh.p_Y[:, 1:-1])
-    assert_allclose(along, 0, atol=1e-9)
-
-
 # forms and solvers
-
-def test_mass_of_the_body(element, mesh):
-    basis = Basis(mesh, element)
-    one = basis.zeros()
-    one[basis.nodal_dofs[0]] = 1.0
-    M = mass.assemble(basis)
-    area = basis.dx.sum()
-    assert_allclose(one @ M @ one, area, rtol=1e-12)
-    assert_allclose(unit_load.assemble(basis) @ one, area, rtol=1e-12)
-    assert_allclose((laplace.assemble(basis) @ one), 0, atol=1e-9)
-    d = np.sqrt(M.diagonal())
-    assert eigh(M.toarray() / np.outer(d, d), eigvals_only=True)[0] > 1e-12
-    assert_allclose((M - M.T).toarray(), 0, atol=1e-16)
 
 
 def poisson(mesh, element, load, exact, how="condense"):
@@ -262,16 +160,6 @@ def elasticity(E, nu):
     return form
 
 
-@pytest.mark.parametrize("name", ["unequal", "s-curve"])
-def test_linear_elasticity_has_three_rigid_motions(element, name):
-    mesh = MESHES[name]().with_sections(element.sections)
-    basis = Basis(mesh, ElementVector(element))
-    K = elasticity(1.0, 0.3).assemble(basis).toarray()
-    d = np.sqrt(np.diag(K))
-    values = eigh(K / np.outer(d, d), eigvals_only=True)
-    assert np.max(np.abs(values[:3])) < 1e-12 and values[3] > 1e-9
-
-
 @pytest.mark.parametrize("name", ["straight", "inclined"])
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_traction_is_exact(name, order):
@@ -293,17 +181,6 @@ def test_traction_is_exact(name, order):
 
 
 # the scalar element along the axis
-
-def test_scalar_element(mesh):
-    basis = Basis(mesh, ElementBeamP1(), intorder=6)
-    assert basis.N == mesh.nvertices
-    q = np.random.default_rng(4).random(basis.N)
-    xi = np.array([[0.0, 0.25, 1.0], [0.0, 0.9, 0.4]])
-    x = mesh.mapping().F(xi)
-    got = (basis.probes(x.reshape(2, -1)) @ q).reshape(x.shape[1:])
-    assert_allclose(got, q[mesh.t[0]][:, None] * (1 - xi[0]) + q[mesh.t[1]][:, None] * xi[0],
-                    atol=1e-11)
-    assert_array_equal(basis.get_dofs("right"), [mesh.nvertices - 1])
 
 
 def test_scikit_fem_draws_a_beam_or_says_what_does():

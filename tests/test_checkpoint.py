@@ -3,23 +3,17 @@
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, NeoHookean, Scene, Section,
-                        StVenantKirchhoff)
-from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
-from skfem_ancf.dynamics import checkpoint
-from skfem_ancf.core.errors import (CallbackError, CheckpointError, InputError, Interrupted,
-                                    MissingExtra)
-from skfem_ancf.actions.obstacles import SignedDistance
-
 from test_restart import driven, swinging
+
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.core.errors import CheckpointError, InputError, MissingExtra
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark, checkpoint
 
 NAMES = ("t", "u", "v", "acceleration", "multipliers")
 
@@ -67,24 +61,6 @@ def test_from_every_file_bit_for_bit(name, tmp_path, monkeypatch):
         assert_identical(scene.resume(copy), whole)
 
 
-@pytest.mark.parametrize("scheme", ["energy-momentum", "radau"])
-@pytest.mark.parametrize("name", ["equal steps", "automatic"])
-def test_what_is_beside_the_band_is_kept(name, scheme, tmp_path, monkeypatch):
-    """Damped modes, and a spring between points far apart: rows of the iteration matrix."""
-    def build():
-        scene = swinging().damping(modal=[0.05, 0.05])
-        X = scene.beams[0].mesh.p[:, [0, -1]].T
-        return scene.spring(5.0, [(0, 0.7 * X[0] + 0.3 * X[1]), (0, X[1])], damping=0.1)
-
-    path = tmp_path / "run.npz"
-    copies = stages(monkeypatch, path)
-    whole = build().integrate(0.1, checkpoint=path, **{**OPTIONS[name], "scheme": scheme})
-    for copy in copies[::2]:
-        again = build().resume(copy)
-        assert_identical(again, whole)
-        assert np.array_equal(again.dissipated, whole.dissipated)
-
-
 @pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values() if cls.joined]
                          + [GeneralizedAlpha(0.3), Newmark(0.36, 0.6)], ids=repr)
 def test_every_scheme(scheme, tmp_path, monkeypatch):
@@ -100,29 +76,6 @@ def test_every_scheme(scheme, tmp_path, monkeypatch):
     assert sorted(p.name for p in tmp_path.iterdir() if ".part" in p.name) == []
     # an instant of what was gone on with is one of the motion
     assert driven(False).integrate(0.035, 2.5e-3, scheme=scheme, start=again.state(-1)).steps == 2
-
-
-class Counting(Newmark):
-    """A scheme that remembers something of its own."""
-
-    name = "counting"
-
-    def step(self, integrator, y, dt):
-        new = super().step(integrator, y, dt)
-        count = 0 if y.memory is None else y.memory["count"]
-        new.memory = {"count": np.array(count + 1), "u": new.u}
-        return new
-
-
-def test_a_scheme_of_ones_own(tmp_path, monkeypatch):
-    path = tmp_path / "run.npz"
-    copies = stages(monkeypatch, path)
-    whole = swinging().integrate(0.02, 2.5e-3, scheme=Counting(), checkpoint=path, every=3)
-    with pytest.raises(CheckpointError, match="'counting': give it"):
-        swinging().resume(copies[1])
-    again = swinging().resume(copies[1], scheme=Counting())
-    assert_identical(again, whole)
-    assert int(again.state(-1)._motion.memory["count"]) == 8
 
 
 def test_a_finished_file_gives_the_history(tmp_path):
@@ -226,28 +179,6 @@ print(json.dumps([out, same(history, whole()), len(os.listdir(os.path.dirname(pa
 # where it cannot be written
 
 
-@needs_fork
-def test_a_file_that_may_not_grow(tmp_path):
-    """A limit on the size of files stands in for a full disk: the last good file stays."""
-    pytest.importorskip("resource")
-    found = in_child('''
-import resource
-resource.setrlimit(resource.RLIMIT_FSIZE, (40000, resource.RLIM_INFINITY))
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    history = run()
-resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-t = float(checkpoint.read(path)["now.t"])
-first = str(caught[0].message)
-print(json.dumps([t, len(caught), type(caught[0].message).__name__, first,
-                  same(history, whole()), same(run(), whole()), os.listdir(os.path.dirname(path))]))
-''', tmp_path / "run.npz")
-    t, n, kind, message, went_on, identical, files = found
-    assert 0.0 < t < 0.1 and n >= 2 and kind == "CheckpointWarning"
-    assert "the last good one stays" in message
-    assert went_on and identical and files == ["run.npz"]
-
-
 @pytest.mark.parametrize("path, error, message", [
     ("missing/run.npz", CheckpointError, "folder .*missing.* does not exist"),
     ("run.txt", InputError, "ends in .npz or .h5"), (3, InputError, "path of a file"),
@@ -257,12 +188,6 @@ def test_bad_places(path, error, message, tmp_path):
     with pytest.raises(error, match=message):
         swinging(False).integrate(0.1, 2.5e-3, checkpoint=path)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("every", [0, 1.5, True, "often"])
-def test_how_often(every, tmp_path):
-    with pytest.raises(InputError, match="every"):
-        swinging(False).integrate(0.01, 2.5e-3, checkpoint=tmp_path / "run.npz", every=every)
 
 
 # files that are not the right ones
@@ -285,47 +210,6 @@ def test_an_unfinished_run_is_not_overwritten(unfinished):
     with pytest.raises(CheckpointError, match="no checkpoint.*not overwritten"):
         swinging(False).integrate(0.02, 2.5e-3, checkpoint=foreign)
     assert np.load(foreign)["a"].shape == (3,)
-
-
-def rewritten(path, change):
-    arrays = dict(np.load(path))
-    change(arrays)
-    np.savez(path, **arrays)
-    return path
-
-
-def test_damaged_files(unfinished, tmp_path):
-    scene, content = swinging(False), unfinished.read_bytes()
-    path = tmp_path / "bad.npz"
-    for bad in (content[:-100], content[:len(content) // 2], b"", b"text", content[100:]):
-        path.write_bytes(bad)
-        with pytest.raises(CheckpointError, match="cannot be read|no checkpoint"):
-            scene.resume(path)
-
-    def bit(arrays):
-        arrays["now.u"].view(np.uint8)[3] ^= 1
-
-    def gone(arrays):
-        del arrays["now.v"]
-
-    for change in (bit, gone):
-        shutil.copy(unfinished, path)
-        with pytest.raises(CheckpointError, match="checksum"):
-            scene.resume(rewritten(path, change))
-    with pytest.raises(CheckpointError, match="no file"):
-        scene.resume(tmp_path / "nowhere.npz")
-
-
-def test_nothing_is_unpickled(tmp_path):
-    class Evil:
-        def __reduce__(self):
-            return os.mkdir, (str(tmp_path / "broken into"),)
-
-    path = tmp_path / "evil.npz"
-    np.savez(path, text=np.array([Evil()], dtype=object))
-    with pytest.raises(CheckpointError, match="cannot be read"):
-        swinging(False).resume(path)
-    assert not (tmp_path / "broken into").exists()
 
 
 def test_files_of_other_versions(unfinished, tmp_path, monkeypatch):
@@ -360,81 +244,9 @@ def test_other_scenes_are_refused(tmp_path, monkeypatch):
             build(**change).resume(copies[1])
 
 
-def test_functions_of_places_and_layers_are_compared(tmp_path):
-    def build(k=5.0, depth=0.5, top=1000.0, E=1e5, own=1e5):
-        layers = Section.layers((0.05, StVenantKirchhoff(1e5, 0.3, 1000.0)),
-                                (0.05, NeoHookean(E, 0.3, top)), width=0.1)
-        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.1), ElementBeamANCF(2),
-                    section=layers, compiled=False)
-        return Scene(beam).clamp("left").point_force((0, 1), (1, 0)).spring(
-            lambda s: k * s, between=((1, 0), (1, 1))).obstacle(
-                SignedDistance(lambda x, y: y + depth)).torsional_spring(
-                    lambda s: own * s**3, at=(0.5, 0))
-
-    path = tmp_path / "run.npz"
-    build().integrate(5e-3, 2.5e-3, checkpoint=path)
-    assert build().resume(path).t[-1] == pytest.approx(5e-3)
-    for change, part in (({"k": 6.0}, "force element 0"), ({"depth": 0.4}, "obstacle 0"),
-                         ({"top": 900.0}, "mass of beam 0"),
-                         ({"E": 1.1e5}, "stiffness of beam 0"),
-                         ({"own": 2e5}, "force element 2")):
-        with pytest.raises(CheckpointError, match=f"of another scene, .*{part}"):
-            build(**change).resume(path)
-
-
 def test_without_h5py(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(MissingExtra, match=r"skfem-ancf\[files\]"):
         swinging(False).integrate(0.01, 2.5e-3, checkpoint=tmp_path / "run.h5")
     with pytest.raises(MissingExtra, match=r"skfem-ancf\[files\]"):
         swinging(False).resume(tmp_path / "run.h5")
-
-
-# stopped
-
-
-@pytest.mark.parametrize("compiled", [True, False])
-def test_interrupted(compiled, tmp_path):
-    """A real signal, while the amplitude of a load is asked for."""
-    struck, path = [], tmp_path / "run.npz"
-
-    def amplitude(t):
-        if path.exists() and not struck and np.ndim(t) == 0 and t > 0.07:
-            struck.append(t)
-            os.kill(os.getpid(), signal.SIGINT)
-        return 0.0 * t
-
-    def build(f):
-        return swinging(compiled).point_force((0, 0), (1, 0), amplitude=f)
-
-    # a job in the background is started with SIGINT ignored
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt) as caught:
-            build(amplitude).integrate(0.1, 2.5e-4, checkpoint=path, every=40)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert isinstance(caught.value, Interrupted) and "of 0.1" in str(caught.value)
-    history = caught.value.state
-    whole = build(lambda t: 0.0 * t).integrate(0.1, 2.5e-4)
-    n = len(history)
-    assert 200 < n < len(whole)
-    for name in NAMES:
-        assert np.array_equal(getattr(history, name), getattr(whole, name)[:n])
-    # on from what is there, and from the file
-    scene = build(lambda t: 0.0 * t)
-    rest = scene.integrate(0.1, 2.5e-4, start=history.state(-1))
-    assert np.allclose(rest.u[-1], whole.u[-1], rtol=0, atol=1e-11)
-    assert np.array_equal(scene.resume(path).u, whole.u)
-
-
-def test_a_failure_leaves_the_file(tmp_path):
-    """A function that fails in the middle: what was found is in the error and in the file."""
-    path = tmp_path / "run.npz"
-    scene = Scene(swinging(False).beams[0]).clamp("left")
-    scene.traction("right", (1.0, 0.0),
-                   amplitude=lambda t: np.inf if t > 0.055 and path.exists() else 1.0)
-    with pytest.raises(CallbackError, match="amplitude") as caught:
-        scene.integrate(0.1, 0.01, scheme="newmark", checkpoint=path, every=2)
-    assert caught.value.state.t[-1] == pytest.approx(0.05)
-    assert float(checkpoint.read(path)["now.t"]) == pytest.approx(0.04)

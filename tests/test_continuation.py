@@ -1,5 +1,6 @@
 """Arc-length continuation against limit loads of exact rods, and what a Path offers."""
 
+import exact
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -7,7 +8,6 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 from skfem import LinearForm
 
-import exact
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, Scene, StVenantKirchhoff,
                         SupportError)
@@ -75,16 +75,6 @@ def test_limits_of_lee_frame_with_quintic_cables():
     assert max(gaps) < 1e-3  # of the chords between points
 
 
-@pytest.mark.parametrize("element, n, slenderness, tol", [
-    (ElementBeamCable(5), 10, 1e4, 6e-5), (ElementBeamCable(3), 20, 1e3, 5e-3),
-    (ElementBeamANCFCubic(2), 20, 1e3, 2e-3), (ElementBeamANCF(2), 40, 1e3, 0.05),
-    (ElementBeamANCFCubic(3), 20, 1e5, 2e-3)])
-def test_limits_of_the_slender_lee_frame(element, n, slenderness, tol):
-    h = 1.0 / slenderness
-    _, limits = lee_limits(element, n, 0.03, h=h, L=1.0, b=1.0, E=12.0 / h**3)
-    np.testing.assert_allclose(limits, exact.lee_frame_limits(), rtol=0, atol=tol)
-
-
 def arch(element, n, h=1e-3, angle=215.0):
     """Clamped at the left, hinged at the right; the load factor is in EI / R^2."""
     a = np.deg2rad(angle) / 2
@@ -131,12 +121,6 @@ def test_williams_toggle(element, n, tol):
     highest, lowest = path.limit_points()
     np.testing.assert_allclose([highest, lowest], [33.861233, 31.262583], rtol=0,
                                atol=max(tol, 2e-4))
-
-
-def test_limit_points_do_not_depend_on_the_step():
-    found = [toggle(ElementBeamCable(5), 6).continuation(steps=200, max_load=60, **options)
-             .limit_points() for options in ({}, dict(ds=0.001, ds_max=0.001), dict(ds=0.03))]
-    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
 
 
 # critical points of an arch whose loads are known in closed form
@@ -188,15 +172,6 @@ def test_critical_loads_of_a_shallow_arch():
     assert np.abs(force).max() < 1e-6 * scale.max()
 
 
-def test_critical_points_do_not_depend_on_the_step():
-    scene, _, _ = sine_arch(2.0, h=0.02)
-    found = [[p.load for p in scene.continuation(until=past_the_maximum(), steps=300,
-                                                 **options).critical_points]
-             for options in ({}, dict(ds=1e-3, ds_max=1e-3), dict(ds=0.1))]
-    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-6)
-    assert scene.continuation(steps=20, locate=None).critical_points == []
-
-
 # branches
 
 
@@ -205,14 +180,6 @@ def column(slenderness=1e3, n=8):
     mesh = MeshBeam.init_line(np.linspace(0, 1, n + 1), 1 / slenderness)
     beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(12 * slenderness**3, 0.0), 1.0)
     return Scene(beam).clamp("left").point_force((-1, 0), (1, 0))
-
-
-def test_bifurcation_loads_of_eulers_column():
-    path = column().continuation(max_load=30, ds=1e-5)
-    known = np.pi**2 / 4 * np.array([1, 9])
-    np.testing.assert_allclose(path.bifurcation_points(), known, rtol=1e-5)
-    assert path.stable[0] and not path.stable[-1] and path.negative[-1] == 2
-    assert len(path.limit_points()) == 0
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -229,27 +196,6 @@ def test_post_buckling_of_eulers_column(side):
         m = brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 2 - ux, 0.0, 0.99)
         assert P == pytest.approx(ellipk(m) ** 2, rel=1e-4)
         assert abs(uy) == pytest.approx(2 * np.sqrt(m) / ellipk(m), abs=1e-4)
-
-
-def test_the_sides_of_a_branch_differ():
-    scene = column(n=4)
-    point = scene.continuation(max_load=5, ds=1e-5).critical_points[0]
-    ends = [scene.continuation(branch=point, side=side, steps=2).displacement((1, 0))[-1, 1]
-            for side in (1, -1)]
-    assert ends[0] == pytest.approx(-ends[1], rel=1e-6) and ends[0] != 0
-
-
-def test_branch_of_another_scene():
-    scene, other = column(n=4), column(n=3)
-    path = scene.continuation(max_load=5, ds=1e-5)
-    with pytest.raises(InputError, match="another scene"):
-        other.continuation(branch=path.critical_points[0])
-    with pytest.raises(InputError, match="critical_points"):
-        scene.continuation(branch=path.state(1))
-    limit = shallow(0.02).continuation(steps=60, ds=1e-3, ds_max=1e-3).critical_points[0]
-    assert limit.kind == "limit" and "limit point" in repr(limit)
-    with pytest.raises(InputError, match="bifurcation"):
-        scene.continuation(branch=limit)
 
 
 # stability
@@ -279,21 +225,6 @@ def test_stability_is_lost_before_the_limit_point_where_the_path_branches():
     assert path.load[lost] < 0.98 * path.limit_points()[0] and path.points[lost].rate > 0
 
 
-def test_stability_with_multipliers():
-    """On the tangent space of the constraints: lost and found at the limits of the toggle."""
-    path = toggle(ElementBeamCable(5), 4).continuation(steps=100, ds=0.002, ds_max=0.002,
-                                                       max_load=80)
-    assert [p.change for p in path.critical_points] == [1, -1]
-    assert path.stable == [p.rate > 0 for p in path.points]
-
-
-def test_stability_is_not_said_of_loads_without_a_potential():
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 4), 0.1)
-    beam = Beam(mesh, ElementBeamANCF(1), StVenantKirchhoff(1e6, 0.3), 1.0)
-    path = Scene(beam).clamp("left").pressure("right", 1.0).continuation(steps=3)
-    assert path.stable == [None] * 4 and path.critical_points == []
-
-
 # what a path offers
 
 
@@ -317,17 +248,6 @@ def test_path_api(path, tmp_path):
     figure = Figure()
     path.plot(point, component=1, ax=figure.subplots())
     figure.savefig(tmp_path / "path.png")
-
-
-def test_a_path_is_a_static_solution(path):
-    state = path.state(2)
-    scene = shallow(0.02, force=state.load)
-    np.testing.assert_allclose(scene.solve_static().u, state.u, rtol=0, atol=1e-7)
-
-
-def test_path_without_limit_point():
-    path = shallow(0.005).continuation(steps=10)
-    assert path.limit_points().shape == (0,)
 
 
 def test_path_with_a_prescribed_displacement():
@@ -355,12 +275,6 @@ def test_steps_until_and_max_load():
     np.testing.assert_allclose(reaction, [0, 1.5], rtol=0, atol=1e-6)
 
 
-def test_steps_grow_up_to_ds_max():
-    path = shallow(0.02).continuation(steps=12, ds=1e-4, ds_max=1e-3)
-    steps = np.diff(path.arc)
-    assert steps[0] == pytest.approx(1e-4) and 5e-4 < steps.max() <= 1e-3 * (1 + 1e-12)
-
-
 def test_failure_keeps_the_path():
     # one iteration is a prediction and no more
     with pytest.raises(ConvergenceError, match="load") as failure:
@@ -369,13 +283,6 @@ def test_failure_keeps_the_path():
     assert len(path) >= 1 and path.load[0] == 0.0
     assert path.state(len(path) - 1).converged
     assert path.displacement((0.5, 0.02)).shape == (len(path), 2)
-
-
-def test_loads_that_move_nothing():
-    mesh = MeshBeam.init_line([0, 1, 2], 0.1)
-    beam = Beam(mesh, ElementBeamANCF(1), StVenantKirchhoff(1.0, 0.3), 1.0, formulation="assumed")
-    with pytest.raises(ConvergenceError, match="move nothing"):
-        Scene(beam).clamp("left").continuation()
 
 
 @pytest.mark.parametrize("options", [

@@ -2,18 +2,16 @@
 
 from math import comb, factorial
 
+import exact
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
-from scipy.linalg import svdvals
 from scipy.optimize import brentq
 
-import exact
 from skfem_ancf import (Beam, ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.elements.base import DEGREES
-from skfem_ancf.mesh.nodal import nodal_derivatives
 from skfem_ancf.mesh.reference_cell import SECTIONS, hermite_basis
 
 E, NU, RHO, B = 2e8, 0.3, 7800.0, 0.01
@@ -41,15 +39,6 @@ def tip_error(degree, n, slenderness=100.0):
 
 
 # the functions
-
-@pytest.mark.parametrize("m", range(1, 9))
-def test_hermite_functions_are_dual_to_the_derivatives_at_the_ends(m):
-    for k in range(m):
-        values = hermite_basis(m, np.array([0.0, 1.0]), k)
-        expected = np.zeros((2 * m, 2))
-        expected[k, 0] = expected[m + k, 1] = 1.0
-        assert_allclose(values / factorial(k), expected / factorial(k), atol=1e-14)
-    assert not np.any(hermite_basis(m, np.array([0.3]), 2 * m))
 
 
 @pytest.mark.parametrize("m", (3, 5, 8))
@@ -99,43 +88,7 @@ def test_no_degree_locks(degree, most, slenderness):
     assert error < bound and state.iterations <= most
 
 
-@pytest.mark.parametrize("degree", DEGREES)
-def test_resists_all_but_rigid_motions(degree):
-    """The strains of one, two and three elements at rest have three zero modes, no more."""
-    for n in (1, 2, 3):
-        for element in (ElementBeamANCFHermite(1, degree), ElementBeamCable(degree)):
-            beam = Beam(MeshBeam.init_line(np.linspace(0, 1, n + 1), 0.1), element,
-                        StVenantKirchhoff(E, NU, RHO), B)
-            nd = beam.nd
-            part = beam.kernel.gradients(np.zeros(beam.N))[0]
-            whole = np.zeros((n, part.shape[1] + beam.N, beam.N))
-            for e in range(n):
-                whole[e, beam.N:, e * nd:(e + 2) * nd] = part[e]
-            whole = whole.reshape(-1, beam.N)
-            s = svdvals(whole / np.linalg.norm(whole, axis=0))
-            assert s[-3] < 1e-13 * s[0] and s[-4] > 1e-7 * s[0]
-
-
-@pytest.mark.parametrize("slenderness, known", [(1e2, -0.9034994), (1e4, -0.90313168)])
-def test_sections_of_a_high_degree(slenderness, known):
-    for degree, n, error in ((7, 4, 2e-5), (9, 2, 8e-5), (9, 4, 1e-6), (11, 1, 4e-5)):
-        state = hanging(ElementBeamANCFHermite(2, degree), n, slenderness).solve_static()
-        assert abs(state.displacement((1, 0))[1] - known) < error
-        assert state.iterations <= 9 and len(state.steps) == 1
-
-
 # curves
-
-def test_derivatives_at_the_nodes_of_a_curve():
-    errors = []
-    for n in (4, 8):
-        mesh = quarter(n)
-        found = nodal_derivatives(mesh, 7)
-        for k, d in enumerate(found):
-            known = np.real(np.array([-1j, -1.0])[:, None] * 1j**k * np.exp(1j * mesh.s))
-            known[1] += k == 0
-            errors.append(np.max(np.abs(d - known)) * mesh.lengths[0]**k / factorial(k))
-    assert max(errors[3:8]) < 1e-6 and max(errors[11:]) < 1e-8  # of the first three: the mesh's own
 
 
 def arch_tip(P):
@@ -166,64 +119,3 @@ def test_cables_on_a_curve(degree, n, error):
     fine = tip(7, 16)
     assert_allclose(fine, arch_tip(0.05), atol=2e-4)
     assert np.hypot(*(tip(degree, n) - fine)) < error
-
-
-@pytest.mark.parametrize("degree, error", [(3, 1e-5), (5, 1e-5), (7, 1e-9), (15, 1e-9)])
-def test_weight_of_a_cable_on_a_curve(degree, error):
-    """The mass is that of the axis, not of directors that are interpolated between nodes."""
-    beam = Beam(quarter(8), ElementBeamCable(degree), StVenantKirchhoff(E, NU, RHO), B)
-    state = Scene(beam).clamp("left").gravity((0, -0.3)).solve_static()
-    assert_allclose(state.reactions("left").force, [0.0, 0.3 * RHO * B * 0.01 * np.pi / 2],
-                    atol=error * RHO * B * 0.01 * 0.3)
-
-
-# what looks at a solution
-
-@pytest.mark.parametrize("element, mesh", [
-    (ElementBeamCable(11), MeshBeam.init_line([0.0, 0.5, 1.0], 0.02)),
-    (ElementBeamCable(9), quarter(2, 0.02)),
-    (ElementBeamANCFHermite(3, 9), MeshBeam.init_line([0.0, 1.0], 0.02)),
-    (ElementBeamANCFHermite(2, 7), quarter(2, 0.02))], ids=repr)
-def test_two_elements_are_looked_at_as_many_short_ones_are(element, mesh, tmp_path):
-    """Fields, section forces, modes, a motion and a joint: against 16 elements of degree 5."""
-    def look(element, mesh):
-        beam = Beam(mesh, element, StVenantKirchhoff(E, NU, RHO), B)
-        scene = Scene(beam).clamp("left", thickness="free").gravity((0, -3.0))
-        state = scene.solve_static()
-        hung = Scene(beam).pin("left")
-        motion = hung.gravity((0, -3.0)).integrate(t_end=0.05, dt=5e-3)
-        return state, [state.displacement(mesh.p[:, -1]), state.reactions("left").moment,
-                       scene.modes(3).frequencies, motion.displacement(mesh.p[:, -1])[-1]]
-
-    finer = (ElementBeamCable(5) if element.order == 0 else
-             ElementBeamANCFHermite(element.order, 5))
-    fine = mesh.refined(3)
-    state, found = look(element, mesh)
-    for a, b in zip(found, look(finer, fine)[1]):
-        assert_allclose(a, b, rtol=2e-3, atol=1e-4)
-    middle = 0.5 * (fine.p[:, 4] + fine.p[:, 5]) if mesh.is_straight else fine.p[:, 4]
-    assert state.strain(middle).shape == (3,)
-    for options in ({}, {"lagrange": True}):
-        path = tmp_path / "beam.vtu"
-        state.save(path, **options)
-        assert path.stat().st_size > 1000
-
-
-def test_meshes_of_a_high_degree_are_moved_saved_and_cut_as_others(tmp_path):
-    mesh = quarter(4, 0.1).with_sections("septic")
-    X = np.array([[0.2, 0.7], [0.1, 0.9]])
-    x = mesh.mapping().F(X)
-    on_the_arc = np.hypot(x[0], x[1] - 1.0) + 0.1 * (X[1] - 0.5)
-    assert_allclose(on_the_arc, 1.0, atol=1e-7)
-    c, s = np.cos(0.3), np.sin(0.3)
-    moved = mesh.rotated(0.3).translated([1.0, 2.0])
-    assert_allclose(moved.mapping().F(X),
-                    np.einsum("ij,jep->iep", [[c, -s], [s, c]], x) + [[[1.0]], [[2.0]]], atol=1e-14)
-    mesh.save_npz(tmp_path / "mesh.npz")
-    same = MeshBeam.load_npz(tmp_path / "mesh.npz")
-    assert same.sections == "septic"
-    assert_allclose(same.mapping().F(X), x, atol=1e-15)
-    fine = mesh.refined()
-    assert fine.sections == "septic" and mesh.restrict([1, 2]).nelements == 2
-    assert_allclose(fine.mapping().F(np.array([[0.4], [0.9]]))[:, ::2, 0],
-                    mesh.mapping().F(np.array([[0.2], [0.9]]))[:, :, 0], atol=1e-7)

@@ -1,6 +1,5 @@
 """Temperature and stress-free strains: Timoshenko's strip, exact curls, buckling, free motion."""
 
-import pickle
 
 import numpy as np
 import pytest
@@ -12,11 +11,9 @@ from skfem import (Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm,
 from skfem.helpers import sym_grad
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
-                        InputError, MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, sweep)
-from skfem_ancf.actions.eigenstrain import Temperature
+                        InputError, MeshBeam, Scene, Section, StVenantKirchhoff)
 from skfem_ancf.core.errors import CallbackError
 from skfem_ancf.core.quadrature import gauss
-from skfem_ancf.core.switch import compiled_off
 
 STEEL = StVenantKirchhoff(E=2e11, nu=0.0, density=8000, thermal_expansion=12e-6)
 BRASS = StVenantKirchhoff(E=1e11, nu=0.0, density=8500, thermal_expansion=19e-6)
@@ -48,24 +45,6 @@ def test_timoshenkos_strip(element, upper, solver):
     state = getattr(Scene(beam).clamp("left").temperature(20.0), solver)()
     kappa = timoshenko(0.001, upper, 20.0)
     assert state.displacement((0.2, 0.0))[1] == pytest.approx(kappa * 0.02, rel=1e-3)
-
-
-@every
-def test_a_free_body_expands_without_stress(element):
-    """Uniform expansion: E = E0 everywhere, stress and section forces vanish."""
-    law = STEEL.replace(nu=0.3)
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), height=lambda x: 0.1 - 0.02 * x)
-    beam = Beam(mesh, element, law, width=0.02)
-    held = Scene(beam).pin("left").fix("right", "r^2")
-    state = held.temperature(500.0).solve_static()
-    e = 12e-6 * 500
-    stretch = e if not beam.has_sections else np.sqrt(1 + 2 * e) - 1
-    assert state.displacement((1.0, 0.0))[0] == pytest.approx(stretch, rel=1e-9)
-    S = state.stress((0.52, 0.01), recover=False)
-    # of a cable the strain is that of Green and Lagrange of its engineering strain
-    assert np.max(np.abs(S)) < (1e-8 if beam.has_sections else 4e-3) * 2e11 * e
-    own = state.resultants((0.52, 0.0), recover=False)
-    assert abs(own.N) < 4e-3 * 2e11 * e * 0.002 and abs(own.M) < 1e-5 * 2e11 * e * 0.002
 
 
 @pytest.mark.parametrize("element, n", [(ElementBeamANCFCubic(2), 48), (ElementBeamCable(5), 32),
@@ -146,82 +125,6 @@ def test_stress_of_a_held_beam_and_of_each_layer():
         assert state.resultants((0.01, 0.0), recover=False).N == pytest.approx(N, rel=1e-3)
 
 
-def test_recovered_fields_know_the_strain():
-    """A temperature linear across bends a free beam without stress; held at the end it is stressed.
-    """
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.05), ElementBeamANCFCubic(3),
-                STEEL, width=0.02)
-    scene = Scene(beam).clamp("left").temperature(lambda x, y: 100.0 * y).point_force(
-        (0.0, -50.0), at=(1.0, 0.0))
-    state = scene.solve_static()
-    assert state.recovered == {0: ""}
-    second = 0.02 * 0.05**3 / 12
-    S = state.stress((0.5, 0.02))
-    assert S[0] == pytest.approx(50.0 * 0.5 * 0.02 / second, rel=1e-3)
-    assert state.strain((0.5, 0.02))[0] == pytest.approx(S[0] / 2e11 + 12e-6 * 2.0, rel=1e-4)
-    assert state.resultants((0.5, 0.0)).M == pytest.approx(-25.0, rel=1e-3)
-
-
-@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
-def test_force_is_the_derivative_of_the_potential_and_stiffness_that_of_the_force(element):
-    load = Scene(strip(element, n=4)).temperature(lambda x, y: 100.0 + x).system.loads[0]
-    u, du = 1e-4 * np.random.default_rng(0).standard_normal((2, load.beam.N))
-    step = 1e-6 * du
-    slope = (load.potential(u + step) - load.potential(u - step)) / 2e-6
-    assert slope == pytest.approx(-load.force(u) @ du, rel=1e-6)
-    i, j, v = load.stiffness(u)
-    K = np.zeros((load.beam.N,) * 2)
-    np.add.at(K, (i, j), v)
-    change = (load.force(u + step) - load.force(u - step)) / 2e-6
-    assert_allclose(K @ du, change, atol=1e-6 * np.abs(change).max())
-    work = load.mean_force(u, u + du) @ du
-    assert work == pytest.approx(load.potential(u) - load.potential(u + du), rel=1e-9)
-    assert_allclose(load.beam.kernel.scatter(load.element_forces(u)), load.force(u),
-                    atol=1e-12 * np.abs(load.force(u)).max())
-
-
-@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
-def test_motion_after_a_sudden_heating_conserves_energy(element):
-    scene = Scene(strip(element, n=4)).clamp("left").temperature(50.0)
-    history = scene.integrate(t_end=0.02, dt=2e-4, scheme="energy-momentum")
-    assert np.ptp(history.total_energy) < 1e-8 * np.ptp(history.strain_energy)
-
-
-@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCFCubic(2)])
-def test_sudden_heat_of_ten_per_cent_cuts_no_step(element):
-    """Waves cross the thickness in 0.6 ms; what the steps do not resolve does not turn into drift.
-    """
-    law = StVenantKirchhoff(E=1e6, nu=0.3, density=1000)
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), 0.02), element, law, width=0.02)
-    scene = Scene(beam).clamp("left").eigenstrain(xx=0.1, yy=0.1)
-    history = scene.integrate(0.01, 1e-3, "energy-momentum")
-    assert history.substeps == 0 and history.iterations < 20 * history.steps
-    # the free end moves on as the elastic wave of a bar leaves it: at the strain's size times c
-    assert history.displacement((1.0, 0.0))[-1, 0] == pytest.approx(
-        (np.sqrt(1.2) - 1.0) * np.sqrt(1e6 / 1e3) * 0.01, rel=0.1)
-    assert np.ptp(history.total_energy) < 1e-8 * np.ptp(history.strain_energy)
-
-
-def test_a_muscle_bends_a_finger_and_functions_of_time_are_products():
-    """A layer that shortens: the same by amplitude, by (x, y, t), and in statics at t = 1."""
-    soft = StVenantKirchhoff(E=1e6, nu=0.0, density=1000)
-    mesh = MeshBeam.init_line(np.linspace(0, 0.1, 9), height=0.01)
-    beam = Beam(mesh, ElementBeamANCFCubic(2), soft, width=0.01)
-
-    def pull(x, y, t):
-        return -0.1 * np.maximum(y, 0.0) / 0.005 * (1.0 + x) * np.sin(3.0 * t)
-
-    one = Scene(beam).clamp("left").eigenstrain(xx=pull)
-    two = Scene(beam).clamp("left").eigenstrain(
-        xx=lambda x, y: pull(x, y, np.pi / 6), amplitude=lambda t: np.sin(3.0 * t))
-    a, b = (s.integrate(t_end=0.05, dt=1e-3).displacement((0.1, 0.0))[-1] for s in (one, two))
-    assert_allclose(a, b, rtol=1e-8)
-    still = Scene(beam).clamp("left").eigenstrain(xx=lambda x, y: pull(x, y, 1.0))
-    assert_allclose(one.solve_static().displacement((0.1, 0)),
-                    still.solve_static().displacement((0.1, 0)), rtol=1e-8)
-    assert still.solve_static().displacement((0.1, 0))[1] > 1e-4  # it bends up, to the muscle
-
-
 @pytest.mark.parametrize("element, error", [
     (ElementBeamCable(5), 1e-9), (ElementBeamANCFCubic(2), 2e-3), (ElementBeamANCF(2), 2e-3)])
 def test_a_muscle_layer_bends_a_finger_as_its_moment_does(element, error):
@@ -246,19 +149,6 @@ def test_a_muscle_layer_bends_a_finger_as_its_moment_does(element, error):
     assert_allclose(scene.solve_static().displacement((L, 0)) + [L, 0], tip, rtol=error)
 
 
-def profile(x, y):
-    return 10.0 * x + 100.0 * y
-
-
-def test_pickles_and_refines():
-    scene = Scene(strip(ElementBeamANCF(2), n=4)).clamp("left").temperature(profile)
-    tip = scene.solve_static().displacement((0.2, 0.0))
-    again = pickle.loads(pickle.dumps(scene)).solve_static().displacement((0.2, 0.0))
-    assert_allclose(again, tip, rtol=1e-12)
-    fine = scene.solve_static(adapt=1e-3)
-    assert fine.beams[0].mesh.nelements > 4
-
-
 @pytest.mark.parametrize("make, words", [
     (lambda s: s.temperature(None), "temperature|number"),
     (lambda s: s.temperature("hot"), "number or a function"),
@@ -280,55 +170,12 @@ def test_what_cannot_expand_says_so():
         dull.temperature(1.0)
 
 
-RUBBER = NeoHookean(E=1e6, nu=0.4, density=1000, thermal_expansion=1e-3)
-SOFT = StVenantKirchhoff(E=1e6, nu=0.3, density=1000, thermal_expansion=1e-3)
 SQUARE = {"width": 0.02}
 POINTS = np.linspace(0, 1, 9)
 
 
 def quarter(height=0.02):
     return MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]), 1.5 * POINTS, height)
-
-
-BODIES = {
-    "cubic cable": lambda **o: Beam(MeshBeam.init_line(POINTS, 0.02), ElementBeamCable(3), SOFT,
-                                    **SQUARE, **o),
-    "tapered cable of degree 7": lambda **o: Beam(
-        MeshBeam.init_line(POINTS, lambda x: 0.03 - 0.01 * x), ElementBeamCable(7), SOFT, **SQUARE,
-        **o),
-    "quintic cable on an arc": lambda **o: Beam(quarter(), ElementBeamCable(5), SOFT, **SQUARE,
-                                                **o),
-    "cable of layers": lambda **o: Beam(
-        MeshBeam.init_line(POINTS, 0.02), ElementBeamCable(5), section=Section.layers(
-            (0.01, SOFT), (0.01, SOFT.replace(E=3e6)), width=0.02), **o),
-    "rubber": lambda **o: Beam(MeshBeam.init_line(POINTS, 0.05), ElementBeamANCF(2), RUBBER,
-                               **SQUARE, **o),
-    "rubber on Hooke's law": lambda **o: Beam(
-        MeshBeam.init_line(POINTS, 0.05), ElementBeamANCFCubic(2), section=Section.layers(
-            (0.02, SOFT), (0.03, RUBBER), width=0.02), **o)}
-
-
-@pytest.mark.skipif(compiled_off() is not None, reason="Numba is not there, or off")
-@pytest.mark.parametrize("body", BODIES)
-def test_compiled_and_plain_take_the_same_iterations_to_the_same(body, monkeypatch):
-    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "1")
-    found = []
-    for way in (False, True):
-        beam = BODIES[body](compiled=way)
-        tip = tuple(beam.mesh.p[:, -1])
-        heat = ((lambda x, y, t: 5.0 * (1.0 + 30.0 * y) * np.sin(t)) if beam.has_sections else
-                (lambda x, y, t: 5.0 * t * (1.0 + x) + 150.0 * y * np.sin(t)))
-        scene = Scene(beam).clamp("left").point_force((0.0, -2e-4), at=tip).temperature(heat)
-        assert "compiled where beams are" in scene.plan()["stress-free strain"].reason
-        assert (scene.system.machine.choose("equilibrium").way == "plain") is not way
-        state = scene.solve_static()
-        found.append([(state.iterations, state.displacement(tip), 1e-10)])
-        for scheme in ("energy-momentum", "generalized-alpha", "radau"):
-            history = scene.integrate(0.05, 5e-3, scheme)
-            found[-1].append((history.iterations, history.displacement(tip), 1e-7))
-    for (n, x, atol), (k, y, _) in zip(*found):
-        assert n == k
-        assert_allclose(y, x, rtol=0, atol=atol * np.abs(x).max())
 
 
 @pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamCable(9)])
@@ -361,40 +208,6 @@ def test_a_held_cable_buckles_when_heated_and_frames_of_cables_expand(degree):
     state = frame.temperature(100.0).solve_static()
     for point in points[1:]:
         assert_allclose(state.displacement(point), 1.2e-3 * np.array(point), atol=1e-12)
-
-
-def test_a_heated_cable_is_replaced_swept_pickled_and_gone_on_with(tmp_path):
-    """All by the force E A alpha T between walls, or the length alpha T L without them."""
-    def bar(T=5.0, E=2e11, held=False):
-        beam = Beam(MeshBeam.init_line(POINTS, 0.02), ElementBeamCable(5), STEEL.replace(E=E),
-                    width=0.02)
-        return (Scene(beam).pin("left").pin("right") if held else Scene(beam).pin("left").fix(
-            "right", "r^2")).temperature(T)
-
-    def force(scene):
-        return scene.solve_static().resultants((0.5, 0.0), recover=False).N
-
-    held = bar(held=True)
-    unit = -4e-4 * 12e-6
-    assert force(held) == pytest.approx(5 * 2e11 * unit, rel=1e-9)
-    stiffer = held.replace(material=STEEL.replace(E=3e11))
-    assert stiffer.system.machine.tables is not held.system.machine.tables
-    assert force(stiffer) == pytest.approx(5 * 3e11 * unit, rel=1e-9)
-    hotter = stiffer.replace(loads=[Temperature(7.0), Temperature(1.0)])
-    assert force(hotter) == pytest.approx(8 * 3e11 * unit, rel=1e-9)
-    assert force(pickle.loads(pickle.dumps(hotter))) == pytest.approx(8 * 3e11 * unit, rel=1e-9)
-    assert force(held) == pytest.approx(5 * 2e11 * unit, rel=1e-9)
-
-    T = np.linspace(1.0, 80.0, 40)
-    found = sweep(bar, {"T": T}, {"end": ("displacement", "right")})
-    assert set(found.status) == {"done"}
-    assert_allclose(found["end"][:, 0], 12e-6 * T, rtol=1e-10)
-
-    waves = bar().temperature(lambda x, y, t: 20.0 * np.sin(900.0 * t) * x)
-    whole = waves.integrate(0.01, 2e-4, checkpoint=tmp_path / "run.npz", every=9)
-    again = bar().temperature(lambda x, y, t: 20.0 * np.sin(900.0 * t) * x)
-    assert np.array_equal(again.resume(tmp_path / "run.npz").u, whole.u)
-    assert np.ptp(whole.displacement((1.0, 0.0))[:, 0]) > 1e-4
 
 
 # layers of different nu, and temperatures of a high degree across

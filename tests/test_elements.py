@@ -4,16 +4,14 @@ from math import factorial
 
 import numpy as np
 import pytest
-from numpy.polynomial import Polynomial, chebyshev
-from numpy.testing import assert_allclose, assert_array_equal
-from skfem import Basis, ElementVector, Functional
-from skfem.models.poisson import mass
-
 from conftest import MESHES
-from skfem_ancf import (ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError,
-                        NameUnknown)
+from numpy.polynomial import Polynomial
+from numpy.testing import assert_allclose, assert_array_equal
+from skfem import Basis, ElementVector
+
+from skfem_ancf import ElementBeamANCF, InputError, MeshBeam, MeshError, NameUnknown
 from skfem_ancf.elements.ancf import POINT_FAMILIES
-from skfem_ancf.mesh.reference_cell import SECTIONS, ElementBeamP1, RefBeam, hermite, linear
+from skfem_ancf.mesh.reference_cell import SECTIONS
 
 ORDERS = range(1, 11)
 SIZES = [(1.0, 1.0), (0.01, 3.0), (250.0, 1e-3)]
@@ -65,19 +63,6 @@ def reference_state(element, mesh):
 
 # the section
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_section_points(order):
-    points = ElementBeamANCF(order).section_points
-    if order == 1:
-        expected = [0.0]
-    elif order == 2:
-        expected = [-0.5, 0.5]
-    else:
-        zeros = chebyshev.chebroots(np.eye(order - 1)[order - 2])
-        expected = np.concatenate([[-0.5], 0.5 * zeros, [0.5]])
-    assert_allclose(points, expected, atol=1e-14)
-    assert_array_equal(points, -points[::-1])
-
 
 @pytest.mark.parametrize("family", POINT_FAMILIES)
 @pytest.mark.parametrize("order", ORDERS)
@@ -97,13 +82,6 @@ def test_section_functions_integrate_the_lagrange_polynomials(order, family):
         P, dP = element.section(eta, k)
         assert_allclose(dP, lagrange(eta), atol=1e-11)
         assert_allclose(P, lagrange.integ(lbnd=0.0)(eta), atol=1e-12)
-
-
-def test_fourth_order_function_in_full():
-    """P_1 = h eta (-1/2 + eta/2 + 4 eta^2/3 - 2 eta^3): the printed appendix has it wrong."""
-    eta = np.linspace(-0.5, 0.5, 9)
-    P, _ = ElementBeamANCF(4).section(eta, 0)
-    assert_allclose(P, eta * (-1 / 2 + eta / 2 + 4 * eta ** 2 / 3 - 2 * eta ** 3), atol=1e-15)
 
 
 @pytest.mark.parametrize("n", range(3, 13))
@@ -162,40 +140,6 @@ def test_gradients_are_those_of_the_values(element, mesh):
         assert_allclose(np.einsum("niep,iep->nep", gradients, along), expected, atol=1e-12)
 
 
-def test_partition_of_unity(element, mesh):
-    values, gradients = tabulate(element, mesh)
-    position = [0, element.nodal_dofs]
-    assert_allclose(values[position].sum(0), 1.0, atol=1e-14)
-    assert_allclose(gradients[position].sum(0), 0.0, atol=1e-12)
-
-
-def test_points_per_element_and_subsets(element, arc):
-    value, grad = tabulate(element, arc)
-    each = np.repeat(POINTS[:, None], 2, axis=1)
-    subset = np.array([2, 0])
-    got, got_grad = tabulate(element, arc, each, subset)
-    assert_allclose(got, value[:, subset], atol=1e-15)
-    assert_allclose(got_grad, grad[:, :, subset], atol=1e-13)
-
-
-# elements against each other
-
-def test_patel_shabana_is_order_two_in_other_coordinates():
-    """r_Y at -+h/2 is r_Y -+ (h/2) r_YY: the same fields, and so the same mass matrix."""
-    mesh = MESHES["s-curve"]()
-    h = mesh.height
-    node = np.eye(4)
-    node[2:, 2:] = [[1.0, -h / 2], [1.0, h / 2]]
-    T = np.kron(np.eye(2), node)
-    ps, zheng = (tabulate(e, mesh) for e in (ElementBeamPatelShabana(), ElementBeamANCF(2)))
-    for a, b in zip(ps, zheng):
-        assert_allclose(a, np.tensordot(T.T, b, 1), atol=1e-14)
-    M_ps, M = (mass.assemble(Basis(mesh, e)).toarray()
-               for e in (ElementBeamPatelShabana(), ElementBeamANCF(2)))
-    T = np.kron(np.eye(mesh.nvertices), node)
-    assert_allclose(M_ps, T.T @ M @ T, atol=1e-15)
-
-
 # the stress-free state
 
 def test_stress_free_state_and_rigid_motion_are_exact(element, mesh):
@@ -229,36 +173,6 @@ def test_stress_free_state_needs_sections_of_its_own_kind(element, sections):
 
 # attributes
 
-def test_attributes(element):
-    n, number = element.order, element.nodal_dofs
-    assert number == len(element.dofnames) == len(element.functionals)
-    p = element.axis_degree
-    assert number == (p + 1) // 2 + n * (SECTIONS.index(element.sections) + 1)
-    assert element.dofnames[:2] == ["r", "r_X"] and len(set(element.dofnames)) == number
-    welded = [name for name, f in zip(element.dofnames, element.functionals) if f[1] == 0]
-    assert element.welded == welded and len(welded) == n + 1
-    assert element.carries_shear_parabola == (n >= 3)
-    assert element.doflocs.shape == (2 * number, 2)
-    assert_array_equal(element.doflocs[:, 0], np.repeat([0.0, 1.0], number))
-    assert element.refdom is RefBeam and p >= 3 and p % 2 == 1
-    assert f"order {n}" in repr(element)
-    with pytest.raises(ValueError, match="basis functions"):
-        element.gbasis(one_element().mapping(), POINTS, 2 * number)
-    with pytest.raises(ValueError, match="basis functions"):
-        element.gbasis(one_element().mapping(), POINTS, -1)
-
-
-def test_default_quadrature_is_exact(element):
-    mesh = one_element(0.7, 0.3)
-    energy = Functional(lambda w: np.sum(w["r"].grad ** 2, (0, 1)) ** 2)  # degree of the strain's
-    bases = [Basis(mesh, ElementVector(element), **kw)
-             for kw in ({}, {"intorder": 4 * element.order + 4 * element.axis_degree + 8})]
-    q = np.random.default_rng(5).standard_normal(bases[0].N)
-    U, exact = (energy.assemble(basis, r=basis.interpolate(q)) for basis in bases)
-    assert_allclose(U, exact, rtol=1e-11)
-    M, exact = (mass.assemble(basis.with_element(element)).toarray() for basis in bases)
-    assert_allclose(M, exact, atol=1e-14)
-
 
 @pytest.mark.parametrize("order", [0, -1, 2.0, 1.5, True, "3", None, np.nan])
 def test_bad_order(order):
@@ -271,37 +185,3 @@ def test_bad_points(points):
     with pytest.raises(NameUnknown, match="'chebyshev', 'gauss-lobatto', 'equispaced'") as info:
         ElementBeamANCF(3, points=points)
     assert info.value.name == points
-
-
-# the functions of the axis, and the scalar element
-
-def test_axis_functions():
-    for x, node in ((0.0, 0), (1.0, 1)):
-        assert_array_equal(hermite(x), np.eye(4)[2 * node])
-        assert_array_equal(hermite(x, 1), np.eye(4)[2 * node + 1])
-        assert_array_equal(linear(x), np.eye(2)[node])
-    x = np.linspace(0, 1, 7)
-    for f, degree in ((hermite, 2), (linear, 1)):
-        for d in range(degree):
-            assert_allclose(f(x + 1j * STEP, d).imag / STEP, f(x, d + 1), atol=1e-14)
-    assert_array_equal(linear(x, 2), 0)
-    with pytest.raises(ValueError, match="derivative"):
-        hermite(x, 3)
-
-
-def test_scalar_element_is_nodal():
-    element = ElementBeamP1()
-    values = np.array([element.lbasis(element.doflocs.T, i)[0] for i in range(2)])
-    assert_array_equal(values, np.eye(2))
-    for i in range(2):
-        d = element.lbasis(POINTS + np.array([[1j * STEP], [0]]), i)[0].imag / STEP
-        assert_allclose(element.lbasis(POINTS, i)[1], [d, 0 * d], atol=1e-15)
-    with pytest.raises(ValueError, match="basis functions"):
-        element.lbasis(POINTS, 2)
-
-
-def test_reference_cell():
-    X = np.array([[0.3, 1.0, 0.6, 0.0], [0.0, 0.2, 1.0, 0.7]])
-    for i in range(4):
-        assert_array_equal(RefBeam.on_facet(i, X), np.arange(4) == i)
-    assert_array_equal(RefBeam.normals, [[0, -1], [1, 0], [0, 1], [-1, 0]])

@@ -11,12 +11,10 @@ from skfem import Basis, BilinearForm, LinearForm, asm
 from skfem.helpers import ddot, dot
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, ElementBeamPatelShabana, MeshBeam,
-                        NeoHookean, Scene, Section, StVenantKirchhoff, forms,
-                        reference_coordinates)
+                        NeoHookean, Scene, StVenantKirchhoff, forms, reference_coordinates)
+from skfem_ancf.actions.loads import EndMoment, Pressure
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
-from skfem_ancf.mesh.places import node_of
-from skfem_ancf.actions.loads import DeadLoad, EndMoment, Pressure
 
 STEP = 1e-30
 BODIES = {
@@ -78,24 +76,6 @@ def relative(a, b):
 
 
 # three implementations
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("element", SHAPES)
-@pytest.mark.parametrize("body", BODIES)
-def test_batched_textbook_and_fused_agree(body, element, law):
-    beam = make(body, element, law)
-    u = deformed(beam)
-    args = (beam.material, WIDTH, beam.material.shear_factor(beam.element))
-    q = dict(r=beam.q0 + u)
-    f = asm(forms.internal_force(*args), beam.basis, **q)
-    K = asm(forms.tangent(*args), beam.basis, **q).toarray()
-    assert relative(asm(forms.textbook.internal_force(*args), beam.basis, **q), f) < 2e-13
-    assert relative(asm(forms.textbook.tangent(*args), beam.basis, **q).toarray(), K) < 2e-13
-    assert relative(beam.kernel.force(u), f) < 2e-12
-    assert relative(dense(beam, beam.kernel.tangents(u)), K) < 2e-13
-    energy = asm(forms.energy(*args), beam.basis, **q)
-    assert abs(beam.kernel.energy(u) - energy) < 1e-12 * energy
-    assert_allclose(K, K.T, rtol=0, atol=1e-13 * np.abs(K).max())
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -166,31 +146,6 @@ def test_forms_are_derivatives_of_each_other(law):
 # derivatives, for every formulation
 
 CASES = [(f, "svk") for f in FORMULATIONS] + [("assumed", "svk-strain")]
-
-
-@pytest.mark.parametrize("body", ["straight", "unequal", "arc"])
-@pytest.mark.parametrize("formulation, law", CASES)
-@pytest.mark.parametrize("element", SHAPES)
-def test_force_and_tangent_are_derivatives(formulation, element, body, law):
-    beam = make(body, element, law, formulation)
-    u, n = deformed(beam), beam.N
-    f, K = beam.kernel.force(u), dense(beam, beam.kernel.tangents(u))
-    steps = u + 1j * STEP * np.eye(n)
-    df = np.imag([beam.kernel.energy(v) for v in steps]) / STEP
-    dK = np.imag([beam.kernel.force(v) for v in steps]).T / STEP
-    assert relative(df, f) < 1e-12
-    assert relative(dK, K) < 1e-12
-    assert relative(K.T, K) < 1e-14
-
-
-@pytest.mark.parametrize("formulation", ["continuum", "assumed"])
-def test_derivatives_of_a_nonlinear_law(formulation):
-    beam = make("arc", "2", "neo", formulation)
-    u = deformed(beam)
-    f, K = beam.kernel.force(u), dense(beam, beam.kernel.tangents(u))
-    steps = u + 1j * STEP * np.eye(beam.N)
-    assert relative(np.imag([beam.kernel.energy(v) for v in steps]) / STEP, f) < 1e-12
-    assert relative(np.imag([beam.kernel.force(v) for v in steps]).T / STEP, K) < 1e-12
 
 
 # rigid motion and objectivity
@@ -309,18 +264,6 @@ def test_an_arc_weighs_what_its_area_and_length_say(element):
         assert_allclose(forces.M[0], g * mass * (1 - np.sin(1.0)), rtol=1e-2)
 
 
-def test_the_mean_density_of_an_arc_is_that_of_its_layers():
-    light = StVenantKirchhoff(7e10, 0.3, density=2700.0)
-    for materials, density in (((STEEL, STEEL), 7800.0), ((light, STEEL, light), 4400.0)):
-        section = Section.layers(*((0.1 / len(materials), m, 0.05) for m in materials))
-        beam = Beam(ARC, ElementBeamANCF(2), section=section)
-        assert_allclose(beam.total_mass, density * 0.05 * 0.1, rtol=3e-6)
-    # more mass outside: the first moment of the area is in it
-    beam = Beam(ARC, ElementBeamANCF(2), section=Section.layers((0.05, STEEL, 0.05),
-                                                               (0.05, light, 0.05)))
-    assert_allclose(beam.total_mass, 0.05 * 0.05 * (7800.0 * 1.025 + 2700.0 * 0.975), rtol=4e-6)
-
-
 @pytest.mark.parametrize("element", SHAPES)
 @pytest.mark.parametrize("body", BODIES)
 def test_gravity(body, element):
@@ -395,33 +338,6 @@ def test_pressure_on_a_closed_surface(body, element):
     assert abs(np.sum(q[:, 0] * g[:, 1] - q[:, 1] * g[:, 0])) < 1e-13
 
 
-@pytest.mark.parametrize("boundary", ENDS)
-@pytest.mark.parametrize("body", BODIES)
-def test_pressure_on_one_surface(body, boundary):
-    """The resultant is p b times the deformed chord, turned; the derivative is exact."""
-    beam, p = make(body, "3"), 0.7
-    load = Pressure(boundary, p).bind(beam)
-    u = deformed(beam, 0.1)
-    # the surface from its start to its end with the body on its left
-    corners = {"bottom": (0, 0, 1, 0), "right": (1, 0, 1, 1), "top": (1, 1, 0, 1),
-               "left": (0, 1, 0, 0)}[boundary]
-    last = beam.mesh.nelements - 1
-    a, b = (beam.mesh.mapping().F(X, e) + beam.displacements(u, X, e) for X, e in (
-        (np.array([[c[0]], [c[1]]], dtype=float), np.array([last if c[0] else 0]))
-        for c in (corners[:2], corners[2:])))
-    along = (b - a)[:, 0, 0]
-    force = beam.rigid_motions()[:, :2].T @ load.force(u)
-    assert_allclose(force, -p * WIDTH * np.array([along[1], -along[0]]), atol=1e-14)
-    i, j, v = load.stiffness(u)
-    d = np.random.default_rng(3).uniform(-1, 1, beam.N)
-    change = np.zeros(beam.N)
-    np.add.at(change, i, v * d[j])
-    assert_allclose(load.force(u + d) - load.force(u), change, atol=1e-13)
-    # follows the body
-    w = moved(beam, u, 1.1, np.array([5.0, 4.0]))
-    assert_allclose(load.force(w), turn(load.force(u), 1.1), atol=1e-13)
-
-
 @pytest.mark.parametrize("end", ["left", "right"])
 @pytest.mark.parametrize("element", SHAPES)
 @pytest.mark.parametrize("body", BODIES)
@@ -445,23 +361,6 @@ def test_end_moment(body, element, end):
     assert np.abs(K - K.T).max() < 1e-15 * np.abs(K).max()
 
 
-@pytest.mark.parametrize("element", SHAPES)
-@pytest.mark.parametrize("body", ["unequal", "arc"])
-def test_end_moment_is_that_of_a_linear_traction(body, element):
-    """On the undeformed section: a traction 12 M Y / (b h^3) along the axis, against Y."""
-    beam = make(body, element)
-    h, node = beam.mesh.height, node_of(beam.mesh, "right")
-    at, e1, e2 = beam.mesh.p[:, node], beam.mesh.p_X[:, node], beam.mesh.p_Y[:, node]
-
-    def traction(x):
-        Y = e2[0] * (x[0] - at[0]) + e2[1] * (x[1] - at[1])
-        return -12 * 1.3 * Y / (WIDTH * h**3) * e1[:, None, None]
-
-    f = asm(forms.traction(traction, WIDTH), beam.facet_basis("right"))
-    moment = EndMoment(np.array([node]), 1.3).bind(beam)
-    assert_allclose(moment.force(np.zeros(beam.N)), f, atol=1e-12)
-
-
 def test_end_moment_counts_whole_turns():
     """A beam rolled up k times: the potential is -M times the whole angle."""
     mesh = MeshBeam.init_line(np.linspace(0, 1, 33), 0.01)
@@ -475,12 +374,3 @@ def test_end_moment_counts_whole_turns():
         q[:, 2:] = np.array([-s, c]).T[:, None]
         load = EndMoment("right", 2.0).bind(beam)
         assert abs(load.potential(q.ravel() - beam.q0) + 4 * np.pi * turns) < 1e-12
-
-
-def test_loads_without_potential_say_so():
-    beam = make("straight")
-    u = deformed(beam)
-    assert Pressure("top", 1.0).bind(beam).potential(u) is None
-    assert DeadLoad(beam, np.ones(beam.N)).potential(u) == -u.sum()
-    with pytest.raises(ValueError, match="NaN"):
-        DeadLoad(beam, np.full(beam.N, np.nan))

@@ -82,18 +82,6 @@ def test_own_forms_are_derivatives_of_the_energy():
     assert close((f[0] - f[1]) / (2 * eps), asm(own.tangent, basis, r=q) @ dq, 1e-7)
 
 
-@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(3)])
-def test_parts_of_a_beam_add_up(element):
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), element, LAWS["svk"], 0.4)
-    own, q = forms.of(beam), coordinates(beam)
-    basis = Basis(beam.mesh, ElementVector(element))
-    parts = [basis.with_elements([0, 2]), basis.with_elements([1, 3])]
-    for form in own:
-        whole = asm(form, basis, r=q)
-        assert abs(sum(asm(form, part, r=q) for part in parts) - whole).max() <= 1e-13 * np.max(
-            np.abs(whole))
-
-
 def test_newton_with_the_default_formulation_in_stock_scikit_fem():
     """Own Newton, stock condense and solve: the tip of the scene, to the tolerance of both."""
     mesh, element = MeshBeam.init_line(np.linspace(0, 1, 9), 0.05), ElementBeamANCF(3)

@@ -1,25 +1,17 @@
 """Frames whose lines are condensed to their nodes, against welded beams and closed forms."""
 
-import pickle
-import tracemalloc
 
 import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
-from test_sections import axis_tip, plane
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
-                        KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff)
-from skfem_ancf.equations import mass_solver, strain_tangent as tangent
-from skfem_ancf.equations.condensation import Condensed
-from skfem_ancf.dynamics import EnergyMomentum
-from skfem_ancf.dynamics import integrate
-from skfem_ancf.dynamics.integrator import Integrator
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
                                     SupportError)
-from skfem_ancf.equations.linear_solver import LinearSolver
+from skfem_ancf.equations import mass_solver
 
 E, H = 2e11, 0.02
 STEEL = StVenantKirchhoff(E, 0.3, density=7800.0)
@@ -129,108 +121,6 @@ def test_a_frame_is_that_of_welded_beams(element, elements):
     assert np.abs(expected).max() > 0.02
     assert_allclose(at_nodes(frame, state), expected, rtol=0, atol=1e-8)
     assert state.strain_energy == pytest.approx(other.strain_energy, rel=1e-8)
-
-
-def test_the_clamp_of_a_frame_lets_a_face_change_its_thickness():
-    """As a weld to the ground; a face that is held is stiffer, as in the plane: there L/h = 10."""
-    element, law, force = ElementBeamANCFCubic(2), STEEL.replace(E=2e8), (0.0, -1e-3)
-    _, basis, u = plane([(-0.05, 0.05, law, 0.1)], 1.0, force, (200, 8))
-    exact = axis_tip(basis, u, 1.0)[1]
-    frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=law, height=0.1, width=0.1,
-                             element=element, elements=32).clamp(0).point_force(force, at=1)
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 33), 0.1), element, law, 0.1)
-    weld, held = Scene(beam), Scene(beam).clamp("left")
-    weld.joint("weld", beams=("ground", 0), at=((0.0, 0.0), "left"))
-    tips = [scene.solve_linear().displacement((1.0, 0.0))[1] / exact - 1 for scene in (
-        frame, weld.point_force(force, at=(1, 0)), held.point_force(force, at=(1, 0)))]
-    assert tips[0] == pytest.approx(tips[1], abs=1e-9)
-    assert 2e-3 < tips[0] < 3e-3 and abs(tips[2]) < 1e-3
-
-
-def test_the_condensed_solution_solves_the_equations_with_multipliers():
-    """At a state in which the joints are closed, hinges and all: by the whole matrix."""
-    frame = Frame.from_lines([*PORTAL[0], (2, 1.2)], [*PORTAL[1], (2, 4), (0, 2)], elements=2,
-                             hinges=[(3, 2), (4, 0)], material=STEEL, height=H, width=H)
-    frame.clamp([0, 3]).pin(4).point_force((400.0, -300.0), at=1)
-    state, equations = frame.solve_static(tol=1e-12), frame.system
-    solver, joints = equations.solver, equations.constraints
-    assert isinstance(solver.condensed, Condensed)
-    rng = np.random.default_rng(0)
-    b, c = rng.standard_normal(equations.N), 1e-4 * rng.standard_normal(joints.m)
-    equations.assemble(state.u)
-    K = equations.K.tocsc().toarray()
-    K += joints.curvature(state.u, 1.0, state.multipliers).toarray()
-    J = joints.jacobian(state.u, 1.0).toarray()
-    d = np.append(1 / np.sqrt(np.abs(K.diagonal())), np.full(joints.m, 1.0))
-    whole = np.block([[K, J.T], [J, np.zeros((joints.m, joints.m))]]) * d * d[:, None]
-    exact = d * np.linalg.solve(whole, d * np.append(b, c))
-    solver.factorize(state.u, 1.0, state.multipliers)
-    x, multipliers = solver.solve(b, c)
-    error = (np.append(x, multipliers) - exact) / d
-    assert np.abs(error).max() < 1e-8 * np.abs(exact / d).max()
-    columns = solver.condensed.solve(np.outer(b, [2.0, -1.0, 0.0]), np.outer(c, [2.0, 3.0, 1.0]))
-    both, alone = solver.condensed.solve(b, 0.0 * c), solver.condensed.solve(0.0 * b, c)
-    for found, of_b, of_c in zip(columns, both, alone):
-        for column, factors in zip(found.T, ((2.0, 2.0), (-1.0, 3.0), (0.0, 1.0))):
-            wanted = factors[0] * of_b + factors[1] * of_c
-            assert_allclose(column, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
-    negative, singular = solver.inertia()
-    null = np.linalg.svd(J)[2][len(J):].T
-    assert (negative, singular) == (np.sum(np.linalg.eigvalsh(null.T @ K @ null) < 0), False)
-
-
-@pytest.mark.parametrize("slenderness", [1e2, 1e3, 1e4, 1e5])
-@pytest.mark.parametrize("elements", [1, 4])
-def test_few_iterations_at_every_slenderness(slenderness, elements):
-    h = 1.0 / slenderness  # E I and the mass are kept
-    soft = StVenantKirchhoff(2e8 * (0.01 / h) ** 3, 0.3, density=7800.0)
-    frame = portal(material=soft, height=h, width=0.01, elements=elements)
-    state = frame.point_force((0.3, -0.2), at=1).solve_static()
-    # at 1e5 round-off asks for one more with some versions of SciPy
-    assert state.iterations <= (8 if slenderness < 1e5 else 11)
-    assert len(state.steps) == 1 and state.stability == "stable"
-    assert state.displacement((0.0, 1.0))[0] == pytest.approx(0.115804, rel=1e-4)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_any_frame_is_that_with_multipliers_as_unknowns(seed, monkeypatch):
-    """Lines at any angles, in groups of several elements, hinged here and there."""
-    rng = np.random.default_rng(seed)
-    points = np.array(np.divmod(np.arange(9), 3)[::-1]) + 0.2 * rng.uniform(-1, 1, (2, 9))
-    lines = [(i, j) for i in range(9) for j in range(i + 1, 9)
-             if (j == i + 1 and j % 3) or j == i + 3 or (j == i + 4 and rng.random() < 0.3)]
-    lines = [lines[k][::rng.choice([1, -1])] for k in rng.permutation(len(lines))]
-    n = len(lines)
-    hinges = [(k, lines[k][rng.integers(2)]) for k in rng.choice(n, 3, replace=False)]
-    options = {"groups": {"a": range(0, n, 3)}, "sections": {"a": {
-        "height": 0.03, "element": [ElementBeamCable(3), ElementBeamANCF(2)][seed % 2]}},
-        "elements": rng.integers(1, 4, n), "hinges": hinges}
-    found = []
-    for condensed in (LinearSolver.condensed, None):
-        monkeypatch.setattr(LinearSolver, "condensed", condensed)
-        frame = Frame.from_lines(points.T, lines, height=H, width=H, material=STEEL, **options)
-        frame.clamp([0, 1]).pin(2).point_force((300.0, -500.0), at=[6, 8]).moment(7, 40.0)
-        state = frame.line_load((0, -200.0), beam="a").solve_static(tol=1e-11)
-        found.append((state, state.reactions([0, 1, 2])))
-    (a, p), (b, q) = found
-    assert np.abs(a.u).max() > 1e-3 and a.stability == b.stability
-    assert_allclose(a.displacement(points), b.displacement(points), rtol=0, atol=1e-9)
-    assert_allclose(a.multipliers, b.multipliers, atol=1e-6 * np.abs(b.multipliers).max(), rtol=0)
-    assert_allclose([*p.force, p.moment], [*q.force, q.moment], rtol=1e-6)
-
-
-def test_reactions_hold_the_loads():
-    frame = portal().point_force((200.0, -100.0), at=1).moment(2, 30.0).gravity((0, -9.81))
-    state = frame.solve_static(tol=1e-11)
-    total = state.reactions("ground")
-    assert_allclose(total.force, [-200.0, 100.0 + 9.81 * frame.beams[0].total_mass], rtol=1e-7)
-    left, right = state.reactions(0), state.reactions(3)
-    assert_allclose(total.force, left.force + right.force, rtol=1e-12)
-    assert total.moment == pytest.approx(
-        left.moment + right.moment + right.force[1], rel=1e-9)  # the arm is 1
-    assert set(left.coordinates) == {"x", "y", "angle"}
-    assert left.moment == pytest.approx(left.coordinates["angle"])
-    assert state.reactions(1).force.tolist() == [0.0, 0.0]
 
 
 def test_a_truss_has_no_moments_and_the_forces_of_its_bars():
@@ -358,71 +248,6 @@ def test_a_portal_frame_buckles_sideways():
     assert frame.buckling(1).factors[0] / (E * h**4 / 12) == pytest.approx(exact, rel=1e-4)
 
 
-def test_modes_and_buckling_of_many_lines_are_those_with_multipliers(monkeypatch):
-    frame = square(5).point_force((5.0, -20.0), at="side")
-    state = frame.solve_static()
-    found = []
-    for few in (tangent.FEW, 10**6):
-        monkeypatch.setattr(tangent, "FEW", few)
-        found.append([*frame.modes(3, state).frequencies, *frame.buckling(2).factors])
-    assert frame.layout.N > 600
-    assert_allclose(found[0], found[1], rtol=1e-8)
-
-
-def test_modes_of_a_frame_factorise_twice(monkeypatch):
-    """For the inverse, and to count; what Lanczos has found is solved with at once."""
-    frame, factors, solutions = square(6), [], []
-    factorize, solve = Condensed.factorize, Condensed.solve
-
-    def factorized(self, *args):
-        factors.append(self)
-        return factorize(self, *args)
-
-    def solved(self, b, phi):
-        solutions.append(b[:1].size)
-        return solve(self, b, phi)
-
-    monkeypatch.setattr(Condensed, "factorize", factorized)
-    monkeypatch.setattr(Condensed, "solve", solved)
-    modes, mass = frame.modes(10), frame.system.mass.tocsc()
-    assert frame.layout.N > 600 and len(factors) == 2
-    assert solutions.count(10) == 2 and 20 < solutions.count(1) == len(solutions) - 2 < 60
-    assert mass.nnz == np.count_nonzero(mass.toarray()) < 0.3 * 23 * frame.layout.N
-    assert_allclose(modes.shapes @ (mass @ modes.shapes.T), np.eye(10), atol=1e-10)
-
-
-@pytest.mark.parametrize("k, factorisations", [(5, 2), (12, 3), (65, 4)])
-def test_equal_frames_side_by_side_have_equal_frequencies(k, factorisations, monkeypatch):
-    """Of equal frequencies the iteration sees a few: the others are counted and found."""
-    n, calls, factorize = 60, [], Condensed.factorize
-
-    def factorized(self, *args):
-        calls.append(self)
-        return factorize(self, *args)
-
-    monkeypatch.setattr(Condensed, "factorize", factorized)
-    points = [(float(i), y) for i in range(n) for y in (0.0, 1.0)]
-    frame = Frame.from_lines(points, [(2 * i, 2 * i + 1) for i in range(n)], height=H, width=H,
-                             material=STEEL).clamp(list(range(0, 2 * n, 2)))
-    modes = frame.modes(k)
-    assert 2 <= len(calls) <= factorisations  # round-off may show more of them at once
-    alone = Frame.from_lines(points[:2], [(0, 1)], height=H, width=H, material=STEEL).clamp(0)
-    assert_allclose(modes.frequencies, np.repeat(alone.modes(2).frequencies, n)[:k], rtol=1e-10)
-    found = modes.shapes @ (frame.system.mass.tocsc() @ modes.shapes.T)
-    assert_allclose(found, np.eye(k), atol=1e-8)
-
-
-def test_a_small_frame_moves_with_its_multipliers():
-    """A portal that is let go swings with its first frequency, and keeps its energy."""
-    frame = portal(height=1e-2, width=1e-2).point_force((1e-2, 0.0), at=1, amplitude=lambda t: 0.0)
-    period = 2 * np.pi / frame.modes(1).frequencies[0]
-    history = frame.integrate(period, period / 100, start=frame.solve_static())
-    x = history.displacement((0.0, 1.0))[:, 0]
-    assert_allclose([x[50], x[100]], [-x[0], x[0]], rtol=0.02)  # it has other motions, too
-    energy = history.strain_energy + history.kinetic_energy
-    assert np.ptp(energy) < 1e-9 * energy[0]
-
-
 def swinging(eliminated, monkeypatch, scheme, n=60, dt=1e-3, **options):
     """A frame of two times two cells, two hinged ends in it, after a step load."""
     monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
@@ -446,25 +271,6 @@ def test_motion_by_elimination_is_that_by_multipliers(scheme, error, monkeypatch
         assert np.ptp(ours.total_energy[1:]) < 1e-10 * ours.kinetic_energy.max()
 
 
-def test_a_start_by_elimination_makes_factors_once(monkeypatch):
-    """For velocities and accelerations; each start is as if there had been none before."""
-    def factorized(self, *args):
-        calls.append(len(args))
-        return factorize(self, *args)
-
-    calls, factorize = [], Condensed.factorize
-    monkeypatch.setattr(Condensed, "factorize", factorized)
-    monkeypatch.setattr(mass_solver, "MANY", 0)
-    made = square(2).point_force((3000.0, 0), at="side").system
-    integrator = Integrator(made, EnergyMomentum())
-    first, _, second = (integrator.start(np.zeros(made.N), np.full(made.N, v), 0.0, 1e-3)
-                        for v in (0.0, 0.1, 0.0))
-    assert made.mass_solver.by_nodes and len(calls) == 3
-    assert np.abs(first.acceleration).max() > 0.0
-    assert np.array_equal(first.acceleration, second.acceleration)
-    assert np.array_equal(first.multipliers, second.multipliers)
-
-
 def test_a_frame_swings_in_its_first_mode(monkeypatch):
     monkeypatch.setattr(mass_solver, "MANY", 0)
     frame = square(4)
@@ -477,51 +283,11 @@ def test_a_frame_swings_in_its_first_mode(monkeypatch):
     assert np.ptp(history.total_energy) < 1e-9 * history.total_energy[0]
 
 
-@pytest.mark.parametrize("change", ["damping", "pressure", "auto"])
-def test_what_else_acts_in_a_motion_by_elimination(change, monkeypatch):
-    """A damped material, a load without potential, steps of automatic size."""
-    dt = "auto" if change == "auto" else 2e-3
-    histories = []
-    for eliminated in (True, False):
-        options = {"damping": KelvinVoigt(1e-3)} if change == "damping" else {}
-        frame = square(2, **options).point_force((100.0, 0), at="side")
-        if change == "pressure":
-            frame.pressure("top", 50.0)
-        monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
-        histories.append(frame.integrate(0.02, dt, rtol=1e-3))
-    ours, dense = histories
-    if change == "auto":
-        assert abs(len(ours.t) / len(dense.t) - 1.0) < 0.1
-    assert_allclose(ours.u[-1], dense.u[-1], rtol=0,
-                    atol=(1e-3 if change == "auto" else 1e-9) * np.abs(dense.u).max())
-    assert np.ptp(ours.total_energy + ours.dissipated) < 1e-9 * dense.kinetic_energy.max() or (
-        change == "pressure")
-
-
 def test_a_motion_by_elimination_goes_on_from_its_checkpoint(monkeypatch, tmp_path):
     whole = swinging(True, monkeypatch, "energy-momentum", n=12, checkpoint=tmp_path / "a.npz",
                      every=5)
     frame = square(2, hinges=[(0, 3), (7, 4)]).point_force((3000.0, 0), at="side")
     assert np.array_equal(frame.resume(tmp_path / "a.npz").u, whole.u)
-
-
-def test_memory_of_a_motion_is_that_of_sparse_matrices():
-    """Dense ones of 1,806 equations by 4,872 coordinates took 211 MB."""
-    frame = square(14).point_force((30.0, 0), at="side")
-    assert "LDL^T" in frame.plan("dynamic")["linear solver"].reason
-    tracemalloc.start()
-    try:
-        history = frame.integrate(3e-3, 1e-3, t_eval=[3e-3])
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak < 60e6 and history.factorizations == 1
-
-
-def test_a_motion_of_too_many_multipliers_is_refused(monkeypatch):
-    monkeypatch.setattr(integrate, "LARGEST", 1e-6)
-    with pytest.raises(InputError, match=r"12 equations of joints.*scene.modes\(k\)"):
-        portal().integrate(1.0, 0.1)
 
 
 # settlements
@@ -552,52 +318,6 @@ def test_supports_that_are_moved_as_a_rigid_body_strain_nothing():
     assert state.strain_energy < 1e-12 * EI
     assert_allclose(frame.rotations(state), a, atol=1e-8)
     assert_allclose(state.reactions("ground").force, 0.0, atol=1e-4)
-
-
-def test_a_large_settlement_is_that_of_joints():
-    """A cantilever whose end is carried and turned, beside joints that prescribe it."""
-    girder = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], elements=6, material=STEEL, height=H,
-                              width=H).clamp(0).settle(1, x=-0.3, y=0.2, angle=1.5)
-    state = girder.solve_static()
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 7), H), ElementBeamCable(5), STEEL, width=H)
-    scene = Scene(beam).clamp("left", thickness="free")
-    scene.joint("position", at=(1, 0), r=lambda t: (1.0 - 0.3 * t, 0.2 * t))
-    scene.joint("angle", at="right", angle=lambda t: 1.5 * t)
-    other = scene.solve_static()
-    assert_allclose(state.displacement((0.5, 0)), other.displacement((0.5, 0)), atol=1e-9)
-    assert_allclose(state.strain_energy, other.strain_energy, rtol=1e-8)
-    work, d = state.reactions(1), 1e-6  # the work of the support is the energy
-    more = girder.settle(1, angle=1.5 + d).solve_static().strain_energy
-    assert_allclose(work.moment, (more - state.strain_energy) / d, rtol=1e-4)
-
-
-@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
-def test_supports_that_shake(scheme, monkeypatch):
-    """Of nodes eliminated, and by multipliers: a support moves and turns, the other shakes."""
-    histories = []
-    for eliminated in (True, False):
-        monkeypatch.setattr(mass_solver, "MANY", 0 if eliminated else 10**9)
-        frame = portal().settle(0, x=lambda t: 0.02 * np.sin(40 * t) ** 2,
-                                angle=lambda t: 0.3 * np.sin(20 * t) ** 2)
-        frame.settle(3, y=lambda t: 0.01 * (1 - np.cos(30 * t)))
-        histories.append(frame.integrate(0.05, 1e-3, scheme=scheme))
-    ours, dense = histories
-    assert np.abs(dense.u).max() > 0.1
-    assert_allclose(ours.u, dense.u, rtol=0, atol=1e-6)
-    x = ours.displacement((0, 0))
-    assert_allclose(x[:, 0], 0.02 * np.sin(40 * ours.t) ** 2, atol=1e-11)
-    turns = [frame.rotations(ours.state(k))[0] for k in (10, 30)]
-    assert_allclose(turns, 0.3 * np.sin(20 * ours.t[[10, 30]]) ** 2, atol=1e-9)
-
-
-@pytest.mark.parametrize("angle", [0.3, lambda t: 0.3 * t])
-def test_tables_of_settled_supports_are_as_compiled_code_takes_them(angle):
-    """Contiguous and writeable: others would be compiled for anew, or read as if they were."""
-    system = portal().settle(0, angle=angle).system
-    tables = system.machine.tables
-    for times in np.ones(1), np.linspace(0, 1, 3):
-        for table, turns in (tables.offsets(times), True), (tables.slopes(times), tables.turns):
-            assert table.flags.carray and len(table) == (len(times) if turns else 1)
 
 
 def test_settlements_that_cannot_be():
@@ -715,67 +435,6 @@ def test_a_tapered_cantilever_of_few_elements(elements, error):
     assert frame.solve_linear().displacement((1, 0))[1] == pytest.approx(-tip, rel=error)
 
 
-def wide(x, y):
-    return 0.01 + 0.02 * x + 0.1 * y
-
-
-LAYERS = Section.layers((0.002, STEEL), (None, STEEL.replace(E=7e10)), width=wide)
-PROFILE = Section.profile("I", width=0.03, web=0.004, flange=0.003)
-
-
-@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)])
-def test_a_tapered_frame_of_any_section_is_that_of_welded_beams(element):
-    """Profiles, layers and graded moduli by group, large displacements, heat."""
-    graded = STEEL.replace(E=Graded())
-    given = {"columns": {"height": slim, "section": PROFILE, "material": STEEL},
-             "girder": {"height": [haunch], "section": LAYERS},
-             "brace": {"height": 0.01, "width": 0.01, "material": graded}}
-    points, lines = [*PORTAL[0], (0.5, 0.6)], [*PORTAL[1], (1, 4)]
-    frame = Frame.from_lines(points, lines, groups={"columns": [0, 2], "girder": [1], "brace": [
-        3]}, elements=4, element=element, sections=given, nodes={"ground": [0, 3]})
-    frame.clamp("ground").point_force((1500.0, -300.0), at=1).point_force((0, -5), at=4)
-    frame.eigenstrain(xx=Graded(1e-3), beam="columns")
-    beams = []
-    for (i, j), name in zip(lines, ("columns", "girder", "columns", "brace")):
-        a, d = frame.points[:, i], frame.points[:, j] - frame.points[:, i]
-        options = dict(given[name])
-        height = options.pop("height")
-        mesh = MeshBeam.init_curve(lambda s, a=a, d=d: a[:, None] + d[:, None] * s, np.linspace(
-            0, 1, 5), height[0] if name == "girder" else height)
-        beams.append(Beam(mesh, element, **options))
-    scene = Scene(*beams)
-    for pair, at in ((("ground", 0), ((0.0, 0.0), "left")), ((0, 1), ("right", "left")),
-                     ((1, 2), ("right", "left")), (("ground", 2), ((1.0, 0.0), "right")),
-                     ((1, 3), ("left", "left"))):
-        scene.joint("weld", beams=pair, at=at)
-    for k in (0, 2):
-        scene.eigenstrain(xx=Graded(1e-3), beam=k)
-    scene.point_force((1500.0, -300.0), at=(0.0, 1.0), beam=0)
-    scene.point_force((0, -5), at=(0.5, 0.6), beam=3)
-    state, other = (s.solve_static(tol=1e-10) for s in (frame, scene))
-    assert isinstance(frame.system.solver.condensed, Condensed)
-    assert state.recovered == dict.fromkeys(
-        ("columns", "girder", "brace"), "")
-    assert np.abs(state.displacement((0, 1))).max() > 0.02
-    for x, beam, k in (((0, 1), "columns", 0), ((1, 1), "columns", 2), ((0.4, 1), "girder", 1)):
-        assert_allclose(state.displacement(x, beam=beam), other.displacement(x, beam=k),
-                        rtol=0, atol=1e-8)
-    x = (0.4, 1.004)
-    assert_allclose(state.stress(x, beam="girder"), other.stress(x, beam=1), rtol=1e-6, atol=1e3)
-    again = pickle.loads(pickle.dumps(frame))
-    assert np.array_equal(again.solve_static(tol=1e-10).u, state.u)
-
-
-class Graded:
-    """A function of the own parameter of a line."""
-
-    def __init__(self, size=E):
-        self.size = size
-
-    def __call__(self, x, y):
-        return self.size * (1.0 + 0.5 * x)
-
-
 def test_refined_tapers_have_the_heights_of_their_functions():
     def height(s):
         return 0.02 + 0.01 * np.sin(3.0 * s)
@@ -807,18 +466,6 @@ def test_heights_that_cannot_be(height, error, message):
 # its parts
 
 
-def test_groups_are_beams_with_sections_of_their_own():
-    sections = {"girder": {"height": 0.04}, "columns": {"element": ElementBeamANCF(2)}}
-    frame = portal(groups={"columns": [0, 2], "girder": [1]}, sections=sections)
-    assert [beam.name for beam in frame.beams] == ["columns", "girder"]
-    assert frame.beam("girder").mesh.height == 0.04
-    state = frame.line_load((0, -1e3), beam="girder").solve_static()
-    assert state.reactions("ground").force[1] == pytest.approx(1e3, rel=1e-7)
-    section = Section.profile("I", width=0.05, web=0.005, flange=0.008)
-    other = portal(height=0.1, width=None, section=section)
-    assert other.beams[0].section is section
-
-
 def test_a_frame_of_meshio(tmp_path):
     points = [[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0], [0.5, 1.1, 0], [9, 9, 9]]
     mesh = meshio.Mesh(points, [("vertex", [[0], [3]]), ("line", [[0, 1], [2, 3]]),
@@ -843,26 +490,6 @@ def test_a_frame_of_meshio(tmp_path):
                     frame.point_force(**force).solve_static().u, atol=1e-12)
 
 
-def test_a_frame_of_a_vtu_file(tmp_path):
-    """Names of cells are numbers there, as meshio writes them."""
-    mesh = meshio.Mesh(np.pad(np.array(PORTAL[0], float), ((0, 0), (0, 1))),
-                       [("line", PORTAL[1])], cell_sets={"columns": [[0, 2]], "girder": [[1]]})
-    mesh.write(tmp_path / "portal.vtu")
-    for options in ({"groups": ["columns", "girder"]}, {"sections": {"columns": {"height": H}}}):
-        frame = Frame.from_meshio(tmp_path / "portal.vtu", material=STEEL, height=H, width=H,
-                                  **options)
-        assert [(beam.name, beam.mesh.nelements) for beam in frame.beams] == [("columns", 2),
-                                                                              ("girder", 1)]
-
-
-def test_a_frame_is_pickled_and_copied():
-    frame = portal().point_force((100.0, 0), at=1)
-    state = frame.solve_static()
-    again = pickle.loads(pickle.dumps(frame))
-    assert_allclose(again.solve_static().u, state.u, atol=1e-15)
-    assert isinstance(again, Frame) and again.nodes("corners").tolist() == [1, 2]
-
-
 def test_springs_and_other_joints_belong_to_it_too():
     """A torsional spring, and what couples more than the nodes: a joint of a scene."""
     k = 5.0
@@ -877,20 +504,6 @@ def test_springs_and_other_joints_belong_to_it_too():
     state = held.moment(1, 1.0).solve_linear()
     assert held.system.solver.condensed is None
     assert held.rotations(state)[1] == pytest.approx(1 / (4 * EI), rel=1e-9)
-
-
-def test_memory_is_linear():
-    """Bytes of a solution for each line do not grow with the frame."""
-    used = []
-    for n in (8, 16):
-        frame = square(n).point_force((10.0, 0), at="side")
-        tracemalloc.start()
-        try:
-            frame.solve_static()
-            used.append(tracemalloc.get_traced_memory()[1] / frame.net.lines.shape[1])
-        finally:
-            tracemalloc.stop()
-    assert used[1] < 1.3 * used[0]
 
 
 # what is refused
@@ -921,31 +534,6 @@ def test_memory_is_linear():
 def test_lines_that_make_no_frame(points, lines, options, error, message):
     with pytest.raises(error, match=message):
         Frame.from_lines(points, lines, **{"material": STEEL, "height": H, "width": H, **options})
-
-
-@pytest.mark.parametrize("points, lines", [
-    ([(0, 0), (2, 1)], [(0, 1)]), ([(0, 0), (2, 0), (0, 1), (2, 1)], [(0, 1), (2, 3)]), PORTAL])
-def test_rows_of_arrays_are_points_and_lines_as_in_lists(points, lines):
-    options = {"material": STEEL, "height": H, "width": H}
-    a = Frame.from_lines(points, lines, **options)
-    for b in (Frame.from_lines(np.array(points), np.array(lines), **options),
-              Frame.from_lines(np.array(points, dtype=float), lines, **options),
-              Frame.from_lines(points, np.array(lines), **options)):
-        assert b.points.T.tolist() == a.points.T.tolist() == [list(map(float, p)) for p in points]
-        assert b.net.lines.T.tolist() == a.net.lines.T.tolist() == [list(pair) for pair in lines]
-        assert_allclose(b.beams[0].mesh.p, a.beams[0].mesh.p, rtol=0, atol=1e-12)
-
-
-def test_rows_of_arrays_are_hinges_nodes_and_places():
-    options = {"material": STEEL, "height": H, "width": H}
-    pairs = [(0, 1), (1, 2)]
-    tips = []
-    for hinges in (pairs, [list(pair) for pair in pairs], np.array(pairs)):
-        frame = Frame.from_lines(*PORTAL, hinges=hinges, **options).clamp([0, 3])
-        tips.append(frame.point_force((100.0, 0.0), at=1).solve_static().displacement((0, 1)))
-    assert_allclose(tips, [tips[0]] * 3, rtol=1e-9)
-    assert frame.nodes(np.array(PORTAL[0])[[0, 3]]).tolist() == [0, 3]
-    assert frame.nodes(np.array(PORTAL[0], dtype=float)[[2, 1]]).tolist() == [1, 2]
 
 
 def test_what_is_not_held_is_said():
@@ -985,37 +573,3 @@ def test_what_is_not_held_is_said():
 def test_calls_that_mean_nothing(call, error, message):
     with pytest.raises(error, match=message):
         call(portal())
-
-
-def test_the_mesh_of_a_frame_is_loaded_as_what_it_was(tmp_path):
-    frame = portal(height=[lambda s: 0.02 + 0.01 * s, 0.02, 0.03], elements=3)
-    mesh, path = frame.beams[0].mesh, tmp_path / "mesh.npz"
-    mesh.save(path)
-    again = MeshBeam.load(path)
-    assert type(again) is type(mesh) is not MeshBeam
-    assert_allclose(again.parameters, mesh.parameters, rtol=0, atol=1e-15)
-    assert_allclose(again.heights, mesh.heights, rtol=1e-15)
-    plain = MeshBeam.init_line([0.0, 1.0], 0.1)
-    plain.save(path)
-    assert type(MeshBeam.load(path)) is MeshBeam
-    with np.load(path) as file:
-        data = dict(file)
-    np.savez(path, **{**data, "kind": "shell"})
-    with pytest.raises(MeshError, match="'shell' is not known, only .'beam', 'lines'."):
-        MeshBeam.load(path)
-    del data["kind"]  # as of files that were written before
-    np.savez(path, **data)
-    assert type(MeshBeam.load(path)) is MeshBeam
-
-
-@pytest.mark.parametrize("force", [1e-7, 1.0, 300.0])
-def test_a_branch_without_load_is_said_to_have_none(force):
-    soft = StVenantKirchhoff(2e8, 0.3, 7800.0)
-    frame = Frame.from_lines([(0, 0), (0, 1), (1, 1), (0, 2), (1, 2.5)],
-                             [(0, 1), (1, 2), (1, 3), (3, 4)], elements=2, height=0.05, width=0.05,
-                             groups={"main": [0, 1], "branch": [2, 3]}, material=soft,
-                             sections={"main": {"width": 0.05}, "branch": {"width": 0.04}})
-    state = frame.clamp((0, 0)).point_force((0, -force), at=(1, 1)).solve_static()
-    assert state.recovered == {"main": "", "branch": "the beam carries no load"}
-    loaded, free = (np.max(np.abs(state.stress([x]))) for x in ((0.0, 0.5), (0.0, 1.5)))
-    assert free < 1e-6 and loaded > 100.0 * force

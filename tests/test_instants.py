@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        Scene, StVenantKirchhoff)
 from skfem_ancf.recovery.section_forces import SectionForces
 
 pytestmark = pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # few elements
@@ -52,12 +52,6 @@ def test_fields_are_recovered_when_they_are_asked_for(monkeypatch, tmp_path):
     assert len(made) == len(history)
     first = history.states([3, 5])
     assert [s.t for s in first] == [history.t[3], history.t[5]]
-
-
-def test_files_of_a_motion_have_two_names(tmp_path):
-    history = Scene(line(ElementBeamCable(5))).pin("left").gravity((0, -9.81)).integrate(1e-3, 1e-3)
-    with pytest.raises(InputError, match=r"must end with one of \.pvd, \.vtkhdf"):
-        history.save(tmp_path / "run.vtu")
 
 
 @pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=repr)

@@ -5,15 +5,13 @@ import xml.etree.ElementTree as ET
 import meshio
 import numpy as np
 import pytest
+from conftest import quarter_arc
 from numpy.testing import assert_allclose, assert_array_equal
 
-from conftest import quarter_arc, s_curve
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, InputError, MeshBeam, NeoHookean, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam,
+                        NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.io import PvdWriter, body_fields, save_vtu
-from skfem_ancf.recovery.grids import grid, lagrange_cell
-from skfem_ancf.materials import Material
+from skfem_ancf.recovery.grids import grid
 from skfem_ancf.results.state import State
 
 FIELDS = {f"{a}_{k}" for a in ("eps", "S", "sigma") for k in ("xx", "yy", "xy")} | {"displacement"}
@@ -60,19 +58,6 @@ def test_file_holds_the_fields_of_the_state(state, tmp_path):
             assert_allclose(m.point_data["S_" + name][k], stress[i], rtol=1e-9, atol=1e-4)
 
 
-def test_quads_are_counterclockwise_and_cover_the_body(state):
-    body = body_fields(state, subdivide=(40, 20))
-    x = body.points[body.cells[0][1]][..., :2]
-    d = x - np.roll(x, 1, axis=1)
-    corner = d[..., 0] * np.roll(d, -1, axis=1)[..., 1] - d[..., 1] * np.roll(d, -1, axis=1)[..., 0]
-    assert np.all(corner > 0)
-    area = 0.5 * np.sum(x[..., 0] * np.roll(x, -1, axis=1)[..., 1]
-                        - x[..., 1] * np.roll(x, -1, axis=1)[..., 0])
-    basis = state.beams[0].exact_basis()
-    F = basis.interpolate(state.q).grad
-    assert_allclose(area, np.sum((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * basis.dx), rtol=1e-3)
-
-
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
 def test_cauchy_stress_of_a_stretched_and_turned_bar(plane, angle):
@@ -97,48 +82,7 @@ def test_cauchy_stress_of_a_stretched_and_turned_bar(plane, angle):
     assert_allclose(data["eps_yy"], strain[1], atol=1e-13)
 
 
-def test_shear_strain_is_the_tensor_component():
-    beam = Beam(MeshBeam.init_line([0, 1], height=1), ElementBeamANCF(1),
-                StVenantKirchhoff(E=1.0, nu=0.3), 1.0)
-    data = body_fields(affine(beam, [[1, 0.2], [0, 1]])).point_data
-    assert_allclose(data["eps_xy"], 0.1, atol=1e-14)
-
-
-@pytest.mark.parametrize("angle", [0.0, 1.0, np.pi])
-def test_a_turned_curved_beam_has_no_strain_and_no_stress(angle):
-    beam = Beam(s_curve(), ElementBeamANCF(4), NeoHookean(E=1.0, nu=0.3), 1.0)
-    data = body_fields(affine(beam, turn(angle))).point_data
-    assert max(abs(v).max() for k, v in data.items() if k != "displacement") < 1e-12
-
-
-def test_no_thickness_left_is_nan_without_a_warning():
-    beam = Beam(MeshBeam.init_line([0, 1], height=1), ElementBeamANCF(1),
-                StVenantKirchhoff(E=1.0, nu=0.3), 1.0)
-    data = body_fields(affine(beam, [[3, 0], [0, 3]])).point_data
-    assert np.all(np.isnan(data["sigma_xx"])) and np.all(np.isfinite(data["S_xx"]))
-
-
 # Lagrange cells
-
-@pytest.mark.parametrize("order", [1, 3, 4, 10])
-def test_lagrange_cells_are_the_exact_body(order, tmp_path):
-    state = bent(ElementBeamANCF(order), quarter_arc())
-    beam = state.beams[0]
-    m = meshio.read(state.save(tmp_path / "arc.vtu", lagrange=True))
-    p = max(3, order)
-    assert [c.type for c in m.cells] == ["VTK_LAGRANGE_QUADRILATERAL"]
-    assert m.cells[0].data.shape == (beam.mesh.nelements, (p + 1) ** 2)
-    X, cell = lagrange_cell(beam)
-    powers = [(i, j) for i in range(p + 1) for j in range(p + 1)]
-
-    def monomials(X):
-        return np.array([(2 * X[0] - 1) ** i * (2 * X[1] - 1) ** j for i, j in powers])
-
-    Y = np.random.default_rng(1).random((2, 9))
-    exact = beam.mesh.mapping().F(Y) + beam.displacements(state.u, Y)
-    for e, points in enumerate(m.cells[0].data):
-        c = np.linalg.solve(monomials(X[:, cell[0]]).T, m.points[points, :2])
-        assert_allclose(monomials(Y).T @ c, exact[:, e].T, atol=1e-11)
 
 
 @pytest.mark.parametrize("order", [1, 3, 5, 10])
@@ -157,13 +101,6 @@ def test_vtk_evaluates_lagrange_cells_as_we_do(order, tmp_path):
             x, w = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()
             cell.EvaluateLocation(vtk.reference(0), [*Y[:, k], 0.0], x, w)
             assert_allclose(x[:2], exact[:, e, k], atol=1e-13)
-
-
-def test_lagrange_degree_that_vtk_does_not_evaluate():
-    beam = Beam(MeshBeam.init_line([0, 1], height=1), ElementBeamANCF(11),
-                StVenantKirchhoff(E=1.0, nu=0.3), 1.0)
-    with pytest.raises(InputError, match="up to degree 10, this element has 11"):
-        body_fields(affine(beam, np.eye(2)), lagrange=True)
 
 
 # several beams, places, names
@@ -185,27 +122,10 @@ def test_all_beams_are_in_one_file(lagrange, tmp_path):
     assert ends[0][:, 0].max() > 1.98 and ends[1][:, 1].max() > 1.0  # the arc's outer face
 
 
-def test_undeformed_points_and_displacement_give_the_deformed_body(state):
-    here, there = body_fields(state), body_fields(state, undeformed=True)
-    assert_allclose(there.points + there.point_data["displacement"], here.points, atol=1e-15)
-    assert there.points[:, 1].max() == pytest.approx(0.05)
-
-
-def test_vtk_suffix_and_missing_folders(state, tmp_path):
-    path = state.save(str(tmp_path / "a" / "b" / "beam.vtk"))
-    assert path.is_file() and set(meshio.read(path).point_data) == FIELDS
-
-
 @pytest.mark.parametrize("name", ["beam.xdmf", "beam", "beam.png"])
 def test_other_suffixes_are_refused(state, tmp_path, name):
     with pytest.raises(InputError, match=r"must end with one of \.vtu, \.vtk"):
         state.save(tmp_path / name)
-
-
-@pytest.mark.parametrize("subdivide", [(0, 1), (2,), 3, (2.5, 1), (True, 1), None, (1, 2, 3)])
-def test_bad_subdivision(state, tmp_path, subdivide):
-    with pytest.raises(InputError, match="two positive integers"):
-        state.save(tmp_path / "beam.vtu", subdivide=subdivide)
 
 
 # series
@@ -250,39 +170,3 @@ def test_series_refuses_bad_names_and_times(state, tmp_path):
     for t in (1.0, 0.5, np.nan):
         with pytest.raises(InputError):
             series.add(state, t)
-
-
-@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamCable(5),
-                                     ElementBeamANCFCubic(2), ElementBeamANCFCubic(4)], ids=str)
-@pytest.mark.parametrize("mesh", [MeshBeam.init_line([0, 0.3, 1.0], height=0.1), quarter_arc()],
-                         ids=["straight", "arc"])
-def test_elements_of_other_kinds(element, mesh, tmp_path):
-    state = bent(element, mesh, StVenantKirchhoff(E=1e6, nu=0.3))
-    beam = state.beams[0]
-    m = meshio.read(state.save(tmp_path / "beam.vtu", subdivide=(2, 2)))
-    assert set(m.point_data) == FIELDS
-    assert all(np.all(np.isfinite(v)) for v in m.point_data.values())
-    end = beam.mesh.p[:, -1]  # on the axis: the point next to last but one of the last element
-    assert_allclose(m.points[-2, :2], state.position(end), atol=1e-12)
-    assert_allclose([m.point_data["eps_" + k][-2] for k in ("xx", "yy", "xy")],
-                    state.strain(end), atol=1e-10)
-    lagrange = meshio.read(state.save(tmp_path / "lagrange.vtu", lagrange=True))
-    degree = max(element.axis_degree, element.order)
-    assert lagrange.cells[0].data.shape == (beam.mesh.nelements, (degree + 1) ** 2)
-
-
-def test_a_law_that_does_not_say_its_thickness_is_written_without_cauchy_stress(tmp_path):
-    class Fibres(Material):
-        def energy(self, strain):
-            return 0.5 * self.E * np.sum(strain**2, axis=0)
-
-        def stress(self, strain):
-            return self.E * strain
-
-    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamANCF(2), Fibres(1e6, 0.0), 0.1)
-    state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
-    state.save(tmp_path / "own.vtu")
-    data = meshio.read(tmp_path / "own.vtu").point_data
-    assert np.isnan(data["sigma_xx"]).all() and np.abs(data["S_xx"]).max() > 0.0
-    with pytest.raises(InputError, match="thickness_stretch"):
-        state.save(tmp_path / "own.vtu", fields=["sigma_xx"])

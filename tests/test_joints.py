@@ -5,13 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 
-import exact
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, EnergyMomentum, Gauss, GeneralizedAlpha,
-                        MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        Scene, StVenantKirchhoff)
+from skfem_ancf.actions.joints import JOINTS
 from skfem_ancf.core.errors import InputError, ModelWarning, NameUnknown, SupportError
-from skfem_ancf.actions.joints import JOINTS, get_joint
-from skfem_ancf.core.linalg import dense
 
 E, NU, RHO = 1e6, 0.3, 1000.0
 GRAVITY = (0.0, -9.81)
@@ -60,14 +57,6 @@ def test_every_joint_has_a_case():
 def joint(request):
     scene = Scene(*elbow())
     return scene.joint(request.param, **CASES[request.param]), scene
-
-
-def test_joints_are_tables_where_they_say_so(joint):
-    joint, scene = joint
-    tables = scene.system.machine.tables
-    m = scene.system.constraints.m
-    assert scene.system.constraints._quadratic_at((0.0, 0.37)) == (joint.tabled or not m)
-    assert bool(tables.plain.joints.own) == bool(m and not joint.tabled)
 
 
 def test_value_is_zero_at_the_start(joint):
@@ -122,65 +111,6 @@ def held(name, pressure=False):
     return scene
 
 
-@pytest.mark.parametrize("pressure", [False, True])
-@pytest.mark.parametrize("border", [True, False])
-@pytest.mark.parametrize("name", JOINTS)
-def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeypatch):
-    """The border, and sparse LU where it is too wide, against the whole matrix."""
-    if not border:
-        monkeypatch.setattr("skfem_ancf.equations.constraints.FEW", 0)
-    s = held(name, pressure).system
-    rng = np.random.default_rng(4)
-    # the prescribed joints leave the forearm of the elbow one motion: a stress holds it
-    u, m, t = 0.02 * rng.standard_normal(s.N), rng.standard_normal(s.constraints.m), 0.7
-    s.assemble(u, 1.0)
-    K = s.K.tocsc().toarray() + s.constraints.curvature(u, t, m).toarray()
-    J = dense(s.constraints.jacobian(u, t))
-    K[s.constraints.fixed], K[:, s.constraints.fixed] = 0.0, 0.0
-    K[s.constraints.fixed, s.constraints.fixed] = 1.0
-    b, c = rng.standard_normal(s.N) * s.constraints.free, rng.standard_normal(s.constraints.m)
-    expected = np.linalg.solve(np.block([[K, J.T], [J, np.zeros((len(c), len(c)))]]),
-                               np.append(b, c))
-    s.solver.factorize(u, t, m)
-    assert s.constraints.few == border
-    assert s.symmetric == (not pressure)
-    x, l = s.solver.solve(b, c)
-    assert np.allclose(x, expected[:s.N], rtol=0, atol=1e-9 * np.abs(expected[:s.N]).max())
-    assert np.allclose(l, expected[s.N:], rtol=0, atol=1e-9 * np.abs(expected[s.N:]).max())
-
-
-def test_sparse_factors_know_no_unit():
-    """A tee of a tenth of a micrometre, in metres: coordinates of lengths, slopes, curvatures."""
-    def tee(unit):
-        steel = StVenantKirchhoff(E=2e11 / unit, nu=0.3)
-        a, b = (Beam(MeshBeam.init_line(unit * np.linspace(0, 1, 5), 0.02 * unit, origin=origin,
-                                        angle=angle), ElementBeamCable(7), steel,
-                     width=0.02 * unit, name=name)
-                for name, origin, angle in (("a", (0, 0), 0.0), ("b", (0.7 * unit, 0), 1.0)))
-        scene = Scene(a, b).clamp("left", a)
-        scene.weld((a, (0.7 * unit, 0)), (b, "left"))
-        return scene.pressure("top", 1e5 / unit, b).solve_static()
-
-    expected = tee(1.0)
-    for unit in (1.0, 1e-4, 1e-7):
-        state = tee(unit)
-        assert state.iterations == expected.iterations
-        assert np.allclose(state.displacement((unit, 0), "a") / unit,
-                           expected.displacement((1, 0), "a"), rtol=0, atol=1e-10)
-
-
-def test_a_frame_of_hinges_and_welds_is_solved_through_its_border():
-    """Beams that joints alone hold, an arch of three hinges: symmetric, and in equilibrium."""
-    beams = [between(a, b, 3, element=ElementBeamCable(5), name=n, E=1e8) for a, b, n in (
-        ((0, 0), (1, 1), "left"), ((1, 1), (2, 1), "middle"), ((2, 1), (3, 0), "right"))]
-    scene = Scene(*beams).pin("left", beam="left").pin("right", beam="right").gravity(GRAVITY)
-    scene.joint("weld", beams=("left", "middle"), at=("right", "left"))
-    scene.joint("hinge", beams=("middle", "right"), at=(2, 1))
-    state = scene.solve_static()
-    up = sum(state.reactions(end, beam=end).force[1] for end in ("left", "right"))
-    assert np.isclose(up, 9.81 * sum(b.total_mass for b in beams))
-
-
 # conservation and drift
 
 FORCED = ("position", "angle", "turn")
@@ -200,45 +130,6 @@ def test_energy_momentum_with_every_joint(name):
         J = joint.jacobian(history.u[k], 0.0)
         assert np.abs(joint.value(history.u[k], 0.0)).max() < 1e-13
         assert np.abs(J @ history.v[k]).max() < 1e-12
-
-
-@pytest.mark.parametrize("name", ["hinge", "weld"])
-def test_joints_between_beams_keep_the_momenta(name):
-    scene = Scene(*elbow())
-    scene.joint(name, **CASES[name])
-    for beam in scene.beams:
-        scene.initial_velocity(lambda x: np.array([1 - 2 * x[1], 2 * x[0]]), beam=beam)
-    history = scene.integrate(0.4, 0.01)
-    assert np.ptp(history.momentum, axis=0).max() < 1e-10
-    assert np.ptp(history.angular_momentum) < 1e-10
-    assert np.ptp(history.total_energy) < 1e-10
-
-
-def swing():
-    """A soft beam that slides on a circle at one end and on a line at the other."""
-    beam = between((0, 0), (1, 0), 1, 1, E=1e6, h=0.2)
-    scene = Scene(beam).gravity((0, -2.0))
-    scene.joint("line", at=(0, 0), direction=(1, 1))
-    scene.joint("circle", at=(1, 0), center=(0.4, 0.7))
-    return scene
-
-
-@pytest.mark.parametrize("scheme, steps", [(EnergyMomentum(), 2000), (GeneralizedAlpha(0.8), 2000)],
-                         ids=["energy-momentum", "generalized-alpha"])
-def test_drift_over_a_long_run(scheme, steps):
-    scene = swing()
-    dt = 4e-3
-    history = scene.integrate(steps * dt, dt, scheme=scheme,
-                              t_eval=np.arange(0, steps + 1, 10) * dt)
-    s = scene.system
-    phi = [np.abs(s.constraints.constraint(u, 0.0)).max() for u in history.u]
-    rate = [np.abs(s.constraints.full_jacobian(u, 0.0) @ v).max()
-            for u, v in zip(history.u, history.v)]
-    assert np.abs(history.v).max() > 0.1
-    assert max(phi) < 1e-10 and max(rate) < 1e-11
-    if isinstance(scheme, EnergyMomentum):
-        assert max(phi) < 1e-13
-        assert np.ptp(history.total_energy) < 1e-9
 
 
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
@@ -282,15 +173,6 @@ def test_two_welded_beams_are_one(angle):
     f1, f2 = whole.modes(4).frequencies, cut.modes(4).frequencies
     assert np.allclose(f1[:2], f2[:2], rtol=1e-3)
     assert np.allclose(f1, f2, rtol=0.02)
-
-
-def test_weld_moment_is_the_moment():
-    """The multiplier of the weld's third equation, in units of moment."""
-    a, b = between((0, 0), (1, 0)), between((1, 0), (2, 0))
-    scene = Scene(a, b).clamp("left", beam=a).moment("right", 1e-3, beam=b)
-    joint = scene.joint("weld", beams=(a, b), at=("right", "left"))
-    state = scene.solve_static()
-    assert np.allclose(state.joint_force(joint), [0, 0, 1e-3], rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [np.pi / 2, 2.0, -0.8])
@@ -355,20 +237,6 @@ def test_roller(tilt):
     assert np.allclose(state.reactions("left").force, [-push[0], W - push[1]], rtol=1e-3, atol=1e-6)
 
 
-def test_circle_carries_a_pendulum():
-    """A stiff bar whose ends hang on circles of radius 1: half its weight each."""
-    bar = between((1, 0), (1.5, 0), 1, E=1e8)
-    scene = Scene(bar).gravity(GRAVITY)
-    left = scene.joint("circle", at=(1, 0), center=(1, 1))
-    right = scene.joint("circle", at=(1.5, 0), center=(1.5, 1))
-    scene.joint("line", at=(1.25, 0), direction=(0, 1))
-    state = scene.solve_static()
-    W = bar.total_mass * 9.81
-    for joint in (left, right):
-        # the guide's force on the beam points to the centre: away from it it is negative
-        assert state.joint_force(joint)[0] == pytest.approx(-W / 2, rel=1e-4)
-
-
 @pytest.mark.parametrize("at, m", [((1, 0), 0), ((0.6, 0.02), 2)])
 def test_prescribed_position_in_statics(at, m):
     """Time is the load factor; where only coordinates are fixed no multiplier is spent."""
@@ -404,78 +272,7 @@ def test_prescribed_angle_in_statics():
     assert abs(state.joint_force(joint)[0]) < 1e-6 * EI
 
 
-def test_elimination_does_not_change_the_motion():
-    """A pin as a support, as an eliminated joint, and through a multiplier: one motion."""
-    def motion(pin):
-        beam = between((0, 0), (1, 0), 2, E=1e5)
-        scene = Scene(beam).gravity(GRAVITY)
-        joint = pin(scene)
-        history = scene.integrate(0.3, 0.01)
-        return history, scene.system.constraints.m, joint
-
-    support, m0, _ = motion(lambda s: s.pin("left"))
-    eliminated, m1, joint = motion(lambda s: s.joint("position", at=(0, 0), r=lambda t: (0, 0)))
-    held, m2, other = motion(lambda s: (s.joint("line", at=(0, 0), direction=(1, 1)),
-                                        s.joint("line", at=(0, 0), direction=(1, -1))))
-    assert (m0, m1, m2) == (0, 0, 2)
-    assert np.abs(support.u[-1]).max() > 0.1
-    assert np.allclose(eliminated.u, support.u, rtol=0, atol=1e-12)
-    assert np.allclose(held.u, support.u, rtol=0, atol=1e-9)
-    # and the same reaction at every instant
-    a = eliminated.joint_force(joint)
-    assert a.shape == (len(eliminated), 2)
-    normals = np.array([other[0].normal, other[1].normal])
-    b = np.column_stack([held.joint_force(j)[:, 0] for j in other]) @ normals
-    assert np.abs(a[0] - b[0]).max() < 1e-8
-    scale = np.abs(a).max()
-    assert scale > 1.0
-    assert np.abs(a - [state.reactions("left").force for state in support]).max() < 1e-7 * scale
-
-
-def test_joint_force_over_time_is_the_rate_of_momentum():
-    """A free beam driven at a point: the force of the joint is all that acts on it."""
-    beam = between((0, 0), (1, 0), 2, E=1e5)
-    scene = Scene(beam)
-    joint = scene.joint("position", at=(0.3, 0), r=lambda t: (0.3 + 0.1 * np.sin(t) ** 3, 0))
-    history = scene.integrate(1.0, 5e-3)
-    rate = np.gradient(history.momentum, history.t, axis=0)[5:-5]
-    force = history.joint_force(joint)[5:-5]
-    assert force.shape[1] == 2 and np.abs(rate).max() > 0.5
-    assert np.abs(force - rate).max() < 0.02 * np.abs(rate).max()
-    impulse = trapezoid(history.joint_force(joint), history.t, axis=0)
-    assert np.allclose(impulse, history.momentum[-1], rtol=0, atol=2e-3)
-
-
 # mechanisms
-
-
-def test_double_pendulum_in_the_rigid_limit():
-    options = dict(ne=1, order=1, E=1e12, h=0.01, width=0.01, nu=0.0)
-    bars = between((0, 0), (1, 0), **options), between((1, 0), (2, 0), **options)
-    scene = Scene(*bars).pin("left", beam=bars[0]).gravity(GRAVITY)
-    scene.joint("hinge", beams=bars, at=(1, 0))
-    t = np.linspace(0.1, 1.0, 10)
-    p, q = exact.double_pendulum(np.append(0.0, t))[:2, 1:]
-    elbow = np.array([np.sin(p), -np.cos(p)]).T
-    hand = elbow + np.array([np.sin(q), -np.cos(q)]).T
-    errors = []
-    for dt in (4e-3, 2e-3):
-        history = scene.integrate(1.0, dt, t_eval=t)
-        errors.append(max(
-            np.abs(history.position((1, 0), beam=bars[0]) - elbow).max(),
-            np.abs(history.position((2, 0), beam=bars[1]) - hand).max()))
-    assert errors[1] < 1e-3
-    assert errors[1] < 0.7 * errors[0]
-
-
-def test_rigid_pendulum():
-    beam = between((0, 0), (1, 0), 1, 1, E=1e12, h=0.01, width=0.01, nu=0.0)
-    scene = Scene(beam).gravity(GRAVITY)
-    scene.joint("position", at=(0, 0), r=lambda t: (0, 0))
-    t = np.linspace(0.1, 1.0, 10)
-    angle = exact.rigid_pendulum(t, 1.0)
-    tip = scene.integrate(1.0, 2e-3, t_eval=t).position((1, 0))
-    assert np.abs(tip - np.array([np.sin(angle), -np.cos(angle)]).T).max() < 1e-4
 
 
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
@@ -513,74 +310,6 @@ def test_four_bar_mechanism(scheme):
     rate = omega * (3 * history.t**2 + history.t**4) / (1 + history.t**2) ** 2
     work = trapezoid(history.joint_force(drive)[:, 0] * rate, history.t)
     assert work == pytest.approx(history.kinetic_energy[-1] + history.strain_energy[-1], rel=0.03)
-
-
-def test_scene_of_unlike_beams():
-    """Order 1, Patel-Shabana and order 4, three heights and materials, straight and curved."""
-    a = between((0, 0), (1, 0), 2, 1, h=0.1, name="a")
-    b = between((1, 0), (1, 1), 2, h=0.05, E=3e6, element=ElementBeamPatelShabana(), name="b",
-                formulation="continuum")
-    arc = MeshBeam.init_curve(lambda s: np.array([1 + np.sin(s), 2 - np.cos(s)]),
-                              np.linspace(0, 1.2, 3), 0.08)
-    c = Beam(arc, ElementBeamANCF(4), StVenantKirchhoff(2e6, 0.2, 500.0, plane="strain"), 0.2,
-             name="c")
-    scene = Scene(a, b, c).clamp("left", beam="a").gravity((0, -1.0))
-    scene.joint("weld", beams=("a", "b"), at=("right", "left"))
-    hinge = scene.joint("hinge", beams=(b, c), at=(1, 1))
-    scene.fix("right", "r^2", beam="c")
-    state = scene.solve_static()
-    assert state.converged
-    weight = sum(beam.total_mass for beam in (a, b, c))
-    held = sum(state.reactions(face, beam=beam).force[1]
-               for face, beam in (("left", "a"), ("right", "c")))
-    assert held == pytest.approx(weight, rel=1e-8)
-    gap = state.position((1, 1), beam="b") - state.position((1, 1), beam="c")
-    assert np.abs(gap).max() < 1e-13
-    # the hinge carries c: its weight less what the roller holds
-    assert state.joint_force(hinge)[1] == pytest.approx(
-        state.reactions("right", beam="c").force[1] - c.total_mass, rel=1e-7)
-    history = scene.integrate(0.05, 0.01, start=state)
-    assert np.abs(history.u - state.u).max() < 1e-8
-
-
-# frames
-
-
-def test_lees_frame_below_the_limit_point():
-    """Load path of Lee's frame (1968) up to 15 EI / L^2; the limit load is 18.56."""
-    L, h = 1.0, 0.01
-    options = dict(h=h, E=12 / h**3, nu=0.0, width=1.0, element=ElementBeamANCFCubic(1))  # E I = 1
-    ux, uy, load = exact.lee_frame(121, A=h, I=h**3 / 12, L=L)
-    rising = slice(0, int(np.argmax(load > 17)) + 1)
-    column = between((0, 0), (0, L), 10, **options)
-    beam = between((0, L), (L, L), 10, **options)
-    for P in (6.0, 14.0):
-        scene = Scene(column, beam).pin("left", beam=column).pin("right", beam=beam)
-        scene.joint("weld", beams=(column, beam), at=("right", "left"))
-        scene.point_force((0, -P), (L / 5, L), beam=beam)
-        state = scene.solve_static(first_step=0.1)
-        found = state.displacement((L / 5, L), beam=beam)
-        known = [np.interp(P, load[rising], x[rising]) for x in (ux, uy)]
-        assert np.abs(found - known).max() < 1e-4
-    assert known[1] < -0.1
-
-
-def test_williams_toggle_below_the_limit_point():
-    """Williams' toggle (1964) in inches and pounds, with his EA and EI."""
-    EA, EI, half, rise = 1.885e6, 9.27e3, 12.943, 0.386
-    h = np.sqrt(12 * EI / EA)
-    options = dict(h=h, E=EA / h, nu=0.0, width=1.0, ne=8, element=ElementBeamANCFCubic(1))
-    left = between((-half, 0), (0, rise), **options)
-    right = between((0, rise), (half, 0), **options)
-    # near the limit point small differences of the law are magnified
-    for v, bound in ((0.1, 2e-3), (0.2, 0.012)):
-        P = exact.williams_toggle(v)
-        scene = Scene(left, right).clamp("left", beam=left).clamp("right", beam=right)
-        scene.joint("weld", beams=(left, right), at=("right", "left"))
-        scene.point_force((0, -P), (0, rise), beam=left)
-        state = scene.solve_static()
-        assert state.displacement((0, rise), beam=left)[1] == pytest.approx(-v, rel=bound)
-        assert abs(state.displacement((0, rise), beam=left)[0]) < 1e-9
 
 
 # equations that repeat others
@@ -651,39 +380,6 @@ def test_forces_of_repeated_joints_are_the_smallest():
     assert abs(state.joint_force(line)[0]) < 1e-12
 
 
-@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau",
-                                    "energy-momentum-4"])
-def test_repeated_joints_change_nothing_in_motion(scheme):
-    (plain, one), (scene, held) = repeated("weld"), repeated("weld, hinge")
-    a = plain.integrate(0.02, 0.001, scheme=scheme)
-    with pytest.warns(ModelWarning, match="Hinge at"):
-        b = scene.integrate(0.02, 0.001, scheme=scheme)
-    assert np.abs(a.u[-1]).max() > 1e-3
-    assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
-    force = pull(a.state(-1), one)
-    assert_allclose(pull(b.state(-1), held), force, rtol=0, atol=1e-6 * np.abs(force).max())
-
-
-def test_repeated_joints_change_nothing_by_gauss_points():
-    (plain, _), (scene, _) = repeated("hinge"), repeated("hinge, twice")
-    a = plain.integrate(0.01, 0.001, scheme=Gauss(2))
-    with pytest.warns(ModelWarning):
-        b = scene.integrate(0.01, 0.001, scheme=Gauss(2))
-    assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
-
-
-def test_a_body_on_two_pins():
-    """Five equations for four coordinates: half of what pulls along the pins each."""
-    body = RigidBody(1.0, 0.1, position=(0.5, 0.0))
-    scene = Scene(body).pin((0, 0), body).pin((1, 0), body)
-    scene.point_force((3.0, -10.0), at=(0.7, 0.0), beam=body)
-    with pytest.warns(ModelWarning, match="^1 of 5 equations"):
-        state = scene.solve_static()
-    first, second = (state.joint_force(joint) for joint in scene.joints)
-    assert_allclose(first, (1.5, -3.0), rtol=0, atol=1e-10)
-    assert_allclose(second, (1.5, -7.0), rtol=0, atol=1e-10)
-
-
 # what is refused
 
 
@@ -723,18 +419,6 @@ def test_contradictory_joints():
         s.solve_static()
 
 
-def test_checking_joints_leaves_them_alone():
-    """Reactions where a support and a joint share coordinates: the joint's part is not lost."""
-    a, b = between((0, 0), (1, 0)), between((0, 0), (0, 1))
-    scene = Scene(a, b).fix("left", "r", beam=a).fix("left", ["r_Y0", "r_Y1"], beam=a)
-    hinge = scene.joint("hinge", beams=(a, b), at=(0, 0))
-    scene.fix("right", "r^1", beam=b)
-    scene.point_force((0, -0.2), (0, 1), beam=b)
-    state = scene.solve_static()
-    assert state.joint_force(hinge)[1] == pytest.approx(-0.2, rel=1e-8)
-    assert state.reactions("left", beam=a).force[1] == pytest.approx(0.2, rel=1e-8)
-
-
 def test_free_mechanism_is_named():
     a, b = elbow()
     scene = Scene(a, b).clamp("left", beam=a)
@@ -760,15 +444,6 @@ def test_bad_inputs(call, error, message):
         call(Scene(*elbow()))
 
 
-def test_joint_of_another_scene():
-    scene, other = Scene(*elbow()), Scene(*elbow())
-    joint = other.joint("hinge", **CASES["hinge"])
-    state = scene.integrate(0.01, 0.01).state(0)
-    with pytest.raises(SupportError, match="not a joint of this scene"):
-        state.joint_force(joint)
-    assert get_joint(joint) is joint
-
-
 @pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamCable(9),
                                      ElementBeamANCFCubic(3)])
 def test_points_inside_elements_are_held_in_any_unit(element):
@@ -790,18 +465,3 @@ def test_points_inside_elements_are_held_in_any_unit(element):
     assert one[0] == pytest.approx(-0.02 * 0.7**2 * (0.3 / 4 + 0.7 / 3) / stiffness, rel=0.05)
     for L in (1e-8, 1e-3, 1e6):
         assert np.allclose(tips(L) / one, 1.0, rtol=0, atol=1e-10)
-
-
-def test_modes_of_a_body_on_a_spring_in_any_unit():
-    """A body on a beam, held by a spring to it: joints of places and of directions."""
-    def frequencies(L):
-        beam = Beam(MeshBeam.init_line(np.linspace(0, L, 7), 0.02 * L), ElementBeamCable(5),
-                    StVenantKirchhoff(2e9, 0.0, 1500.0), 0.02 * L, name="beam")
-        bob = RigidBody(0.3 * L**3, 1e-3 * L**5, (1.1 * L, 0.0), name="bob")
-        scene = Scene(beam, bob).clamp("left", "beam")
-        scene.hinge((beam, "right"), (bob, (L, 0)))
-        scene.spring(100.0 * L, between=((beam, (0.3 * L, 0)), (bob, (1.1 * L, 0.1 * L))))
-        return scene.modes(3).frequencies * L
-
-    for L in (1e-6, 1e6, 1e9):
-        assert np.allclose(frequencies(L) / frequencies(1.0), 1.0, rtol=0, atol=1e-9)

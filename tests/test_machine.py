@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFHermite, ElementBeamCable,
-                        EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.core import code_cache
 from skfem_ancf.core.errors import CompilationWarning
 from skfem_ancf.core.source import lanes, source
@@ -185,25 +184,6 @@ def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
     assert code_cache.on_disk(*backend.COMPILING)
 
 
-def test_code_of_two_versions_of_numba_is_kept_side_by_side(monkeypatch):
-    names = set()
-    for number in ("0.62.0", "0.68.1"):
-        code_cache.key.cache_clear()
-        monkeypatch.setattr(code_cache, "version", lambda name, number=number: number)
-        names.add(code_cache.key())
-    code_cache.key.cache_clear()
-    assert len(names) == 2
-
-
-def test_kernels_that_a_scene_has_not_are_not_compiled():
-    assert scene().system.machine.tables.parts == ["StrainTables"]
-    cable = scene(ElementBeamCable(3))
-    assert cable.system.machine.tables.parts == ["StrainTables"]
-    cable.spring(1.0, between=((1.0, 0.0), ("ground", (1.0, 1.0))))
-    assert cable.system.machine.tables.parts == ["StrainTables", "elements"]
-    assert set(backend.PARTS) <= set(backend.COMPILING)
-
-
 @pytest.mark.parametrize("error", [ImportError("made for another NumPy"),
                                    AttributeError("Numba has changed")])
 def test_what_cannot_be_compiled_runs_in_numpy(error, auto, monkeypatch, caplog):
@@ -222,19 +202,6 @@ def test_what_cannot_be_compiled_runs_in_numpy(error, auto, monkeypatch, caplog)
     said = [r.message for r in caplog.records if "runs in NumPy" in r.message]
     assert len(said) == 1 and str(error) in said[0]
     assert str(error) in s.plan()["compiled loop"].reason
-
-
-def test_one_signature_for_every_scene(needs_compiled):
-    """What is compiled takes arguments of one type: of another it would raise a TypeError."""
-    two = scene()
-    two = Scene(*two.beams, Beam(MeshBeam.init_line([0.0, 1.0], 0.1), ElementBeamCable(3),
-                                 StVenantKirchhoff(1e6, 0.3, 1e3), width=0.1))
-    for s in (scene(), scene(ElementBeamCable(5)), scene(ElementBeamCable(13)),
-              scene(ElementBeamANCFHermite(2, 7)), two.clamp("left", 0).clamp("left", 1),
-              scene().pressure("top", 0.1), scene().moment("right", 1e-3)):
-        s.solve_static(), s.integrate(1e-3, 1e-3), s.integrate(1e-3, 1e-3, EnergyMomentum())
-    s.system.internal_force(np.zeros(s.system.N))
-    assert {"equilibrium", "steps", "evaluate"} <= set(backend.LOADED) and not backend.PROBLEMS
 
 
 @pytest.mark.parametrize("damage", ["empty", "noise", "a file in the way"])
@@ -265,17 +232,6 @@ print(y.tolist())
         for path in kept:
             path.write_bytes(b"" if damage == "empty" else b"\x80 no code")
     assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
-
-
-@pytest.mark.parametrize("first, last", [(0, 4), (2, 4), (4, 2), (3, 3)])
-def test_functions_run_as_in_python(needs_compiled, first, last):
-    """With those that they call; loops of one end and of two, by steps, in lanes, and in others."""
-    from skfem_ancf.core.jit import entry
-
-    found, expected = np.zeros(5), np.zeros(5)
-    loops(first, last, expected)
-    entry(loops, (first, last, found))(first, last, found)
-    assert found.tolist() == expected.tolist() and (last <= 0 or expected[0] > 0.0)
 
 
 @source

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from skfem import FacetBasis
 
-from conftest import MESHES, STRAIGHT, quarter_arc
 from skfem_ancf import MeshBeam, MeshError
-from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 STEP = 1e-30
 POINTS = np.random.default_rng(2).random((2, 30))
@@ -21,19 +18,6 @@ def test_reference_cell_is_mapped_to_itself():
     assert_allclose(m.mapping().F(POINTS)[:, 0], POINTS, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", STRAIGHT)
-def test_straight_body_is_a_chain_of_rectangles(name):
-    mesh = MESHES[name]()
-    a, b = mesh.p[:, mesh.t]  # each (2, ne): x and y of both nodes
-    start, end = np.array([a[0], b[0]]), np.array([a[1], b[1]])
-    e1 = (end - start) / np.hypot(*(end - start))
-    e2 = np.array([-e1[1], e1[0]])
-    xi, eta = POINTS
-    expected = (start[..., None] + (end - start)[..., None] * xi
-                + mesh.height * e2[..., None] * (eta - 0.5))
-    assert_allclose(mesh.mapping().F(POINTS), expected, atol=1e-14)
-
-
 def test_axis_and_sections_of_an_arc(arc):
     """On the nodes the sections are radial; the axis is within the error of a cubic."""
     mapping, h = arc.mapping(), arc.height
@@ -44,15 +28,6 @@ def test_axis_and_sections_of_an_arc(arc):
         assert_allclose(ends[..., 1], (1 - h / 2) * radial, atol=1e-14)
     axis = mapping.F(np.array([ALONG[0], 0.5 + 0 * ALONG[0]]))
     assert np.max(np.abs(np.hypot(*axis) - 1)) < 3e-4
-
-
-def test_inverse(mesh):
-    mapping = mesh.mapping()
-    X = 1.1 * POINTS - 0.05  # also just outside the cell
-    back = mapping.invF(mapping.F(X))
-    assert_allclose(back, np.broadcast_to(X[:, None], back.shape), atol=1e-13)
-    subset = np.array([mesh.nelements - 1, 0])
-    assert_allclose(mapping.invF(mapping.F(X, subset), subset), back[:, subset], atol=1e-13)
 
 
 def test_derivative(mesh):
@@ -88,19 +63,6 @@ def test_area_is_that_inside_the_boundary(mesh):
         assert_allclose(area, mesh.height * mesh.lengths.sum(), rtol=1e-14)
 
 
-def test_neighbours_meet_in_the_same_section(mesh):
-    """Both elements of a section see the same points of it, with the axis smooth."""
-    mapping = mesh.mapping()
-    inner = np.nonzero(mesh.f2t[1] >= 0)[0]
-    assert_array_equal(inner, np.arange(1, mesh.nelements))
-    before, after = mesh.f2t[:, inner]
-    left, right = (np.array([xi + 0 * ALONG[0], ALONG[0]]) for xi in (0.0, 1.0))
-    x = mapping.G(ALONG, inner)
-    assert_allclose(mapping.F(right, before), x, atol=1e-14)
-    assert_allclose(mapping.F(left, after), x, atol=1e-14)
-    assert_allclose(mapping.frame(right, before), mapping.frame(left, after), atol=1e-14)
-
-
 def test_facets(mesh):
     """Each facet is its side of its element, with the length detDG and an outward unit normal."""
     mapping = mesh.mapping()
@@ -119,32 +81,6 @@ def test_facets(mesh):
         assert_allclose(np.sum(n * d, 0) / np.hypot(*d), 0.0, atol=1e-13)
         outside = mapping.invF(mapping.F(points, elements) + 1e-4 * mesh.height * n, elements)
         assert np.all(np.abs(outside[1 - local % 2] - 0.5) > 0.5)
-
-
-def test_perimeter():
-    for name in STRAIGHT:
-        m = MESHES[name]()
-        fb = FacetBasis(m, ElementBeamP1())
-        assert_allclose(fb.dx.sum(), 2 * (m.lengths.sum() + m.height), rtol=1e-13)
-    h, errors = 0.3, []
-    for n in (8, 16, 32):
-        fb = FacetBasis(quarter_arc(n, h), ElementBeamP1(), intorder=10)
-        errors.append(fb.dx.sum() - (np.pi + 2 * h))  # (R + h/2) pi/2 + (R - h/2) pi/2
-    assert abs(errors[-1]) < 1e-5
-    assert np.all(np.log2(np.abs(np.divide(errors[:-1], errors[1:]))) > 1.9)
-
-
-def test_frame(mesh):
-    mapping = mesh.mapping()
-    frame = mapping.frame(POINTS)
-    gram = np.einsum("kiep,kjep->ijep", frame, frame)
-    assert_allclose(gram, np.eye(2)[:, :, None, None] + 0 * gram, atol=1e-14)
-    assert np.all(np.linalg.det(np.moveaxis(frame, (0, 1), (-2, -1))) > 0)
-    at_nodes = mapping.frame(np.array([[0.0, 1.0], [0.2, 0.9]]))  # the same across the section
-    for k in (0, 1):
-        assert_allclose(at_nodes[:, 0, :, k], mesh.p_X[:, mesh.t[k]], atol=1e-13)
-        assert_allclose(at_nodes[:, 1, :, k], mesh.p_Y[:, mesh.t[k]], atol=1e-13)
-    assert_allclose(mapping.frame(POINTS, np.array([0])), frame[:, :, :1], atol=1e-15)
 
 
 def test_folding_map_is_refused():

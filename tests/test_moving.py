@@ -8,11 +8,9 @@ from numpy.testing import assert_allclose
 from test_sections import BRASS, FOAM, PLAIN, STEEL, H, cantilever, plane, plane_stress
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        KelvinVoigt, MeshBeam, NeoHookean, RigidBody, Scene, Section)
-from skfem_ancf.formulations import Formulation, Term
-from skfem_ancf.actions.obstacles import Line
+                        MeshBeam, Scene, Section)
 from skfem_ancf.core.quadrature import gauss
-from skfem_ancf.sections.moving import Moving
+from skfem_ancf.formulations import Formulation, Term
 
 P = 1e-2
 ELEMENTS = {"order 2": ElementBeamANCF(2), "cubic": ElementBeamANCFCubic(2),
@@ -156,76 +154,6 @@ def test_a_heated_coating_bends_a_blade_by_its_own_curvature(element):
     assert state.displacement((1, 0))[1] == pytest.approx(np.sum(w * curvature * (1 - x)), rel=2e-4)
 
 
-@few
-@pytest.mark.parametrize("name", ["T", "coating"])
-def test_motion_keeps_its_energy_but_for_what_is_damped(element, name):
-    section, material, _ = SECTIONS[name]
-    for damping in (None, KelvinVoigt(1e-3)):
-        beam = Beam(taper(6), element, material, section=section, damping=damping)
-        history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.05, 1e-3)
-        balance = history.total_energy + history.dissipated
-        assert np.ptp(balance) < 1e-11 * np.max(history.kinetic_energy)
-        assert (history.dissipated[-1] > 1e-9 * history.kinetic_energy[-1]) == (damping is not None)
-
-
-@pytest.mark.parametrize("name", ["T", "core"])
-def test_they_slide_and_lie_on_the_ground(name):
-    section, material, _ = SECTIONS[name]
-    for element in (ElementBeamCable(5), ElementBeamANCFCubic(2)):
-        beam, body = Beam(taper(6), element, material, section=section), RigidBody(1, 0.1, (0.3, 0))
-        scene = Scene(beam, body).pin("left", beam=beam).pin("right", beam=beam).gravity((0, -9.81))
-        scene.initial_velocity(lambda x: np.array([1.0 + 0 * x[0], 0 * x[0]]), beam=body)
-        scene.slider(body, beam)
-        history = scene.integrate(0.05, 2e-3)
-        assert np.ptp(history.total_energy) < 1e-12 * history.kinetic_energy.max()
-        scene = Scene(Beam(taper(6), element, material, section=section)).clamp("left")
-        scene.point_force((0, -300), at=(1, 0)).obstacle(Line((0, -0.055), (0, 1)))
-        bottom = scene.solve_static().position((1.0, -0.025))
-        assert bottom[1] == pytest.approx(-0.055, abs=1e-3)
-
-
-def graded(x, y):
-    if np.any(y < 0.5 * height(x) - 0.0101):
-        raise ValueError("asked below the layer")
-    return 1e8 * (1 + x + 10 * y)
-
-
-def wide(x, y):
-    return 0.02 + 0.01 * x + y * y
-
-
-def test_constant_heights_are_those_of_fixed_layers_and_profiles():
-    """A taper that does not: energy, shear factor, mass; and a layer that takes the rest."""
-    flat = MeshBeam.init_line(np.linspace(0, 1, 5), height=H)
-    same = MeshBeam.init_line(np.linspace(0, 1, 5), height=lambda x: H + 0.0 * x)
-    u = 1e-3 * np.random.default_rng(0).standard_normal(100)
-    for section, material, _ in SECTIONS.values():
-        for element in (ElementBeamANCF(2), ElementBeamANCF(3), ElementBeamCable(5)):
-            one, two = (Beam(mesh, element, material, section=section) for mesh in (flat, same))
-            assert two.across.moving and not one.across.moving
-            if element.order:
-                assert one.across.shear == pytest.approx(two.across.shear, rel=1e-9)
-            assert_allclose(*(b.kernel.force(u[:b.N]) for b in (one, two)), rtol=1e-8, atol=1e-6)
-            assert abs(one.mass() - two.mass()).max() < 1e-13 * abs(one.mass()).max()
-
-
-def test_rubber_on_a_core_of_steel():
-    """A law that is not linear, on two meshes, and against Hooke's of the same moduli."""
-    rubber = NeoHookean(E=1e6, nu=0.4, density=1000)
-    section = Section.layers((None, STEEL.replace(E=1e6)), (0.01, rubber), width=0.02)
-    tips = []
-    for n in (4, 8):
-        beam = Beam(taper(n), ElementBeamANCFCubic(2), section=section)
-        state = Scene(beam).clamp("left").point_force((0, -0.2), at=(1, 0)).solve_static()
-        assert state.recovered == {0: ""} and state.iterations < 12
-        tips.append(state.displacement((1, 0))[1])
-    small = Beam(taper(8), ElementBeamANCFCubic(2), section=Section.layers(
-        (None, STEEL.replace(E=1e6)), (0.01, STEEL.replace(E=1e6, nu=0.4)), width=0.02))
-    hooke = Scene(small).clamp("left").point_force((0, -0.2), at=(1, 0)).solve_static()
-    assert tips[0] == pytest.approx(tips[1], rel=5e-3)
-    assert tips[1] == pytest.approx(hooke.displacement((1, 0))[1], rel=0.02)
-
-
 class Few(Formulation):
     """With a rule across that does not know the section."""
 
@@ -254,15 +182,3 @@ class Few(Formulation):
 def test_errors_teach(make, words):
     with pytest.raises(InputError, match=words):
         make()
-
-
-def test_rules_have_all_moments_of_a_width_that_jumps():
-    measure = Moving(I.pieces, H).of_order(2)
-    h = np.array([0.1, 0.07, 0.05])
-    x, w = measure.gauss(5)
-    b = measure.series(measure.moments(h)[..., None], x)
-    for k in range(9):
-        found = (w * b) @ (x - 0.5)**k
-        exact = [2 * sum(width * (z[1]**(k + 1) - z[0]**(k + 1)) / (k + 1) for width, z in (
-            (0.01, (0, 0.5 - 0.01 / s)), (0.06, (0.5 - 0.01 / s, 0.5)))) * (k % 2 == 0) for s in h]
-        assert_allclose(found, exact, atol=1e-16)

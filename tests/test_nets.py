@@ -1,6 +1,5 @@
 """What frames are made of: lines and names of mesh files, and points that nearly meet."""
 
-import warnings
 
 import meshio
 import numpy as np
@@ -128,103 +127,6 @@ def test_sets_of_abaqus_that_meshio_takes_for_others_are_refused(tmp_path, text,
     assert length(Frame.from_meshio(abaqus(tmp_path / "plain.inp", plain), **OPTIONS)) > 1.5
 
 
-GMSH = """$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-0 10 "foot"
-1 1 "column"
-1 2 "all"
-$EndPhysicalNames
-$Entities
-2 2 0 0
-1 0 0 0 1 10
-2 1 1 0 0
-1 0 0 0 0 1 0 2 1 2 2 1 -2
-2 0 1 0 1 1 0 1 2 2 1 -2
-$EndEntities
-$Nodes
-3 3 1 3
-0 1 0 1
-1
-0 0 0
-1 1 0 1
-2
-0 1 0
-0 2 0 1
-3
-1 1 0
-$EndNodes
-$Elements
-3 3 1 3
-0 1 15 1
-1 1
-1 1 1 1
-2 1 2
-1 2 1 1
-3 2 3
-$EndElements
-"""
-#: Of version 2 an element that is in two groups is there twice.
-GMSH_2 = """$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-0 10 "foot"
-1 1 "column"
-1 2 "all"
-$EndPhysicalNames
-$Nodes
-3
-1 0 0 0
-2 0 1 0
-3 1 1 0
-$EndNodes
-$Elements
-4
-1 15 2 10 1 1
-2 1 2 1 1 1 2
-3 1 2 2 1 1 2
-4 1 2 2 2 2 3
-$EndElements
-"""
-
-
-@pytest.mark.parametrize("text", [GMSH, GMSH_2])
-def test_elements_of_gmsh_may_be_in_two_groups(tmp_path, text):
-    path = tmp_path / "frame.msh"
-    path.write_text(text)
-    frame = Frame.from_meshio(path, groups="column", **OPTIONS)
-    assert [(beam.name, beam.mesh.nelements) for beam in frame.beams] == [
-        ("column", 1), ("lines", 1)]
-    state = frame.clamp("foot").line_load((0, -100.0), beam="all").solve_static(tol=1e-11)
-    assert_allclose(state.reactions("foot").force, [0, 200.0], atol=1e-5)
-    assert length(Frame.from_meshio(path, **OPTIONS)) == pytest.approx(2.0)
-
-
-def test_names_of_points_that_are_no_nodes_are_not_half_taken():
-    mesh = meshio.Mesh(ARC[[0, 2, 1]], [("line3", [[0, 1, 2]])],
-                       point_sets={"ends": [0, 1], "all": [0, 1, 2]})
-    frame = Frame.from_meshio(mesh, **OPTIONS)
-    assert frame.nodes("ends").tolist() == [0, 1]
-    with pytest.raises(MeshError, match="'all' holds the point 2 of the mesh, which is no end"):
-        frame.nodes("all")
-
-
-def test_sets_that_hold_something_else_are_refused():
-    cells = [("line", [[0, 1], [1, 2]])]
-    for sets, message in (({"a": [[5]]}, "numbers from 0 to 1"), ({"a": [[0.5]]}, "numbers"),
-                          ({"a": [[[0], [0, 1]]]}, "numbers"), ({"a": [[0], [1]]}, "2 parts")):
-        mesh = meshio.Mesh(ARC[:3], cells)
-        mesh.cell_sets = sets
-        with pytest.raises(MeshError, match=message):
-            Frame.from_meshio(mesh, **OPTIONS)
-    with pytest.raises(InputError, match="groups are names"):
-        Frame.from_meshio(meshio.Mesh(ARC[:3], cells), groups=3, **OPTIONS)
-
-
 # points that nearly meet
 
 def sway(points, lines, size=1.0, **options):
@@ -288,30 +190,3 @@ def test_numbers_of_points_and_lines_stay_where_some_are_one():
     for tol in (-1.0, np.nan, "1"):
         with pytest.raises(InputError, match="tol must be"):
             Frame.from_lines(points, lines, **{**options, "tol": tol})
-
-
-def test_curves_end_at_the_node_that_their_points_became():
-    def arc(s):
-        return np.array([1.0 - np.cos(np.pi * s), np.sin(np.pi * s)])
-
-    points, lines = [(0, -1), (1e-6, 0), (0, 0), (2, 0)], [(0, 1), (2, 3)]
-    frame = Frame.from_lines(points, lines, curves={1: arc}, elements=4, tol=1e-5, **OPTIONS)
-    assert length(frame) == pytest.approx(1 + np.pi, rel=1e-4)
-    with pytest.raises(MeshError, match="ends of line 0, which has a curve"):
-        Frame.from_lines([(0, 0), (1e-6, 0), (1, 0)], [(0, 1), (1, 2)], curves={
-            0: lambda s: np.array([np.sin(2 * np.pi * s) + 1e-6 * s, 1 - np.cos(2 * np.pi * s)])},
-            tol=1e-5, elements=8, **OPTIONS)
-
-
-def test_a_fine_mesh_keeps_its_lines():
-    """Lines that are short against the frame, as all are, are no gaps."""
-    n = 2000
-    points = [(1e-3 * k, 0.0) for k in range(n + 1)]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        frame = Frame.from_lines(1e3 * np.array(points), [(k, k + 1) for k in range(n)], **OPTIONS)
-        assert len(np.unique(frame.net.same)) == n + 1
-        line = Frame.from_lines(np.column_stack([np.linspace(0, 100, 10**5), np.zeros(10**5)]),
-                                np.column_stack([np.arange(10**5 - 1), np.arange(1, 10**5)]),
-                                **{**OPTIONS, "height": 1e-4})
-        assert len(line.net.kept) == 10**5 - 1

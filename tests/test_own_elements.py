@@ -1,20 +1,17 @@
 """A family of elements from outside: one class, and the default formulation fits it."""
 
 
+import exact
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
-from scipy.linalg import eigh, null_space
-from scipy.special import roots_jacobi
+from scipy.linalg import eigh
 from skfem import Basis, ElementVector, asm
 
-import exact
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam,
-                        MeshError, NeoHookean, Scene, StVenantKirchhoff, forms)
-from skfem_ancf.elements import ELEMENTS, ElementBeam
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, NeoHookean, Scene, StVenantKirchhoff, forms
+from skfem_ancf.elements import ElementBeam
 from skfem_ancf.elements.base import SectionFunctions
-from skfem_ancf.elements.sampling import default_sampling
 from skfem_ancf.formulations import Assumed
 
 WIDTH = 0.01
@@ -48,7 +45,6 @@ class QuinticAxis(ElementBeam):
 
 
 OWN = {"quintic": Quintic, "quintic sections": QuinticSections, "quintic axis": QuinticAxis}
-ALL = {**ELEMENTS, **OWN}
 
 
 def line(n, h, L=1.0):
@@ -68,49 +64,6 @@ def eigenvalues(beam):
     K = tangent(beam)
     scale = 1.0 / np.sqrt(np.diag(K))
     return eigh(K * np.outer(scale, scale), eigvals_only=True)
-
-
-# what the samples miss is what is held, for every element
-
-@pytest.mark.parametrize("name", ALL)
-def test_held_are_the_modes_that_the_samples_miss(name):
-    """The kernel of the sampled strains of one element beyond rigid motions, found numerically."""
-    element = ALL[name]()
-    law = StVenantKirchhoff(1.0, 0.0)
-    beam = Beam(line(1, 1.0), element, law, 1.0, formulation=Assumed(alpha=0.0))
-    K = tangent(beam)
-    size = np.sqrt(np.diag(K))
-    kernel = null_space(K / np.outer(size, size), rcond=1e-11) / size[:, None]
-    rigid = beam.rigid_motions()
-    assert np.linalg.matrix_rank(np.hstack([kernel, rigid]) * size[:, None], 1e-9) == len(kernel.T)
-    held = [mode.weights @ part for mode in element.stabilised
-            for part in (kernel[0::2], kernel[1::2])]
-    missed = kernel.shape[1] - 3
-    s = np.linalg.svd(np.array(held), compute_uv=False)
-    assert np.sum(s > 1e-9 * s[0]) == missed  # rigid motions are not held, all else is
-    for mode in element.stabilised:  # and none is held in vain
-        both = [mode.weights @ part for part in (kernel[0::2], kernel[1::2])]
-        assert np.max(np.abs(both)) > 1e-6 * s[0]
-
-
-@pytest.mark.parametrize("p, s", [(3, 1), (3, 3), (5, 1), (5, 3), (5, 5), (7, 5)])
-def test_samples_leave_something_to_bend_with(p, s):
-    sampling = default_sampling(p, s)
-    new = {name: sum(x > 0 for x in sampling.places(name)) for name in ("xx", "yy", "xy")}
-    assert p + s + 2 - sum(new.values()) >= 1
-
-
-def test_samples_of_the_elements_of_the_package():
-    gauss = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
-    linear, cubic = ElementBeamANCF(2).sampling, ElementBeamANCFCubic(2).sampling
-    for places, expected in ((linear.places("xx"), gauss), (linear.places("xy"), gauss),
-                             (linear.places("yy"), [0, 1]), (cubic.places("xx"), gauss),
-                             (cubic.places("xy"), [0, 0.5, 1]), (cubic.places("yy"), [0, 0.5, 1])):
-        assert_allclose(places, expected, atol=1e-15)
-    assert (linear.points, cubic.points) == (2, 3)
-    inner = roots_jacobi(3, 1.0, 1.0)[0]
-    assert_allclose(Quintic().sampling.places("yy"), 0.5 + 0.5 * np.array([-1, *inner, 1]),
-                    atol=1e-15)
 
 
 # the quintic elements
@@ -224,14 +177,6 @@ def test_the_error_does_not_depend_on_the_slenderness(name, error, plane):
     assert abs(found[3] - found[4]) < 1e-6
 
 
-def test_high_order():
-    """Half the elements' length, an error sixteen times smaller at the least."""
-    line = exact.gravity_cantilever(2e8, 0.3, 7800, 1.0, WIDTH, 0.01, model="elastica")[1]
-    errors = [abs(cantilever("quintic", n, 1e5, "stress").displacement((1, 0))[1] - line)
-              for n in (2, 4, 8)]
-    assert errors[1] < errors[0] / 16 and errors[2] < errors[1] / 16
-
-
 def test_modes_motion_and_recovery():
     """Frequencies of the free Euler-Bernoulli beam; energy kept; the bending stress -E kappa Y."""
     E, rho, h = 2e8, 7800.0, 1e-3
@@ -247,14 +192,3 @@ def test_modes_motion_and_recovery():
     for recover in (True, False):
         stress = state.stress((0.4, 0.005), recover=recover)
         assert stress[0] == pytest.approx(-M * 0.005 / (WIDTH * 0.02**3 / 12), rel=1e-3)
-
-
-def test_curved_meshes_are_for_axes_and_sections_of_one_degree():
-    arc = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]), [0.0, 0.5, 1.0], 0.1)
-    for name, cls in OWN.items():
-        if name != "quintic axis":
-            beam = Beam(arc, cls(), StVenantKirchhoff(1.0, 0.3), 1.0)
-            assert beam.mesh.sections == "quintic"
-            continue
-        with pytest.raises(MeshError, match="is for straight meshes"):
-            Beam(arc, cls(), StVenantKirchhoff(1.0, 0.3), 1.0)

@@ -1,11 +1,7 @@
 """Grids, views and films: read back, and looked at pixel by pixel."""
 
 import itertools
-import os
-import shutil
-import subprocess
 import sys
-from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -13,15 +9,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 pv = pytest.importorskip("pyvista", reason="pyvista is not installed (the extra 'view')")
 
-from vtkmodules.vtkCommonCore import vtkLogger
-
 from conftest import quarter_arc
 from test_io import bent
-from skfem_ancf import (Beam, ElementBeamANCF, InputError, Line, MeshBeam, MissingExtra,
-                        NameUnknown, Scene, StVenantKirchhoff)
-from skfem_ancf.recovery.fields import FIELDS
+
+from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.io import body_fields
 from skfem_ancf.io.vtkhdf import VtkHdfWriter
+from skfem_ancf.recovery.fields import FIELDS
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
@@ -85,22 +80,6 @@ def test_beams_by_name():
     assert blocks["mast"].point_data.keys() == ["displacement (global frame)"]
 
 
-def test_series_changes_its_mesh_in_place(history):
-    series = history.to_pyvista(fields=["eps_yy", "displacement"], subdivide=(2, 2))
-    mesh, points = series.mesh, series.mesh.points
-    address = mesh.point_data["eps_yy"].ctypes.data
-    for k in (3, -1, 0):
-        assert series.update(k) is mesh
-        fresh = history.state(k).to_pyvista(fields=["eps_yy", "displacement"], subdivide=(2, 2))
-        assert_array_equal(mesh.points, fresh.points)
-        assert_array_equal(mesh["eps_yy"], fresh["eps_yy"])
-    assert points.ctypes.data == mesh.points.ctypes.data
-    assert mesh.point_data["eps_yy"].ctypes.data == address
-    assert len(series) == len(history) and series.k == 0
-    with pytest.raises(InputError, match="k must be an integer"):
-        series.update(99)
-
-
 def test_view_shows_both_signs(state, tmp_path):
     plotter = state.view("S_xx", filename=tmp_path / "new" / "view.png", undeformed=False)
     assert isinstance(plotter, pv.Plotter) and plotter.camera.parallel_projection
@@ -111,31 +90,6 @@ def test_view_shows_both_signs(state, tmp_path):
     assert high == pytest.approx(-low) and "S_xx" in str(plotter.scalar_bars.keys())
     assert "force / area" in str(plotter.scalar_bars.keys())
     plotter.close()
-
-
-def test_view_says_that_the_section_is_enlarged(history):
-    plotter = history.state(5).view("von_mises", off_screen=True, unit="Pa")
-    texts = [a.GetText(k) for a in plotter.renderer.actors.values() if hasattr(a, "GetText")
-             for k in range(4) if a.__class__.__name__.startswith(("Corner", "vtkCorner"))]
-    assert any("times as thick" in (t or "") for t in texts)
-    assert plotter.mapper.scalar_range[0] == 0.0
-    assert "(Pa)" in str(plotter.scalar_bars.keys())
-    bounds = plotter.mesh.bounds
-    assert bounds[3] - bounds[2] > 0.01
-    plotter.close()
-    again = history.state(5).view(plotter=(own := pv.Plotter(off_screen=True)))
-    assert again is own
-    own.close()
-
-
-def test_no_display_is_no_warning(state, monkeypatch, capfd):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    said = vtkLogger.GetCurrentVerbosityCutoff()
-    plotter = state.view("eps_yy")
-    assert plotter.off_screen and vtkLogger.GetCurrentVerbosityCutoff() == said
-    plotter.close()
-    assert "WARN" not in capfd.readouterr().err
 
 
 def test_film(history, tmp_path):
@@ -165,36 +119,6 @@ def test_film_as_mp4(history, tmp_path):
     assert len(images) == 4 and images[0].shape == (242, 322, 3)  # even numbers of pixels
     assert np.sum(np.abs(images[3] - images[0]).max(axis=2) > 60) > 100  # it moves
     assert images[0].mean() > 150 and np.ptp(images[0], axis=2).max() > 50  # white, with colours
-
-
-@pytest.mark.parametrize("missing", ["imageio", "imageio_ffmpeg"])
-def test_an_mp4_names_the_extra_that_is_missing(history, tmp_path, monkeypatch, missing):
-    monkeypatch.setitem(sys.modules, missing, None)
-    with pytest.raises(MissingExtra, match=r'pip install "skfem-ancf\[view\]"'):
-        history.animate(tmp_path / "new" / "film.mp4")
-    assert not (tmp_path / "new").exists()
-
-
-@pytest.mark.parametrize("options, error, message", [
-    (dict(filename="a.avi"), InputError, r"must end with one of \.gif, \.mp4"),
-    (dict(field="eps_y"), NameUnknown, "did you mean 'eps_yy'"),
-    (dict(frames=0), InputError, "frames must be"),
-    (dict(fps=0), InputError, "fps must be positive"),
-    (dict(size=3), InputError, "size must be"),
-    (dict(cmap="rainbo"), NameUnknown, "colour map"),
-])
-def test_films_that_cannot_be(history, tmp_path, options, error, message):
-    with pytest.raises(error, match=message):
-        history.animate(**{"filename": tmp_path / "a.gif", **options})
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_folder_that_cannot_be_made_is_said_before_anything_is_drawn(history, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OSError, match="cannot make the folder"):
-        history.animate(tmp_path / "file" / "a.gif", field=lambda v: 1 / 0)
-    with pytest.raises(OSError, match="cannot write"):
-        history.save(tmp_path / "file" / "a.vtkhdf", fields=lambda v: 1 / 0)
 
 
 def test_without_pyvista(state, history, tmp_path, monkeypatch):
@@ -244,100 +168,6 @@ def test_vtkhdf_refuses_and_leaves_nothing_behind(history, state, tmp_path):
             series.add(state, 1.0)
         raise RuntimeError
     assert not list(tmp_path.iterdir())
-
-
-def test_a_frame_that_was_interrupted_moves_none_of_the_next(history, tmp_path, monkeypatch):
-    """Points were appended, fields were not: of all later frames they were of two instants."""
-    h5py = pytest.importorskip("h5py")
-    append, names = VtkHdfWriter._append, []
-
-    def interrupted(writer, name, values):
-        names.append(name)
-        if len(names) == 6:
-            raise KeyboardInterrupt
-        append(writer, name, values)
-
-    monkeypatch.setattr(VtkHdfWriter, "_append", interrupted)
-    options = dict(subdivide=(1, 1), fields=["displacement", "u_x", "u_y"])
-    with VtkHdfWriter(tmp_path / "a.vtkhdf", **options) as series:
-        for k in range(4):
-            with suppress(KeyboardInterrupt):
-                series.add(history.state(k), history.t[k])
-    assert names[4:7] == ["Points", "PointData/displacement", "Points"]
-    with h5py.File(tmp_path / "a.vtkhdf") as file:
-        root = file["VTKHDF"]
-        assert_array_equal(root["Steps/Values"], history.t[[0, 2, 3]])
-        for frame, k in enumerate([0, 2, 3]):
-            body = body_fields(history.state(k), **options)
-            at = slice(root["Steps/PointOffsets"][frame], None)
-            for name, values in {"Points": body.points, **{
-                    f"PointData/{name}": v for name, v in body.point_data.items()}}.items():
-                assert_array_equal(root[name][at][:len(values)], values)
-
-
-def test_frames_of_other_beams_are_not_put_on_the_cells_of_the_first(tmp_path):
-    pytest.importorskip("h5py")
-    beams = [Beam(MeshBeam.init_line(np.linspace(x, x + 1, n), 0.02), ElementBeamANCF(2),
-                  StVenantKirchhoff(2e8, 0.3), width=0.02) for x, n in ((0, 3), (1, 5))]
-    with VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
-        series.add(Scene(*beams).state(), 0.0)
-        with pytest.raises(InputError, match="the same cells"):
-            series.add(Scene(*beams[::-1]).state(), 1.0)
-    assert series.times == [0.0]
-
-
-def test_an_interrupted_series_keeps_the_obstacles_of_the_one_before(tmp_path):
-    """They lie beside the body, in a file of their own, and are as old as it."""
-    pytest.importorskip("h5py")
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.02), ElementBeamANCF(2),
-                StVenantKirchhoff(2e8, 0.3), width=0.02)
-    states = [Scene(beam).obstacle(Line((0, y))).state() for y in (-0.1, -0.2)]
-
-    def files():
-        return {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-
-    with VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
-        series.add(states[0], 0.0)
-    before = files()
-    assert sorted(before) == ["a.vtkhdf", "a_obstacles.vtu"]
-    with pytest.raises(KeyboardInterrupt), VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
-        series.add(states[1], 0.0)
-        raise KeyboardInterrupt
-    assert files() == before
-
-
-FULL = """
-import numpy as np
-from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-from skfem_ancf.core.errors import FileError
-
-beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), ElementBeamANCF(2),
-            StVenantKirchhoff(2e8, 0.3, 7800), width=0.02)
-history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.1, 0.002)
-try:
-    history.save("a.vtkhdf")
-except FileError as error:
-    print(error)
-"""
-
-
-@pytest.mark.parametrize("size", [100, 4300, 4700])  # kilobytes
-def test_vtkhdf_on_a_full_disk(tmp_path, size):
-    """HDF5 took the process with it."""
-    pytest.importorskip("h5py")
-    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(tmp_path)]
-    if not shutil.which("mount") or subprocess.run(mount, check=False).returncode:
-        pytest.skip("needs a small disk, which takes the right to mount one")
-    try:
-        (tmp_path / "a.vtkhdf").write_text("before")
-        run = subprocess.run([sys.executable, "-c", FULL], check=False, cwd=tmp_path,
-                             capture_output=True, text=True,
-                             env={**os.environ, "SKFEM_ANCF_COMPILED": "0"})
-        assert run.returncode == 0, run.stderr
-        assert run.stdout == "cannot write 'a.vtkhdf': No space left on device\n"
-        assert [p.read_text() for p in tmp_path.iterdir()] == ["before"]
-    finally:
-        subprocess.run(["umount", str(tmp_path)], check=True)
 
 
 def test_notebooks_get_words_and_pictures(state, history, monkeypatch):

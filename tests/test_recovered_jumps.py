@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                         ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff)
-from skfem_ancf.sections.jumps import jumps
 
 E, B, H, M, ALPHA = 1e6, 0.05, 0.06, 0.05, 1e-3
 elements = pytest.mark.parametrize(
@@ -125,21 +124,3 @@ def test_smooth_functions_do_not_jump():
         lambda x: np.array([x[0], np.sin(9.0 * x[0])]))
     state = scene.solve_static()
     assert list(state.recovery().forces.cuts) == [0.0, 16.0]
-
-
-@pytest.mark.parametrize("n", [4, 9])
-@pytest.mark.parametrize("b", [0.3, 1.0, 2.0])
-def test_smooth_curves_do_not_jump(n, b):
-    mesh = MeshBeam.init_curve(lambda s: np.array([np.cos(s), b * np.sin(s)]),
-                               np.linspace(0.0, 1.5, n), height=0.05)
-    beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(E=E, nu=0.3), B)
-    assert list(beam.across.jumps) == []
-
-
-def test_jumps_are_found_by_their_size():
-    def ask(X, e):
-        return 1.0 + X[0] + np.array([0.0, 1.0, 2.0, 3.5])[e][:, None]
-
-    assert jumps(ask, 4, np.zeros(1)).tolist() == [3.0]
-    assert jumps(ask, 4, np.zeros(1), 1.0).tolist() == []
-    assert jumps(lambda X, e: X[0], 1, np.zeros(1)).tolist() == []

@@ -7,7 +7,6 @@ from skfem import LinearForm
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, Scene, StVenantKirchhoff)
-from skfem_ancf.actions.forces import ForceElement, point
 from skfem_ancf.core.quadrature import gauss
 
 E, NU, RHO, H, B, G = 2e8, 0.3, 7800.0, 0.01, 0.02, 9.81
@@ -63,23 +62,6 @@ def test_normal_stress_across_under_a_body_force_that_varies_across(element):
              + q * (6.0 / H**3) * (0.25 * H**2 * Y - Y**3 / 3.0))
     found = state.stress(np.array([0.0 * Y + 0.45, Y]))[1]
     assert_allclose(found, exact, atol=2e-3 * np.abs(exact).max())
-
-
-class Moss(ForceElement):
-    """One of the user's own that acts all along."""
-
-    distributed = True
-
-    def bind(self, scene):
-        return [point(scene, None, (x, 0.0)) for x in np.linspace(0, 1, 9)]
-
-    def force(self, x, v, t):
-        return -0.1 * (x - [[X, 0.0] for X in np.linspace(0, 1, 9)])
-
-
-def test_force_elements_of_which_it_is_not_known_where_they_act_are_named():
-    state = held().gravity((0, -G)).add(Moss()).solve_static()
-    assert "Moss" in state.recovered[0]
 
 
 @pytest.mark.parametrize("element", ELEMENTS, ids=IDS)
@@ -155,17 +137,6 @@ def test_shear_stress_of_a_beam_that_creeps(element):
     assert_allclose(state.stress(np.array([0 * y + 0.5, y]))[2], exact, rtol=1e-2)
 
 
-@pytest.mark.parametrize("element", ELEMENTS, ids=IDS)
-@pytest.mark.parametrize("add", [
-    lambda s: s.damping(mass=3.0), lambda s: s.damping(stiffness=1e-3),
-    lambda s: s.damping(modal=[0.2, 0.1]), lambda s: s.drag(5.0, 1.2, 0.1),
-    lambda s: s.foundation(1e4, damping=20.0)],
-    ids=["mass", "stiffness", "modal", "drag", "foundation"])
-def test_sections_of_damped_motions_are_in_balance(element, add):
-    scene = add(held(element, n=8).gravity((0, -G)))
-    balanced(scene.integrate(0.05, 1e-3, scheme="generalized-alpha").state(-1))
-
-
 @pytest.mark.parametrize("element", ELEMENTS[:3], ids=IDS[:3])
 def test_section_force_of_a_damped_beam_is_that_of_the_part_behind_it(element):
     """Inertia, damping of the mass and drag of the rest, integrated here."""
@@ -187,46 +158,3 @@ def test_section_force_of_a_damped_beam_is_that_of_the_part_behind_it(element):
         total -= weight * RHO * B * H / 8 * np.sum(w * (a + alpha * v), axis=(1, 2))
     total += [0.0, -G * RHO * B * H / 2]
     assert_allclose(state.resultants((0.5, 0)).force, total, atol=1e-4 * np.abs(total).max())
-
-
-@pytest.mark.parametrize("curved", [False, True])
-@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCFCubic(3),
-                                     ElementBeamCable(5)], ids=str)
-def test_a_force_close_to_a_node(element, curved):
-    """What changes is in proportion to how far it is from the node."""
-    def stress(xi, e):
-        s = np.linspace(0, 1, 7)
-        mesh = (MeshBeam.init_curve(lambda s: np.array([s, 0.06 * np.sin(3 * s)]), s, 0.1) if curved
-                else MeshBeam.init_line(s, 0.02))
-        at = mesh.mapping().F(np.array([[xi], [0.5]]), np.array([e]))[:, 0, 0]
-        beam = Beam(mesh, element, StVenantKirchhoff(2e8, 0.3), width=0.05)
-        scene = Scene(beam).clamp("left", thickness="free").point_force((0, -1), at=at)
-        state = scene.point_force((0, -1), at=mesh.p[:, -1]).solve_static()
-        assert state.recovered == {0: ""}
-        points = mesh.mapping().F(np.array([[0.5], [0.9]]), np.arange(6))[..., 0]
-        return state.stress(points)[0]
-
-    at_node = stress(0.0, 3)
-    for far in (1e-6, 4e-6, 3e-5, 5e-4, 2e-3):
-        for xi, e in ((far, 3), (1.0 - far, 2)):
-            change = np.abs(stress(xi, e) - at_node).max() / np.abs(at_node).max()
-            assert change < 0.2 * far + 1e-7
-
-
-@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCFCubic(3),
-                                     ElementBeamCable(5)], ids=str)
-@pytest.mark.parametrize("far", [2e-5, 1e-4, 1e-3, 1e-2])
-def test_between_a_force_and_an_end_close_to_it(element, far):
-    """No noise in the sliver: no stress where nothing acts, else the pressure on its face."""
-    mesh = MeshBeam.init_curve(lambda s: np.array([s, 0.06 * np.sin(3 * s)]),
-                               np.linspace(0, 1, 7), 0.1)
-    near, middle, end = (mesh.mapping().F(np.array([3 * [xi], [0.0, 0.5, 1.0]]), np.array([e]))[
-        :, 0] for xi, e in ((1.0 - far, 5), (0.5, 2), (1.0 - 0.5 * far, 5)))
-    beam = Beam(mesh, element, StVenantKirchhoff(2e8, 0.3), width=0.05)
-    scene = Scene(beam).clamp("left", thickness="free").point_force((0, -1e-2), at=near[:, 1])
-    state = scene.solve_static(tol=1e-12)
-    assert state.recovered == {0: ""}
-    assert np.abs(state.stress(end)).max() < 1e-8 * np.abs(state.stress(middle)).max()
-    pressed = scene.pressure("top", 1.0).solve_static(tol=1e-12)
-    assert pressed.recovered == {0: ""}
-    assert_allclose(pressed.stress(end)[1], [0.0, -0.5, -1.0], atol=0.05)

@@ -8,11 +8,9 @@ from test_sections import (BIMETAL, BRASS, PROFILES, SANDWICH, STEEL, H, cantile
                            plane_stress, straight)
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        NeoHookean, Scene, Section)
-from skfem_ancf.materials.damping import KelvinVoigt
-from skfem_ancf.recovery.intervals import Intervals
-from skfem_ancf.sections.section import layer_of
+                        Scene, Section)
 from skfem_ancf.sections.measure import Uniform
+from skfem_ancf.sections.section import layer_of
 
 T = Section.profile("T", width=0.06, web=0.01, flange=0.015)
 ELEMENTS = [ElementBeamANCF(2), ElementBeamANCFCubic(2), ElementBeamCable(5)]
@@ -97,40 +95,6 @@ def test_a_heated_bimetal_strip(element):
     assert np.abs(found[1:]).max() < 1e-3 * np.abs(exact).max()
 
 
-def swinging(section, material, element, mesh):
-    beam = Beam(mesh, element, material, section=section, damping=KelvinVoigt(1e-3))
-    scene = Scene(beam).pin("left").gravity((0, -9.81)).temperature(lambda x, y: 50 * y + x)
-    return scene.integrate(0.05, 1e-3, scheme="generalized-alpha")
-
-
-@elements
-@pytest.mark.parametrize("nonlinear", [False, True])
-def test_layers_of_one_material_are_the_plain_body(element, nonlinear):
-    """A curved beam that swings, damped and heated; NeoHookean at rest."""
-    x = np.linspace(0, 1, 9)
-    mesh = MeshBeam.init_curve(lambda s: (np.sin(s), 1 - np.cos(s)), x, height=H)
-    if nonlinear:
-        if not element.order:
-            return
-        law = NeoHookean(E=1e5, nu=0.3, density=1000)
-        states = [Scene(Beam(mesh, element, material, section=section)).clamp("left").gravity(
-            (0, -1.0)).solve_static() for section, material in (
-                (Section.layers((0.03, law), (0.07, law), width=0.02), None),
-                (Section.profile("rectangle", width=0.02), law))]
-    else:
-        law = STEEL.replace(thermal_expansion=1e-5)
-        states = [swinging(section, material, element, mesh).state(-1) for section, material in (
-            (Section.layers((0.03, law), (0.07, law), width=0.02), None),
-            (Section.profile("rectangle", width=0.02), law))]
-    Y = np.linspace(-0.05, 0.05, 11)
-    at = np.array([np.sin(0.55) - Y * np.sin(0.55), 1 - np.cos(0.55) + Y * np.cos(0.55)])
-    one, two = (state.stress(at) for state in states)
-    assert states[0].recovered == states[1].recovered == {0: ""}
-    rotary = 0.0 if element.order else 1e-2  # which a cable of a plain rectangle has not
-    for a, b in zip(one, two):
-        assert_allclose(a, b, atol=(2e-4 + rotary) * np.abs(two).max())
-
-
 def test_pressure_goes_through_the_layers():
     """S_yy is continuous, zero at the bottom and the pressure at the top."""
     state = Scene(Beam(line(), ElementBeamANCFCubic(2), section=SANDWICH)).clamp("left").pressure(
@@ -170,22 +134,6 @@ def test_numbers_have_section_forces_and_no_fields(element):
     assert_allclose([r.N, r.Q, r.M], [1e-3, 1e-3, 5e-4], rtol=2e-5)
     assert_allclose([r.curvature, r.stretch - 1.0], [5e-4 / EI, 1e-3 / EA], rtol=2e-3)
     assert r.shear == pytest.approx(1e-3 / GA, rel=1e-2)
-
-
-def test_intervals_across():
-    """Integrals and values of polynomials, of layers and of a circle."""
-    for section, material in ((SANDWICH, None), (PROFILES["circle"][0], STEEL)):
-        across = Intervals(section.layers_on(line(), material), 2)
-        middle = across.points(np.ones(1))
-        eta = np.array([0.0, 0.3, 0.1, 1.0])
-        for k in range(4):
-            values = across.eta**k
-            assert_allclose(across.whole @ values, 1 / (k + 1), rtol=1e-10)
-            assert_allclose(across.from_bottom @ values, across.eta**(k + 1) / (k + 1), atol=1e-10)
-            assert_allclose(across.weights(eta) @ values, eta**k, atol=1e-9)
-            assert_allclose([middle.axis @ values, middle.till_axis @ values],
-                            [0.5**k, 0.5**(k + 1) / (k + 1)], atol=1e-10)
-    assert np.sum(across.whole * across.width) == pytest.approx(1.0, rel=1e-12)
 
 
 def narrower(x):

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
-                        StVenantKirchhoff)
-from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
+from skfem_ancf import Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.core.errors import InputError
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
 
 VARIANTS = [*(cls() for cls in SCHEMES.values() if cls.joined), GeneralizedAlpha(0.3),
             Newmark(0.36, 0.6)]
@@ -63,31 +62,6 @@ def test_two_halves_are_the_whole(scheme, build, compiled):
     assert np.abs(whole.u[-1] - half.u[-1]).max() > 0.01
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_two_halves_with_factors_that_are_not_symmetric(compiled):
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 1e-4)
-    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e12, 0.3, 7800.0), 0.01,
-                compiled=compiled)
-    scene = Scene(beam).pin("left").gravity((0, -9.81))
-    whole, half = (scene.integrate(t, 1e-2, "energy-momentum") for t in (0.2, 0.1))
-    rest = scene.integrate(0.2, 1e-2, "energy-momentum", start=half.state(-1))
-    assert np.array_equal(rest.u[-1], whole.u[-1]) and np.array_equal(rest.v[-1], whole.v[-1])
-    assert half.iterations + rest.iterations == whole.iterations
-
-
-def test_a_scene_built_again_goes_on_too():
-    whole = driven().integrate(0.2, 2.5e-3)
-    half = driven().integrate(0.1, 2.5e-3)
-    assert_same_end(driven().integrate(0.2, 2.5e-3, start=half.state(-1)), whole)
-    # one with other loads starts from the position and velocity, with its own accelerations
-    other = driven().gravity((0, 5.0))
-    rest = other.integrate(0.2, 2.5e-3, start=half.state(-1))
-    assert np.array_equal(rest.u[0], half.u[-1])
-    assert np.abs(rest.acceleration[0] - half.acceleration[-1]).max() > 1.0
-    free = ~np.isin(np.arange(other.layout.N), other.system.constraints.fixed)
-    assert_allclose(rest.v[0][free], half.v[-1][free], rtol=0, atol=1e-6)
-
-
 def test_the_start_has_the_last_word_about_the_velocity():
     scene = swinging()
     half = scene.integrate(0.1, 2.5e-3)
@@ -98,26 +72,6 @@ def test_the_start_has_the_last_word_about_the_velocity():
     begun = scene.integrate(0.01, 2.5e-3, start=still)
     assert begun.t[0] == 0.0
     assert_allclose(begun.velocity((1, 0))[0], [0.0, 2.0], rtol=0, atol=1e-9)
-
-
-def test_time_may_be_shifted():
-    """Nothing depends on time here, so that the motion is the same at other times."""
-    scene = swinging()
-    whole = scene.integrate(0.2, 2.5e-3)
-    half = scene.integrate(0.1, 2.5e-3)
-    later = scene.integrate(5.1, 2.5e-3, start=half.state(-1), t_start=5.0)
-    assert later.t[0] == 5.0
-    assert_allclose(later.u[-1], whole.u[-1], rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize("compiled", [True, False])
-def test_automatic_steps_go_on_in_their_size(compiled):
-    scene = swinging(compiled)
-    half = scene.integrate(0.1, "auto", rtol=1e-4)
-    rest = scene.integrate(0.2, "auto", rtol=1e-4, start=half.state(-1))
-    assert rest.t[1] - rest.t[0] > 0.1 * (half.t[-2] - half.t[-3])
-    fine = scene.integrate(0.2, 5e-4, t_eval=[0.2])
-    assert np.abs(rest.u[-1] - fine.u[-1]).max() < 1e-2
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])

@@ -1,16 +1,17 @@
 """Section forces, against the statics of the free body and closed forms."""
 
+import itertools
+
 import numpy as np
 import pytest
+from conftest import quarter_arc
 from numpy.testing import assert_allclose
 
-from conftest import quarter_arc
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.obstacles import Line
-from skfem_ancf.dynamics import GeneralizedAlpha
 from skfem_ancf.core.quadrature import gauss
-import itertools
+from skfem_ancf.dynamics import GeneralizedAlpha
 
 ELEMENTS = [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]
 
@@ -76,18 +77,6 @@ def test_end_force_on_an_arc(element):
     assert_allclose(np.exp(1j * found), np.exp(1j * between), atol=0.04)
 
 
-@pytest.mark.parametrize("side, sign", [("top", -1), ("bottom", 1)])
-def test_pressure_is_that_on_the_chord_of_the_face(side, sign):
-    """p times the turned chord of the deformed face, whatever its shape."""
-    p, h = 3.0, 0.02
-    state = Scene(line(h=h, E=2e6)).clamp("left").pressure(side, p).solve_static(tol=1e-12)
-    r = state.resultants()
-    face = state.position(np.array([r.s, -0.5 * sign * h + 0 * r.s]))
-    chord = face[:, -1:] - face
-    assert_allclose(r.force, sign * p * h * np.array([-chord[1], chord[0]]), atol=1e-8 * p * h)
-    assert np.abs(chord[1]).max() > 0.1  # it is bent
-
-
 @pytest.mark.parametrize("at", [0.5, 0.53], ids=["at a node", "inside of an element"])
 def test_beam_on_two_supports(at):
     """Force in the span: Q and M by statics, both sides of the jump."""
@@ -147,16 +136,6 @@ def test_strains_of_the_axis(element):
     assert_allclose(r.shear[inner], (k * r.Q / (E / (2 * (1 + nu)) * A))[inner], rtol=1e-4)
 
 
-def test_curvature_of_a_curved_bar_is_its_change():
-    mesh = quarter_arc(12, height=0.05)
-    beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(1e9, 0.3), width=0.05)
-    state = Scene(beam).clamp("left", thickness="free").moment("right", 1.0).solve_static()
-    r = state.resultants()
-    assert_allclose(r.M, 1.0, atol=1e-6)
-    # Golovin's bar: M / (E I) to the order (h / R)^2
-    assert_allclose(r.curvature[20:-20], 12 / (1e9 * 0.05**4), rtol=3e-3)
-
-
 def test_the_shear_force_of_a_cable_that_may_touch():
     """Recovered fields know no contact: the slope of the moment in the element is there instead."""
     near, free = (Scene(line(16, element=ElementBeamCable(5))).clamp("left").gravity((0, -9.81))
@@ -165,34 +144,6 @@ def test_the_shear_force_of_a_cable_that_may_touch():
     right = free.solve_static().resultants()
     assert not own.recovered and right.recovered
     assert_allclose(own.Q, right.Q, atol=0.04 * np.abs(right.Q).max())
-
-
-def test_heat_that_varies_along_a_cable_shears_nothing():
-    scene = Scene(line(16, element=ElementBeamCable(5))).clamp("left")
-    scene.eigenstrain(xx=lambda x, y, t: -0.2 * y * np.sin(3 * x))
-    own = scene.solve_static().resultants(recover=False)
-    EI = 2e8 * 0.01**4 / 12
-    assert np.abs(own.curvature).max() > 0.19 and np.abs(own.Q).max() < 1e-3 * EI * 0.6
-
-
-def test_the_elements_own():
-    """Without equilibrium: integrated stress, which is a little off."""
-    state = Scene(line(32)).clamp("left").gravity((0, -9.81)).solve_static()
-    own, right = state.resultants(recover=False), state.resultants()
-    middle = slice(4, None, 9)
-    for name, size in (("M", 0.05), ("curvature", 0.05), ("angle", 0.01), ("shear", 0.05)):
-        a, b = getattr(own, name)[middle], getattr(right, name)[middle]
-        assert np.abs(a - b).max() < size * max(np.abs(b).max(), 1.0)
-    assert not own.recovered and np.array_equal(own.s, right.s)
-    cable = Scene(line(32, element=ElementBeamCable(5))).clamp("left").gravity((0, -9.81))
-    state = cable.solve_static()
-    own, right = state.resultants(recover=False), state.resultants()
-    assert_allclose(own.M, right.M, atol=5e-3)
-    assert_allclose(own.Q, right.Q, atol=0.01 * np.abs(right.Q).max())
-    assert_allclose(own.force, np.array([np.cos(own.angle) * own.N - np.sin(own.angle) * own.Q,
-                                         np.sin(own.angle) * own.N + np.cos(own.angle) * own.Q]))
-    mode = cable.modes(1, state).mode(0, 0.01)  # about a state under load
-    assert not mode.resultants().recovered and np.all(np.isfinite(mode.resultants().M))
 
 
 def test_motion():

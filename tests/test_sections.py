@@ -1,6 +1,5 @@
 """Profiles, layers and numbers: against beam theory, and scikit-fem's Q2 elements in the plane."""
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -14,12 +13,10 @@ from skfem.helpers import sym_grad
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, ModelWarning, NameUnknown, NeoHookean, Scene, Section,
                         StVenantKirchhoff)
-from skfem_ancf.core.errors import CallError
-from skfem_ancf.materials.base import hooke
-from skfem_ancf.actions.obstacles import Line
-from skfem_ancf.core.quadrature import gauss
 from skfem_ancf.beam.interpolation import locate
-from skfem_ancf.sections.measure import Piece, Weighted
+from skfem_ancf.core.errors import CallError
+from skfem_ancf.core.quadrature import gauss
+from skfem_ancf.materials.base import hooke
 
 H = 0.1
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
@@ -106,23 +103,6 @@ def plane(pieces, length, force, n=(80, 4), ends=None):
 
 def axis_tip(basis, u, length):
     return (basis.probes(np.array([[length - 1e-12], [0.0]])) @ u).reshape(2)
-
-
-def test_rules_of_a_width_with_jumps_and_round_ends():
-    """Moments of an I and of a circle to high degree, with few points."""
-    jumps = Weighted([Piece(0.0, 0.2, 3.0), Piece(0.2, 0.9, 0.5), Piece(0.9, 1.0, 2.0)])
-    x, w = jumps.gauss(6)
-    total = 0.6 + 0.35 + 0.2
-    for k in range(12):
-        exact = (3.0 * 0.2**(k + 1) + 0.5 * (0.9**(k + 1) - 0.2**(k + 1))
-                 + 2.0 * (1 - 0.9**(k + 1))) / (k + 1)
-        assert total * np.sum(w * x**k) == pytest.approx(exact, rel=1e-13)
-    round_, = Section.profile("circle").layers_on(line(h=2.0), STEEL)
-    x, w = round_.measure.gauss(5)
-    # int_{-1}^{1} 2 sqrt(1 - y^2) y^{2 k} dy
-    for k, exact in enumerate(np.pi * np.array([1, 1 / 4, 1 / 8, 5 / 64, 7 / 128])):
-        assert np.pi * np.sum(w * (2 * x - 1) ** (2 * k)) == pytest.approx(exact, rel=1e-13)
-    assert_allclose(Weighted([Piece(0.0, 1.0, 2.0)]).gauss(7)[0], gauss(7)[0], atol=1e-14)
 
 
 @every
@@ -301,23 +281,6 @@ def plane_stress(basis, u, x, pieces, ends=None):
     return np.einsum("nij,jn->in", D, e)
 
 
-@pytest.mark.parametrize("section", [SANDWICH, BIMETAL, PROFILES["I"][0]])
-@pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm"])
-def test_tangents_are_derivatives_and_rigid_motion_strains_nothing(section, formulation):
-    material = None if section.has_materials else STEEL
-    beam = Beam(line(4), ElementBeamANCF(2), material, formulation=formulation, section=section)
-    k = beam.kernel
-    u, du = 1e-3 * np.random.default_rng(1).standard_normal((2, beam.N))
-    K = k.tangents(u)
-    change = np.imag(k.force(u + 1e-30j * du)) / 1e-30
-    gather = k.gather(du).reshape(4, -1)
-    assert_allclose(k.scatter(np.einsum("eij,ej->ei", K, gather).reshape(4, -1, 2)), change,
-                    atol=1e-11 * np.abs(change).max())
-    q, c, s = beam.q0_local.reshape(-1, 2), np.cos(2.0), np.sin(2.0)
-    turned = (q @ np.array([[c, s], [-s, c]]) - q).ravel()
-    assert np.abs(k.force(turned)).max() < 1e-9 * np.abs(K).max()
-
-
 def test_graded_moduli_and_densities():
     """E and rho as functions of (x, y): against integrals over the section."""
     law = StVenantKirchhoff(E=lambda x, y: 1e8 * (1 + x) * np.exp(10 * y), nu=0.0,
@@ -344,20 +307,6 @@ def test_graded_moduli_and_densities():
     soft = NeoHookean(E=law.E, nu=0.3)
     assert Beam(line(4), ElementBeamANCF(2), soft, width=0.02).kernel.energy(
         1e-3 * np.ones(40)) >= 0
-
-
-def test_graded_materials_vibrate_and_lie_on_obstacles():
-    """With functions that are constant: frequencies and contacts are those of the numbers."""
-    law = StVenantKirchhoff(E=lambda x, y: 1e8 + 0 * x, nu=0.0, density=lambda x, y: 1e3 + 0 * y)
-    plain = StVenantKirchhoff(E=1e8, nu=0.0, density=1e3)
-    frequencies, contacts = [], []
-    for material in (law, plain):
-        scene = Scene(Beam(line(8), ElementBeamANCFCubic(2), material, width=0.02)).clamp("left")
-        frequencies.append(scene.modes(3).frequencies)
-        state = scene.gravity((0, -9.81)).obstacle(Line((0, -0.0505))).solve_static()
-        contacts.append(state.contact().force)
-    assert_allclose(frequencies[0], frequencies[1], rtol=1e-9)
-    assert_allclose(contacts[0], contacts[1], rtol=1e-6)
 
 
 def mesh_x(beam, node):
@@ -421,17 +370,6 @@ def test_a_cable_says_that_it_does_not_shear():
 def test_errors_teach(make, kind, words):
     with pytest.raises(kind, match=words):
         make()
-
-
-def test_beams_with_sections_are_replaced_pickled_and_refined():
-    beam = Beam(line(), ElementBeamANCF(2), section=BIMETAL, name="strip")
-    other = pickle.loads(pickle.dumps(beam.replace(name="other")))
-    assert other.total_mass == beam.total_mass and other.section.has_materials
-    assert beam.replace(mesh=beam.mesh.refined()).total_mass == pytest.approx(beam.total_mass)
-    plain = beam.replace(section=None, material=STEEL, width=0.02)
-    assert plain.width == 0.02
-    profile = plain.replace(section=PROFILES["I"][0])
-    assert profile.width is None and profile.replace(material=BRASS).material is BRASS
 
 
 @pytest.mark.parametrize("height", [0.01, 0.1])

@@ -1,6 +1,5 @@
 """Sensors: what they read is what the states of every step say."""
 
-import pickle
 
 import numpy as np
 import pytest
@@ -8,7 +7,6 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, MeshError,
                         NameUnknown, Scene, StVenantKirchhoff)
-from skfem_ancf.core.errors import CheckpointError
 
 
 def swinging(element=None, **options):
@@ -66,42 +64,6 @@ def test_acceleration_of_a_falling_beam():
     read = scene.integrate(0.05, 1e-2, t_eval=[0.05]).sensors
     assert_allclose(read["a"], np.tile([1.0, -9.81], (6, 1)), atol=1e-6)
     assert_allclose(read.t, np.linspace(0, 0.05, 6), atol=1e-15)
-
-
-def test_steps_of_automatic_size_and_events():
-    scene = swinging().sensor("tip", "position", at=(1, 0))
-    history = scene.integrate(0.3, "auto", until=lambda state: state.position((1, 0))[1] + 0.05)
-    assert_allclose(history.sensors.t, history.t, atol=0)
-    assert_allclose(history.sensors["tip"], history.position((1, 0)), atol=1e-13)
-    assert_allclose(history.sensors["tip"][-1, 1], -0.05, atol=1e-9)
-
-
-def test_they_go_on_from_a_checkpoint(tmp_path, interrupted):
-    scene, path = with_all(swinging()), tmp_path / "run.npz"
-    whole = scene.integrate(0.03, 1e-3, t_eval=[0.03])
-    interrupt = interrupted(
-        lambda: scene.integrate(0.03, 1e-3, t_eval=[0.03], checkpoint=path, every=7))
-    assert len(interrupt.state.sensors.t) == 15
-    with pytest.raises(CheckpointError, match="sensors"):
-        swinging().resume(path)
-    again = scene.resume(path)
-    for name, values in whole.sensors.items():
-        assert_allclose(again.sensors[name], values, atol=1e-9 * (1 + np.abs(values).max()))
-    assert np.array_equal(again.sensors["tip"], whole.sensors["tip"])
-
-
-def test_they_pickle_and_are_in_the_plan():
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.02)
-    scene = Scene(Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e8, 0.3, 1000), 0.02))
-    scene.pin("left").gravity((0, -9.81)).sensor("tip", "position", at=(1, 0))
-    again = pickle.loads(pickle.dumps(scene.sensor("energy", tip_energy)))
-    a, b = (s.integrate(0.02, 1e-3) for s in (scene, again))
-    assert np.array_equal(a.sensors["tip"], b.sensors["tip"])
-    assert list(pickle.loads(pickle.dumps(a)).sensors) == ["tip", "energy"]
-    assert "2 read" in scene.plan("dynamic")["sensors"].reason
-    still = scene.plan()["sensors"]
-    assert still.status == "skipped" and "motions" in still.reason
-    assert "tip" in repr(a.sensors) and "position" in repr(scene._sensors["tip"])
 
 
 @pytest.mark.parametrize("make, error, message", [

@@ -1,6 +1,5 @@
 """Sliders on beams and bodies; welds and hinges at points between the ends of beams."""
 
-import pickle
 
 import numpy as np
 import pytest
@@ -9,8 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamANCFHermite, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
-                        RigidBody, Scene, StVenantKirchhoff)
+                        ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.equations.momentum import angular_momentum, momentum
 
 G = 9.81
@@ -25,31 +23,6 @@ def line(a, b, n, element=None, name=None, E=E, h=H, density=100.0, grading=1.0,
                               angle=np.arctan2(d[1], d[0]))
     return Beam(mesh, element or ElementBeamCable(), StVenantKirchhoff(E, 0.0, density), width=h,
                 name=name, damping=damping)
-
-
-# derivatives
-
-@pytest.mark.parametrize("angle", [False, True])
-@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamCable(5), ElementBeamANCF(3),
-                                     ElementBeamANCFCubic(2), ElementBeamANCFHermite(2, 5),
-                                     ElementBeamCable(15)], ids=repr)
-def test_derivatives_on_elements_of_unequal_length(element, angle):
-    rng = np.random.default_rng(0)
-    a = line((0, 0), (2, 0.5), 4, element, "a", grading=1.3)
-    b = line((0.8, 0.2), (1, 1), 3, element, "b")
-    scene = Scene(a, b, RigidBody(1.0, 0.1, (1.5, 0.4)))
-    for at in (("b", (0.8, 0.2)), (2, (1.2, 0.3)), ("ground", (1.2, 0.3))):
-        joint = scene.slider(at, "a", angle=angle)
-        u, v = 0.01 * rng.standard_normal(scene.layout.N), rng.standard_normal(scene.layout.N)
-        m, h = rng.standard_normal(1 + angle), 1e-6
-        slope = (joint.value(u + h * v, 0) - joint.value(u - h * v, 0)) / (2 * h)
-        assert_allclose(joint.jacobian(u, 0) @ v, slope, atol=1e-8)
-        i, j, values = joint.curvature(u, 0, m)
-        C = np.zeros((scene.layout.N, scene.layout.N))
-        np.add.at(C, (i, j), values)
-        second = m @ (joint.jacobian(u + h * v, 0) - joint.jacobian(u - h * v, 0)) / (2 * h)
-        assert_allclose(C @ v, second, rtol=0, atol=1e-7 * np.abs(second).max())
-        assert_allclose(C, C.T, rtol=0, atol=1e-12)
 
 
 # motion
@@ -97,19 +70,6 @@ def test_energy_of_a_body_that_slides_on_a_beam(element, angle):
     assert_allclose(history.position(body)[-1], scene_position(scene, history, s[-1]), atol=1e-7)
 
 
-def test_order_of_a_body_that_slides_on_a_beam():
-    """Second, towards what another scheme says."""
-    ends = []
-    for dt in (16e-3, 8e-3, 4e-3):
-        # damped: fast vibrations do not follow the order of steps as long as these
-        scene, _, slider = thrown(ElementBeamCable(), False, damping=KelvinVoigt(0.01))
-        ends.append(slider.distance(scene.integrate(0.4, dt).u[-1]))
-    assert_allclose((ends[0] - ends[1]) / (ends[1] - ends[2]), 4.0, rtol=0.1)
-    limit = ends[2] + (ends[2] - ends[1]) / 3
-    other = scene.integrate(0.4, 2e-3, scheme="generalized-alpha")
-    assert abs(slider.distance(other.u[-1]) - limit) < 0.3 * abs(ends[2] - limit)
-
-
 def scene_position(scene, history, s):
     """The point of the axis at a length of the stress-free one."""
     return history.position((s, 0.0), beam="rail")[-1]
@@ -144,65 +104,6 @@ def test_what_a_sleeve_in_flight_keeps(element, angle, n):
     assert_allclose(momenta - momenta[0], 0.0, atol=1e-10)
     turn = [angular_momentum(system, u, v) for u, v in zip(history.u, history.v)]
     assert_allclose(turn, turn[0], rtol=1e-10)
-
-
-@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamANCF(2),
-                                     ElementBeamANCFHermite(2, 5), ElementBeamCable(15)], ids=repr)
-def test_discrete_gradients(element):
-    """Without a remainder, in an element and over several, however far; as the derivative nearby.
-
-    What turns has a work of its own, for velocities that slide.
-    """
-    rng = np.random.default_rng(1)
-    beam = line((0, 0), (2, 0.5), 4, element, "a", grading=1.3)
-    scene = Scene(beam, RigidBody(1.0, 0.1, (1.5, 0.4)))
-    joint = scene.slider((1, (1.2, 0.3)), "a", angle=True)
-    N, m, seen = scene.layout.N, np.array([0.7, -0.3]), set()
-    for size in (1e-7, 1e-3, 0.3):
-        for _ in range(4):
-            ends = [0.02 * rng.standard_normal(N)]
-            ends.append(ends[0] + size * rng.standard_normal(N))
-            change, D = ends[1] - ends[0], np.zeros((2, N))
-            rows, columns, values = joint.mean_entries(*ends, 0.0)
-            np.add.at(D, (rows, columns), values)
-            gap = joint.value(ends[1], 0.0) - joint.value(ends[0], 0.0)
-            assert_allclose(D @ change, gap, rtol=0, atol=1e-13)
-            if size < 1e-2:
-                middle = joint.jacobian(0.5 * (ends[0] + ends[1]), 0.0)
-                assert_allclose(D, middle, rtol=0, atol=size)
-            v = [w - np.linalg.pinv(J) @ (J @ w) for w, J in zip(
-                rng.standard_normal((2, N)), (joint.jacobian(u, 0.0) for u in ends))]
-            X = joint.mean_turning(*ends, *v, 0.0, m)
-            assert_allclose(X @ change, 0.5 * m @ D @ (v[1] - v[0]), rtol=0, atol=1e-10)
-            seen.add(tuple(joint.axis.element(joint._parameter(u)) for u in ends))
-    assert any(a == b for a, b in seen) and any(a != b for a, b in seen)
-
-
-def test_a_sleeve_keeps_its_angle():
-    scene, body, slider = thrown(ElementBeamCable(5))
-    state = scene.integrate(0.3, 4e-3).state(-1 % 76)
-    s = slider.distance(state.u)
-    a, b = state.position((s - 1e-4, 0.0), "rail"), state.position((s + 1e-4, 0.0), "rail")
-    assert_allclose(state.angle(body), np.arctan2(*(b - a)[::-1]), atol=1e-7)
-    assert abs(state.angle(body)) > 1e-3
-
-
-@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
-def test_compiled_is_the_same(needs_compiled, monkeypatch, scheme):
-    runs = []
-    for way in ("0", "1"):
-        monkeypatch.setenv("SKFEM_ANCF_COMPILED", way)
-        scene, _, _ = thrown(ElementBeamANCF(2))
-        runs.append(scene.integrate(0.05, 5e-3, scheme=scheme).u)
-    assert_allclose(runs[1], runs[0], rtol=0, atol=1e-9)
-
-
-def test_a_slider_goes_on_from_a_checkpoint(tmp_path):
-    scene, _, _ = thrown(ElementBeamCable())
-    whole = scene.integrate(0.05, 5e-3, checkpoint=tmp_path / "run.npz", every=3)
-    assert np.array_equal(scene.resume(tmp_path / "run.npz").u, whole.u)
-    again = pickle.loads(pickle.dumps(scene))
-    assert np.array_equal(again.integrate(0.05, 5e-3).u, whole.u)
 
 
 def test_a_mass_that_leaves_its_beam_is_said_to():
@@ -331,64 +232,6 @@ def test_energy_in_a_slot_is_kept():
 
 # welds and hinges between ends
 
-def across(n, length=2.0, short=1e-4, **options):
-    """A beam of n elements, of which a short one has the middle of the beam inside of it."""
-    half = 0.5 * length
-    x = np.linspace(0, half - 0.4 * short, n // 2 + 1)
-    x = np.append(x, half + 0.6 * short + (half - 0.6 * short) * np.linspace(0, 1, n // 2 + 1))
-    return Beam(MeshBeam.init_line(x, H), options.pop("element", None) or ElementBeamCable(),
-                StVenantKirchhoff(E, 0.0, 100.0), width=H, **options)
-
-
-def frame(element, n):
-    """A girder of length 2, clamped at both ends, with a post of 0.7 on it.
-
-    With an odd number of elements the post stands inside of a short one.
-    """
-    girder = line((0, 0), (2, 0), n, element, "girder") if n % 2 == 0 else across(
-        n, element=element, name="girder")
-    post = line((1, 0), (1, 0.7), n, element, "post")
-    scene = Scene(girder, post)
-    for end in ("left", "right"):
-        scene.clamp(end, "girder", thickness="free")
-    return scene
-
-
-@pytest.mark.parametrize("element, n, tol", [
-    (ElementBeamCable(), 64, 1e-4), (ElementBeamCable(), 151, 1e-4),
-    (ElementBeamANCF(2), 128, 1e-4), (ElementBeamANCF(1), 151, 1e-3)], ids=str)
-def test_a_tee(element, n, tol):
-    """A force on the post: M l / 16 EI turns the middle; at a node, and inside an element."""
-    scene, F = frame(element, n), 1e-3 * EI
-    weld = scene.weld((1, 0))
-    state = scene.point_force((F, 0), (1, 0.7), "post").solve_static()
-    turn = -F * 0.7 * 2 / (16 * EI)
-    expected = -turn * 0.7 + F * 0.7**3 / (3 * EI) + F / (2 * EA)
-    assert_allclose(state.displacement((1, 0.7), "post")[0], expected, rtol=tol)
-    force = state.joint_force(weld)
-    assert_allclose(force[0], F, rtol=1e-6)
-    assert_allclose(abs(force[2]), F * 0.7, rtol=1e-4)
-    root = state.reactions("left", "girder"), state.reactions("right", "girder")
-    assert_allclose(sum(r.force[0] for r in root), -F, rtol=1e-6)
-
-
-def test_a_tee_is_as_two_beams_that_meet_in_it():
-    """Against a girder of two halves, all welded at one point by one call; large bending."""
-    F = 2.0 * EI
-    tee = frame(ElementBeamCable(), 96)
-    tee.weld((1, 0))
-    one = tee.point_force((F, 0), (1, 0.7), "post").solve_static()
-    halves = [line((0, 0), (1, 0), 48, name="a"), line((1, 0), (2, 0), 48, name="b"),
-              line((1, 0), (1, 0.7), 96, name="post")]
-    scene = Scene(*halves)
-    scene.clamp("left", "a", thickness="free").clamp("right", "b", thickness="free")
-    star = scene.weld((1, 0))
-    assert len(star.equations) == 6 and "from number 2" in star.equations[-1]
-    two = scene.point_force((F, 0), (1, 0.7), "post").solve_static()
-    tip = two.displacement((1, 0.7), "post")
-    assert np.hypot(*tip) > 0.15
-    assert_allclose(one.displacement((1, 0.7), "post"), tip, rtol=2e-3)
-
 
 @pytest.mark.parametrize("kind", ["one call", "several calls", "a body between"])
 def test_a_star(kind):
@@ -418,28 +261,6 @@ def test_a_star(kind):
         assert_allclose(state.angle(hub), turn, rtol=1e-4)
 
 
-def test_a_hinge_in_the_middle_of_a_beam():
-    """A post that stands on a girder by a hinge and is held at its top: a strut."""
-    scene = frame(ElementBeamCable(), 65)
-    hinge = scene.hinge((1, 0))
-    scene.joint("line", at=(1, 0.7), beam="post", direction=(0, 1))
-    F = 1e-3 * EI
-    state = scene.point_force((0, -F), (1, 0.7), "post").solve_static()
-    assert_allclose(state.displacement((1, 0), "girder")[1], -F * 8 / (192 * EI), rtol=1e-4)
-    assert_allclose(state.joint_force(hinge), (0, -F), atol=1e-6 * F)
-
-
-def test_a_weld_to_the_ground_inside_an_element():
-    """As a clamp there: two cantilevers."""
-    beam = across(101)
-    scene = Scene(beam)
-    scene.weld((beam, (1, 0)), ("ground", (1, 0)))
-    F = 1e-3 * EI
-    state = scene.point_force((0, F), (2, 0)).point_force((0, 2 * F), (0, 0)).solve_static()
-    assert_allclose(state.displacement([(2, 0), (0, 0)])[1], np.array([F, 2 * F]) / (3 * EI),
-                    rtol=2e-4)
-
-
 def test_a_post_on_the_surface_of_a_beam():
     """The point of a section is on its top: the arm of the girder's half height counts."""
     h = 0.1
@@ -455,17 +276,6 @@ def test_a_post_on_the_surface_of_a_beam():
     # the girder's shear: angle F arm / l / G A each side
     shear = F * arm * arm / 2 / (5 / 6 * 0.5e6 * h * h)
     assert_allclose(found, expected + shear, rtol=3e-2)
-
-
-def test_motion_of_a_tee():
-    """Energy, and the joint closed, in a weld inside an element."""
-    scene = frame(ElementBeamANCF(2), 5).gravity((30.0, 0.0))
-    weld = scene.weld((1, 0))
-    history = scene.integrate(0.2, 2e-3)
-    assert np.ptp(history.total_energy) < 1e-10
-    assert np.abs([weld.value(u, 0.0) for u in history.u]).max() < 1e-10
-    assert_allclose(history.position((1, 0), "post"), history.position((1, 0), "girder"),
-                    atol=1e-10)
 
 
 # what is refused

@@ -1,6 +1,5 @@
 """Springs and dashpots by functions of the caller's: against linear ones, SciPy and energy."""
 
-import pickle
 
 import numpy as np
 import pytest
@@ -38,26 +37,6 @@ def wound(a):
 
 LAWS = [hardening, (hardening, hardening_potential)]
 ELEMENTS = {"sections": ElementBeamANCF(2), "cable": ElementBeamCable(3)}
-
-
-@pytest.mark.parametrize("element", list(ELEMENTS))
-def test_a_linear_law_is_the_linear_spring(element):
-    made = []
-    for k, c, kt, ct in ((20.0, 0.5, 1.0, 0.01),
-                         (lambda s: 20.0 * s, lambda w: 0.5 * w, lambda a: 1.0 * a,
-                          lambda w: 0.01 * w)):
-        scene = Scene(beam_of(ELEMENTS[element])).clamp("left").gravity((0, -G))
-        scene.spring(k, between=((1, 0), (1, 0.5)), damping=c)
-        scene.torsional_spring(kt, at=(0.5, 0), damping=ct)
-        made.append(scene)
-    still = [scene.solve_static() for scene in made]
-    assert_allclose(still[1].u, still[0].u, atol=1e-10)
-    assert_allclose(still[1].strain_energy, still[0].strain_energy, rtol=1e-9)
-    moved = [scene.integrate(0.05, 1e-3) for scene in made]
-    assert_allclose(moved[1].u, moved[0].u, atol=1e-7)
-    assert_allclose(moved[1].dissipated[-1], moved[0].dissipated[-1], rtol=1e-5)
-    modes = [scene.modes(2).frequencies for scene in made]
-    assert_allclose(modes[1], modes[0], rtol=1e-7)
 
 
 def test_a_rigid_bar_on_a_hardening_spring_at_rest():
@@ -115,15 +94,6 @@ def test_a_spring_that_only_pulls():
     slack = scene.spring(lambda s: 30.0 * max(s, 0.0), ((1, 0), (1, -3.0))).solve_static()
     free = Scene(beam_of()).clamp("left").gravity((0, -G)).solve_static()
     assert_allclose(slack.u, free.u, atol=1e-9)
-
-
-def test_they_pickle_and_are_in_the_plan():
-    scene = Scene(beam_of()).clamp("left").gravity((0, -G))
-    scene.spring(hardening, between=((1, 0), (1, 0.5)), damping=drag)
-    again = pickle.loads(pickle.dumps(scene))
-    assert_allclose(again.solve_static().u, scene.solve_static().u, atol=1e-12)
-    assert "1 by functions" in scene.plan()["force elements"].reason
-    assert "Spring <k" in repr(scene.elements[0])
 
 
 @pytest.mark.parametrize("add, message", [

@@ -4,22 +4,15 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-
 from scipy.integrate import solve_ivp
+from test_dynamics import GRAVITY, by_scipy, soft
 
-from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, RigidBody, Scene,
-                        StVenantKirchhoff)
-from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
-                                 Radau)
+from skfem_ancf import Scene
+from skfem_ancf.core.errors import InputError
+from skfem_ancf.dynamics import SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Radau
 from skfem_ancf.dynamics.base import in_steps
 from skfem_ancf.dynamics.energy_momentum import PARTS
-from skfem_ancf.dynamics.run import integrator_of, interpolate
-from skfem_ancf.core.errors import InputError
 from skfem_ancf.equations.momentum import momentum
-
-from test_dynamics import GRAVITY, by_scipy, soft
-from test_restart import driven
 
 
 def positions(scene):
@@ -65,37 +58,6 @@ def test_error_is_in_proportion_to_the_tolerance(scheme, name):
     assert 0.05 < min(ratios) and max(ratios) < 2.5, ratios
 
 
-def test_first_order_schemes_too():
-    times, u = known("swinging")
-    scene = swinging()
-    ratios = []
-    for rtol in (1e-2, 2e-3):
-        run = scene.integrate(0.5, "auto", scheme=Newmark(0.36, 0.6), rtol=rtol, t_eval=times)
-        ratios.append(np.abs(run.u - u)[:, positions(scene)].max() / rtol)
-    assert 0.03 < min(ratios) and max(ratios) < 5, ratios
-
-
-def test_steps_of_fourth_order_keep_the_energy():
-    """Two rods on a hinge: of automatic size, a quarter of those of second order."""
-    def build():
-        a, b = (soft(2, 2, E=1e5, mesh=MeshBeam.init_line([k, k + 0.5, k + 1.0], 0.1), name=name)
-                for k, name in enumerate("ab"))
-        scene = Scene(a, b).pin("left", a).gravity(GRAVITY)
-        scene.hinge((a, (1, 0)), (b, (1, 0)))
-        return scene
-
-    history = build().integrate(0.5, "auto", scheme="energy-momentum-4", rtol=1e-4)
-    second = build().integrate(0.5, "auto", scheme="energy-momentum", rtol=1e-4)
-    assert np.ptp(history.total_energy) < 1e-12 * history.kinetic_energy.max()
-    gap = [history.position((1, 0), name) for name in "ab"]
-    assert_allclose(gap[0], gap[1], rtol=0, atol=1e-12)
-    assert history.steps < 0.25 * second.steps
-    scene = build()
-    fine = scene.integrate(0.5, 1.25e-3, scheme="radau")
-    off = np.abs(history.u[-1] - fine.u[-1])[positions(scene)].max()
-    assert 0.05 < off / (1e-4 * scene.system.size) < 1.0
-
-
 def one_step(scheme, u, v, x):
     """A step, of the length 1, of the vibration of the frequency x: its end, and its stages."""
     if scheme.name == "energy-momentum-4":  # rotations, by the midpoint rule
@@ -127,29 +89,6 @@ def test_estimates_are_the_errors_of_vibrations(scheme):
         old, u, v = new, u1, v1
     sizes = [np.sqrt(np.mean(np.square(e[8:]))) for e in (estimates, errors)]
     assert sizes[0] == pytest.approx(sizes[1], rel=0.1)
-
-
-def test_what_joints_undo_is_not_added_up():
-    """A body whose angle is given is where it is said to be; a single step still counts."""
-    body = RigidBody(1.0, 0.1, (0.5, 0))
-    scene = Scene(body).pin((0, 0), body)
-    scene.motor(body, angle=lambda t: 3.0 * t * t)
-    history = scene.integrate(2.0, "auto", scheme="generalized-alpha", rtol=1e-4)
-    assert_allclose(history.angle(body), 3.0 * history.t**2, rtol=0, atol=1e-9)
-    assert 100 < history.steps < 600  # 2700 if all were added up
-
-
-def test_what_is_damped_away_is_not_added_up():
-    """By a resistance alpha times the mass: 1 / (1 + alpha T / 2) is left in the mean of T."""
-    scene = swinging().damping(mass=40.0)
-    s = scene.system
-    integrator = integrator_of(s, Radau())
-    y = integrator.start(np.zeros(s.N), np.zeros(s.N), 0.0, 0.01)
-    integrator.step(y, 0.01)
-    du = np.random.default_rng(2).normal(size=s.N) * s.constraints.free
-    assert_allclose(integrator.scheme.lasting(integrator, du, 0.5), du / 11.0, rtol=1e-9)
-    free = integrator_of(swinging().system, Radau())
-    assert free.scheme.lasting(free, du, 0.5) is du
 
 
 @pytest.mark.parametrize("name, rtol, tol", [("swinging", 1e-6, 1e-3), ("vibrating", 1e-4, 1e-2)])
@@ -268,49 +207,7 @@ def test_steps_end_at_breakpoints(scheme, compiled):
     assert abs(run().momentum[-1][0] - 3.0 * 0.0444) > 1e-4
 
 
-@pytest.mark.parametrize("breakpoints", ["soon", [np.nan], [[0.1]]])
-def test_bad_breakpoints(breakpoints):
-    with pytest.raises(InputError, match="breakpoints"):
-        swinging().integrate(0.1, 0.01, breakpoints=breakpoints)
-
-
 # instants within steps
-
-
-def test_instants_within_steps_have_the_energy():
-    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamANCF(2),
-                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.02)
-    scene = Scene(beam).pin("left").gravity(GRAVITY)
-    times = np.linspace(0.0007, 0.1993, 41)
-    every = scene.integrate(0.2, 2e-3)
-    some = scene.integrate(0.2, 2e-3, t_eval=times)
-    scale = every.kinetic_energy.max()
-    energy = every.total_energy[0]
-    assert np.abs(some.total_energy - energy).max() < 1e-9 * scale
-    # what a polynomial between the steps would give
-    motions = [every.state(k)._motion for k in range(len(every))]
-    at = np.searchsorted(every.t, times)
-    hermite = [interpolate(motions[k - 1], motions[k], t) for k, t in zip(at, times)]
-    s = scene.system
-    drift = [s.strain_energy(y.u) + 0.5 * y.v @ s.mass.multiply(y.v) + s.load_potential(y.u)
-             - energy for y in hermite]
-    assert np.abs(drift).max() > 1e-6 * scale
-    # the steps do not depend on what is asked for
-    both = scene.integrate(0.2, 2e-3, t_eval=np.append(times, 0.2))
-    assert np.array_equal(both.u[-1], every.u[-1])
-    assert every.steps == some.steps == 100
-
-
-@pytest.mark.parametrize("dt", [2.5e-3, "auto"])
-def test_instants_within_steps_have_closed_joints(dt):
-    scene = driven()
-    times = np.linspace(0.0011, 0.0999, 23)
-    history = scene.integrate(0.1, dt, t_eval=times, rtol=1e-3)
-    s = scene.system
-    for t, u, v in zip(times, history.u, history.v):
-        assert np.abs(s.constraints.constraint(u, t)).max() < 1e-12
-        assert_allclose(u[s.constraints.fixed], s.constraints.values(1.0, t), rtol=0, atol=1e-14)
-    assert np.array_equal(history.t, times)
 
 
 @pytest.mark.parametrize("scheme", [*(cls() for cls in SCHEMES.values() if in_steps(cls())),
@@ -335,24 +232,3 @@ def test_order_within_steps(scheme):
     # where in its step an instant lies changes too: the rates scatter
     assert np.all(rates[:2] > 1.5) and np.all(rates[2:] > 1.2), rates
     assert np.all(rates < 3.5), rates
-
-
-def test_interpolation_is_of_fourth_order():
-    times = np.array([0.3, 0.305, 0.31, 0.32, 0.34, 0.38])
-    scene = Scene(soft()).clamp("left")
-    scene.gravity((0, -3.0), amplitude=lambda t: np.sin(1.5 * t) ** 2)
-    u, v = by_scipy(scene, times, rtol=1e-13, atol=1e-14)
-    from skfem_ancf.dynamics import Motion
-
-    motions = {round(t, 6): Motion(t, a, b, a, a, *np.zeros((2, 0)))
-               for t, a, b in zip(times, u, v)}
-    errors = []
-    for h in (0.08, 0.04, 0.02):
-        found = interpolate(motions[0.3], motions[round(0.3 + h, 6)], 0.3 + 0.25 * h)
-        exact = motions[round(0.3 + 0.25 * h, 6)]
-        errors.append([np.abs(found.u - exact.u).max(), np.abs(found.v - exact.v).max()])
-    rates = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(np.abs(rates[-1] - [4, 3]) < 0.25)
-
-
-# what is counted

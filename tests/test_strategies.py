@@ -1,7 +1,5 @@
 """The default of statics: what it tries, and scenes that only loads hold, against closed forms."""
 
-import importlib.util
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from scipy.optimize import brentq, root
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam,
                         Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.actions.obstacles import Circle, Line
-from skfem_ancf.solvers.strategies import HELD_BY_LOADS, STRATEGIES
 
 GRAVITY = (0.0, -9.81)
 
@@ -59,18 +56,6 @@ def test_slack_ropes_are_elastic_catenaries(slack, weight, n, element):
     newton = slack_rope(slack, weight, n, element).solve_static(method="newton")
     assert state.iterations <= 10 * newton.iterations
     assert abs(state.strain_energy - newton.strain_energy) < 1e-5 * newton.strain_energy
-
-
-def test_the_message_names_the_strategy_and_what_was_given_up():
-    rope = slack_rope(0.0027, 25.0, 40, ElementBeamCable(5)).solve_static()
-    assert "by Newton's method" in rope.message and rope.iterations < 20
-    assert "given up: the mixed iteration" in rope.message
-    short = Scene(Beam(line(8), ElementBeamANCF(2), steel(2e8), 0.01)).clamp("left")
-    state = short.gravity(GRAVITY).solve_static()
-    assert state.message.endswith("by the mixed iteration") and len(state.steps) == 1
-    only = short.solve_static(method="newton")
-    assert only.message.endswith("by Newton's method")
-    assert all(s.run.__doc__ for s in (*STRATEGIES, *HELD_BY_LOADS))
 
 
 # a rod under a line of constant tension
@@ -151,17 +136,6 @@ def test_a_chain_of_bars_hangs(angle, side):
         assert np.allclose(state.position(tuple((k + 1) * d), f"bar {k}"), at, rtol=0, atol=2e-4)
 
 
-@pytest.mark.parametrize("slack", [0.02, 0.5])
-def test_two_hinged_pieces_sag_as_a_triangle(slack):
-    scene, _ = chain(2, 0.0)
-    scene.fix("right", "r^2", beam="bar 1")
-    scene.fix("right", "r^1", displacement=-slack, beam="bar 1")
-    state = scene.solve_static()
-    low = np.sqrt(1.0 - (1.0 - 0.5 * slack) ** 2)
-    assert state.stability == "stable"
-    assert np.allclose(state.position((1, 0), "bar 0"), [1 - slack / 2, -low], rtol=0, atol=2e-4)
-
-
 def test_a_mooring_line_on_the_sea_bed_is_a_catenary_where_it_is_lifted():
     h, n, H, V = 0.05, 100, 3000.0, 3000.0
     beam = Beam(line(n, 100.0, h), ElementBeamCable(5), steel(2e9), width=h)
@@ -215,25 +189,6 @@ def test_a_frame_that_hangs_on_a_hinge():
     assert abs(centre[0]) < 1e-3 and centre[1] < -0.3
 
 
-# random scenes
-
-
-CAMPAIGN = Path(__file__).parents[1] / "benchmarks" / "strategies.py"
-
-
-@pytest.mark.skipif(not CAMPAIGN.exists(), reason="benchmarks/ is not in the distribution")
-@pytest.mark.parametrize("kind", ["rope", "cable", "guyed_rod", "arch", "frame", "cantilever",
-                                  "column", "chain"])
-def test_the_default_does_not_lose_to_explicit_methods(kind):
-    """A few of the scenes of benchmarks/strategies.py, which draws hundreds."""
-    spec = importlib.util.spec_from_file_location("strategies_campaign", CAMPAIGN)
-    campaign = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(campaign)
-    explicit = {name: campaign.EXPLICIT[name] for name in ("mixed", "newton")}
-    for number in range(2):
-        assert campaign.lost(campaign.draw(kind, number), explicit)[0] == []
-
-
 # errors
 
 
@@ -257,9 +212,3 @@ def test_an_error_says_what_was_tried_and_what_the_last_state_is_beyond():
     with pytest.raises(ConvergenceError) as error:
         cantilever(StVenantKirchhoff(E, 0.0)).solve_static(method="mixed", **options)
     assert "descent" not in str(error.value) and "use NeoHookean" in str(error.value)
-
-
-def test_a_pendulum_of_adaptive_elements():
-    beam = Beam(line(4, 2.0), ElementBeamCable(5), steel(2e9), width=0.01)
-    state = Scene(beam).pin("left").gravity(GRAVITY).solve_static(adapt=1e-3)
-    assert np.allclose(state.position((2, 0)), [0, -2], rtol=0, atol=1e-3)

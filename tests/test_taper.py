@@ -1,6 +1,5 @@
 """Heights and widths that vary: against integrals of beam theory and the wedge of elasticity."""
 
-import pickle
 
 import numpy as np
 import pytest
@@ -10,10 +9,9 @@ from scipy.integrate import solve_bvp
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, InputError, MeshBeam, MeshError, Scene,
                         StVenantKirchhoff)
+from skfem_ancf.beam.interpolation import locate
 from skfem_ancf.core.errors import CallbackError
 from skfem_ancf.core.quadrature import gauss
-from skfem_ancf.beam.interpolation import locate
-from skfem_ancf.scene.adapt import refine
 
 ELEMENTS = {"order 1": ElementBeamANCF(1), "order 2": ElementBeamANCF(2),
             "order 4": ElementBeamANCF(4), "Patel-Shabana": ElementBeamPatelShabana(),
@@ -190,18 +188,6 @@ def test_width_as_a_function_of_both_coordinates(element):
     assert state.resultants((0.5, 0.0), recover=False).M == pytest.approx(M, rel=2e-2)
 
 
-def test_loads_on_faces_have_the_width_and_the_slope_of_the_face():
-    beam = Beam(straight(), ElementBeamANCF(2), STEEL, width=lambda x, y: 0.1 + 0.05 * x)
-    scene = Scene(beam).clamp("left").pressure("top", 3.0)
-    load = scene.system.loads[0].force(np.zeros(beam.N))
-    total = [load @ beam.rigid_motions()[:, k] for k in (0, 1)]
-    wide = integral(lambda x: 0.1 + 0.05 * x)
-    # n da = (-h'/2, 1) dx on the top
-    assert_allclose(total, [-3.0 * 0.02 * wide, -3.0 * wide], rtol=1e-12)
-    pull = Scene(beam).traction("right", (2.0, 0.0)).system.loads[0].force(np.zeros(beam.N))
-    assert pull @ beam.rigid_motions()[:, 0] == pytest.approx(2.0 * 0.15 * 0.06, rel=1e-13)
-
-
 @pytest.mark.parametrize("mesh", [straight(), curved()])
 def test_points_are_found_and_meshes_refined(mesh):
     X = np.random.default_rng(2).uniform(0, 1, (2, 20))
@@ -217,29 +203,6 @@ def test_points_are_found_and_meshes_refined(mesh):
     part = mesh.restrict([1, 2])
     assert_allclose(part.heights, mesh.heights[:, 1:3])
     assert_allclose(mesh.scaled(2.0).refined().heights, 2.0 * fine.heights)
-
-
-@every
-def test_refined_meshes_have_the_same_state(element):
-    """Spaces are nested: energy and force of a state are those on a finer mesh."""
-    scene = Scene(Beam(straight(), element, STEEL, width=0.1, formulation="continuum")
-                  ).clamp("left").gravity((0, -50))
-    state = scene.solve_static()
-    finer, prolong = refine(scene, [[0, 3]])
-    u = prolong(state.u)
-    assert_allclose(finer.beams[0].weight((0, 1)) @ u, scene.beams[0].weight((0, 1)) @ state.u,
-                    rtol=1e-12)
-    assert finer.beams[0].kernel.energy(u) == pytest.approx(state.strain_energy, rel=1e-3)
-
-
-def test_files_and_pickles(tmp_path):
-    mesh = straight()
-    mesh.save(tmp_path / "mesh.npz")
-    other = MeshBeam.load(tmp_path / "mesh.npz")
-    assert_allclose(other.heights, mesh.heights)
-    assert_allclose(other.refined().heights, mesh.refined().heights, rtol=1e-13)
-    beam = pickle.loads(pickle.dumps(Beam(mesh, ElementBeamANCF(2), STEEL, width=sides)))
-    assert beam.mesh.taper(1.0) == taper(1.0) and beam.width(0.0, 0.0) == 0.1
 
 
 @pytest.mark.parametrize("height, kind, words", [
@@ -262,9 +225,3 @@ def test_bad_heights(height, kind, words):
 def test_bad_widths(width, words):
     with pytest.raises(InputError, match=words):
         Beam(straight(), ElementBeamANCF(2), STEEL, width=width)
-
-
-def test_a_kink_at_a_node_is_kept():
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=lambda x: 0.1 + 0.1 * np.abs(x - 0.5))
-    assert Beam(mesh, ElementBeamANCF(2), STEEL, width=1.0).total_mass == pytest.approx(
-        7800 * 0.125, rel=1e-13)

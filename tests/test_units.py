@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.joints import JOINTS
 
@@ -127,43 +127,6 @@ def test_joints_that_are_open_at_the_start_are_told(L):
     scene.joint("angle", at="right", angle=lambda t: 1e-6 + t)
     with pytest.raises(SupportError, match="open by"):
         scene.integrate(t_end=0.1, dt=0.01)
-
-
-def side_by_side(k, L=1.0, origin=(0.0, 0.0), order=slice(None)):
-    """A frame of k equal cantilevers, 0.001 L apart, under the same forces at their tips."""
-    x, y = np.meshgrid(L * np.array([0.0, 1.0]), 1e-3 * L * np.arange(k))
-    lines = np.arange(2 * k).reshape(k, 2)[order]
-    return Frame.from_lines(np.column_stack([x.ravel(), y.ravel()]) + origin, lines,
-                            height=0.1 * L, width=0.1 * L, elements=2,
-                            material=StVenantKirchhoff(1e6 * L * L, 0.3, 1000.0)).clamp(
-        np.arange(0, 2 * k, 2)).point_force((0.0, -20.0 * L**4), at=np.arange(1, 2 * k, 2))
-
-
-@pytest.mark.parametrize("L, origin, order", [(1.0, (0, 0), slice(None)),
-                                              (1e-3, (0, 0), slice(None)),
-                                              (1.0, (3.0, -5.0), slice(None, None, -1))])
-def test_many_lines_do_not_make_a_scene_larger(L, origin, order):
-    """The error of a motion and its steps are those of one line, wherever and in which order."""
-    frames = side_by_side(1, L, origin), side_by_side(12, L, origin, order)
-    assert np.isclose(frames[1].beams[0].size, np.hypot(1.0, 0.011) * L, rtol=1e-12)
-    one, many = (frame.integrate(t_end=0.3, dt="auto", rtol=1e-3, scheme="generalized-alpha",
-                                 check=True) for frame in frames)
-    assert len(many.t) == len(one.t)
-    assert np.isclose(many.error, one.error, rtol=1e-3)
-
-
-def test_how_far_bodies_reach():
-    """The box round lines; a curled one may be drawn straight, what lies apart adds up."""
-    from skfem_ancf.mesh.mesh_beam import reach
-
-    arc = MeshBeam.init_curve(lambda s: [np.cos(s), np.sin(s)], np.linspace(0, np.pi, 9), 0.05)
-    bar = MeshBeam.init_line(np.linspace(0, 1, 3), 0.05)
-    far, near = bar.translated((1e3, 0.0)), bar.rotated(0.5 * np.pi)
-    assert np.isclose(reach([arc]), np.pi, rtol=1e-12)
-    assert reach([bar, far]) == reach([far, bar]) == 2.0
-    assert np.isclose(reach([bar, near]), np.sqrt(2.0), rtol=1e-12)
-    assert np.isclose(reach([bar.translated((7.0, 8.0)), near.translated((7.0, 8.0))]),
-                      np.sqrt(2.0), rtol=1e-12)
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])

@@ -42,67 +42,6 @@ def test_section_forces_near_a_joint_are_those_of_the_nearest_axis(case):
         assert_allclose(found.curvature, M / EI, rtol=1e-2, atol=1e-8)
 
 
-def test_all_readings_choose_alike(case):
-    frame, state = case
-    for at, line, other in (((0, 3.9), 0, 2), ((0.02, 3.9), 0, 2), ((0.15, 3.95), 2, 0),
-                            ((-0.1, 4.05), 1, 1), ((0.1, 3.95), 2, 0)):
-        for recover in (True, False):
-            for name in ("strain", "stress"):
-                found = [getattr(state, name)(at, recover=recover, line=k)
-                         for k in (line, other)]
-                assert_allclose(getattr(state, name)(at, recover=recover), found[0], rtol=0,
-                                atol=1e-9 * np.abs(found).max())
-                assert line == other or not np.allclose(*found, rtol=1e-3, atol=0)
-            assert state.resultants(at, recover=recover).M == pytest.approx(
-                state.resultants(at, recover=recover, line=line).M, rel=1e-9, abs=1e-6)
-        assert_allclose(state.field("von_mises", at), state.field("von_mises", at, line=line))
-        for name in ("displacement", "position", "velocity"):
-            assert_allclose(getattr(state, name)(at), getattr(state, name)(at, line=line),
-                            rtol=1e-9)
-        history = frame.sensor("S", "S_xx", at=at).sensor("u", "displacement", at=at).sensor(
-            "M", "M", at=at).integrate(2e-3, 1e-3)
-        last = history.state(-1)
-        assert_allclose(history.sensors["S"][-1], last.field("S_xx", at, recover=False, line=line),
-                        rtol=1e-6)
-        assert_allclose(history.sensors["u"][-1], last.displacement(at, line=line), rtol=1e-12)
-        assert_allclose(history.sensors["M"][-1],
-                        last.resultants(at, recover=False, line=line).M, rtol=1e-7, atol=1e-6)
-        strain = last.strain(at, line=line)
-        assert_allclose(history.strain(at)[-1], strain, rtol=0, atol=1e-7 * np.abs(strain).max())
-        assert_allclose(history.displacement(at)[-1], history.displacement(at, line=line)[-1])
-        assert_allclose(history.resultants(at).M[-1], last.resultants(at, line=line).M, rtol=1e-6,
-                        atol=1e-6)
-        many = [(0, 1), at, (1, 4)]
-        assert_allclose(state.strain(many)[:, 1], state.strain(at), rtol=1e-6, atol=1e-15)
-        assert_allclose(state.displacement(np.array(many).T)[:, 1], state.displacement(at))
-
-
-def test_the_node_is_read_from_each_line(case):
-    frame, state = case
-    for read in (state.resultants, state.strain, state.stress,
-                 lambda at: state.field("S_xx", at), lambda at: frame.sensor("N", "N", at=at)):
-        with pytest.raises(InputError, match=r"as near to the axes of lines \[0, 1, 2\].*line=0"):
-            read((0, 4))
-    with pytest.raises(InputError, match=r"axes of lines \[0, 2\]"):
-        state.strain([(0, 1), (0.1, 3.9)])
-    column, left, right = (state.resultants((0, 4), line=k) for k in range(3))
-    assert_allclose([column.M, left.M, right.M], [-2 * F, 0, -2 * F], rtol=0, atol=1e-4 * F)
-    assert_allclose(column.force + left.force, right.force, rtol=0, atol=1e-5 * F)
-    assert_allclose([column.N, right.Q], [-F, -F], rtol=1e-4)
-    strains = [state.strain((0, 4), line=k)[0] for k in range(3)]
-    assert strains[0] == pytest.approx(-F / (2e11 * 0.1 * H), rel=1e-2)
-    assert_allclose(strains[1:], 0.0, atol=1e-2 * abs(strains[0]))
-    places = [state.displacement((0, 4), line=k) for k in range(3)]
-    assert_allclose(places, [state.displacement((0, 4))] * 3, rtol=1e-9)
-    for k, (a, b) in enumerate(LINES):
-        along = state.resultants(line=k)
-        assert_allclose(along.x[:, 0], POINTS[a], atol=1e-12)
-        assert_allclose(along.x[:, -1], POINTS[b], atol=1e-12)
-    history = frame.sensor("N", "N", at=(0, 4), line=0).integrate(2e-3, 1e-3)
-    assert_allclose(history.sensors["N"][-1],
-                    history.state(-1).resultants((0, 4), line=0, recover=False).N, rtol=1e-9)
-
-
 def test_a_follower_force_at_a_node_turns_with_the_line_that_is_named():
     """A weak column that leans as the girder on it is pushed: the force turns with either."""
     for groups in ("together", "apart"):
@@ -130,14 +69,6 @@ def test_a_follower_force_at_a_node_turns_with_the_line_that_is_named():
     joint(ElementBeamCable(5), "apart").follower_force((0, -F), at=(1, 4)).solve_static()
 
 
-def test_no_points_are_none_of_them(case):
-    _, state = case
-    none = np.zeros((2, 0))
-    assert state.displacement(none).shape == (2, 0) and state.strain(none).shape == (3, 0)
-    with pytest.raises(MeshError, match="outside the body|in none of the"):
-        state.displacement([(0, 1), (0.3, 3.7)])
-
-
 def test_lines_that_are_not_there_are_refused(case):
     frame, state = case
     with pytest.raises(InputError, match="the frame has no line 3: its lines are numbered 0 to 2"):
@@ -150,21 +81,6 @@ def test_lines_that_are_not_there_are_refused(case):
     if len(frame.beams) > 1:
         with pytest.raises(InputError, match="line 0 is in the beam 'column', not in"):
             state.strain((0, 4), frame.beams[-1 if frame.beams[0].name == "column" else 0], line=0)
-
-
-@pytest.mark.parametrize("groups", GROUPS)
-def test_loads_near_a_joint_act_on_the_nearest_axis(groups):
-    """As on a frame with a node there."""
-    below = (0, 3.9)
-    points = [*POINTS, below]
-    lines = [(0, 4), *LINES[1:], (4, 1)]
-    fine = {"groups": None, "points": points, "lines": lines}
-    tips = []
-    for options in ({"groups": groups}, fine):
-        frame = joint(ElementBeamANCF(2), **options, elements=8, height=0.3)
-        frame.spring(1e6, between=(below, ("ground", (3, 3.9)))).point_force((0, -F), at=3)
-        tips.append(frame.solve_static(tol=1e-11).displacement((2, 4)))
-    assert_allclose(tips[0], tips[1], rtol=2e-3)
 
 
 @pytest.mark.parametrize("groups, beam", [("together", 0), ("apart", "column")])
