@@ -55,6 +55,15 @@ class EigenStrain(Load):
         (x, y, t), which statics take at t = 1. None for zero.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
+
+    Other Parameters
+    ----------------
+    layer, x, y
+        A :class:`~skfem_ancf.sections.Layer` and material coordinates, shape (...).
+    X, e
+        Reference points, shape (2, n, m), and their elements, shape (n,).
+    u, factor
+        Displacement of the beam's degrees of freedom, shape (N,); a factor on the strain.
     """
 
     constant = False
@@ -83,20 +92,7 @@ class EigenStrain(Load):
             ("xx", xx), ("yy", yy), ("xy", xy)))
 
     def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
-        """(eps_xx, eps_yy, 2 eps_xy) of a layer of a section at material coordinates.
-
-        Parameters
-        ----------
-        layer
-            A :class:`~skfem_ancf.sections.Layer`.
-        x, y
-            Coordinates, shape (...).
-
-        Returns
-        -------
-        ndarray
-            Shape (3, ...).
-        """
+        """(eps_xx, eps_yy, 2 eps_xy) of a layer at coordinates x, y (...); shape (3, ...)."""
         factors = 1.0, 1.0, 2.0
         return np.array([c * _asked(f"eps_{name}", f, x, y) for c, name, f in zip(
             factors, COMPONENTS, (self.xx, self.yy, self.xy))])
@@ -154,20 +150,7 @@ class EigenStrain(Load):
         return 1.0, one
 
     def element_forces(self, u: Array, factor: float = 1.0) -> Array:
-        """The forces on the coordinates of each element.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates, shape (N,).
-        factor
-            On the strain.
-
-        Returns
-        -------
-        ndarray
-            Shape (nelements, nb, 2).
-        """
+        """Forces (nelements, nb, 2) on each element at u (N,), of a factor times the strain."""
         beam = self.beam
         u_e = beam.kernel.gather(u)
         if self._elements is not None:
@@ -221,13 +204,7 @@ class EigenStrain(Load):
     # fields
 
     def strain_at(self, X: Array, e: Array) -> Array:
-        """E0 at points, shape (3, n, m).
-
-        Parameters
-        ----------
-        X, e
-            Reference points (2, n, m) and their elements (n,).
-        """
+        """E0 at reference points X (2, n, m) of elements e (n,), shape (3, n, m)."""
         across = self.beam.across
         x, y = across.coordinates(X, e)
         which, out = np.broadcast_to(across.which(X, e), x.shape), np.empty((3, *x.shape))
@@ -237,17 +214,7 @@ class EigenStrain(Load):
         return out
 
     def stress_at(self, u: Array, X: Array, e: Array, factor: float = 1.0) -> Array:
-        """What the stress is less by at points, S(E) - S(E - factor E0), shape (3, n, m).
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates, shape (N,).
-        X, e
-            Reference points (2, n, m) and their elements (n,).
-        factor
-            On the strain.
-        """
+        """What the stress is less by at points, S(E) - S(E - factor E0), shape (3, n, m)."""
         beam, E0 = self.beam, self.strain_at(X, e)
         if not beam.has_sections:
             stretch, _ = stretched(on_grid(strain_at, beam, u, X, e)[0])
@@ -261,13 +228,7 @@ class EigenStrain(Load):
             X, E, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
 
     def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
-        """What the nominal stress of a cable, force per stress-free area, is less by, (3, n, m).
-
-        Parameters
-        ----------
-        X, e, factor
-            As for :meth:`stress_at`, shapes (2, n, m) and (n,).
-        """
+        """What a cable's nominal stress, force per stress-free area, is less by, (3, n, m)."""
         E0 = factor * self.strain_at(X, e) * np.array([1.0, 0.0, 0.0])[:, None, None]
         return self.beam.across.of_layers(X, E0, [
             lambda layer=layer: layer.material.axial_modulus * E0
@@ -424,17 +385,7 @@ class _AtTime:
 
 
 class Coefficient:
-    """The factor of one product as a function of time.
-
-    Parameters
-    ----------
-    name, function
-        For messages, and the function (x, y, t).
-    x, y, weights
-        Places at which it is asked, and what its values there are multiplied by, shape (k,).
-    amplitude
-        Another factor, a function of time, or None.
-    """
+    """The factor of one product as a function of time: its values at some places, weighted."""
 
     def __init__(self, name: str, function: Callable[..., Any], x: Array, y: Array,
                  weights: Array, amplitude: TimeFunction = None) -> None:

@@ -94,6 +94,11 @@ class Load(Item):
     for_bodies : bool
         It may act on a :class:`~skfem_ancf.RigidBody` too.
 
+    Other Parameters
+    ----------------
+    u, u0, u1
+        Displacements of the beam's degrees of freedom, shape (N,), and at both ends of a step.
+
     Examples
     --------
     Springs below a beam, so many newton a metre at each node:
@@ -145,15 +150,10 @@ class Load(Item):
         return (self._with(beam=layout.number(self.beam)),)
 
     def bind(self, beam: Any) -> Any:
-        """The load on a beam: by default a copy with :attr:`beam` set.
+        """The load on a beam, or a rigid body if :attr:`for_bodies`: by default a copy.
 
         Override it where something is computed from the beam, and leave ``self`` as it is, which is
         bound to other beams later.
-
-        Parameters
-        ----------
-        beam
-            A :class:`~skfem_ancf.Beam`, or a :class:`~skfem_ancf.RigidBody` if :attr:`for_bodies`.
         """
         return self._with(beam=beam)
 
@@ -175,18 +175,7 @@ class Load(Item):
         return self.factor(t), self
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        """A mean of the force between two displacements whose work is exact if it can be.
-
-        Parameters
-        ----------
-        u0, u1
-            Displacements of the beam's coordinates, shape (N,).
-
-        Returns
-        -------
-        ndarray
-            Shape (N,).
-        """
+        """A mean (N,) of the force from u0 to u1, (N,) each, whose work is exact if it can be."""
         return self.force(0.5 * (u0 + u1))
 
     def force(self, u: Array) -> Array:
@@ -196,7 +185,7 @@ class Load(Item):
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         """Derivative of the force: rows, columns and values.
 
-        Rows and columns are coordinates of one node or of neighbouring nodes.
+        Rows and columns are degrees of freedom of one node or of neighbouring nodes.
         """
         raise NotImplementedError
 
@@ -205,14 +194,10 @@ class Load(Item):
         return None
 
     def spread(self, u: Array) -> Spread | None:
-        """How the force at the displacement ``u`` is spread over the body, or None.
+        """How the force at the displacement ``u`` is distributed over the body, or None.
 
         Recovered fields need to know. By default it is taken to act on the nodes, or the point
-        inside of an element, whose coordinates it acts on, and not known if they are neighbours.
-
-        Returns
-        -------
-        skfem_ancf.beam.distribution.Spread or None
+        inside of an element, whose degrees of freedom it acts on; not known if they are neighbours.
         """
         stations = stations_of_vector(self.beam, self.force(u))
         return None if stations is None else Spread(stations=stations)

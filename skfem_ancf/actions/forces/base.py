@@ -70,6 +70,15 @@ class ForceElement(Item):
     groups
         Points of the surface that it may touch, of an obstacle.
 
+    Other Parameters
+    ----------------
+    layout
+        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+    x, v, t
+        Places and velocities of the points, shape (n, 2) each; time, in statics the load factor.
+    y
+        Places at the end of a step, shape (n, 2), whose start is at ``x`` and middle at ``t``.
+
     Examples
     --------
     A spring to the ground that hardens, with a dashpot:
@@ -104,11 +113,6 @@ class ForceElement(Item):
     def bind(self, layout: Layout) -> Sequence[Vector]:
         """The points and sections on which it acts; the scene calls it of a copy.
 
-        Parameters
-        ----------
-        layout
-            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-
         Returns
         -------
         list
@@ -118,73 +122,29 @@ class ForceElement(Item):
         raise NotImplementedError
 
     def force(self, x: Array, v: Array, t: float) -> Array:
-        """The force on each point; on the direction of a section what works on its change.
-
-        Parameters
-        ----------
-        x, v
-            Places and velocities of the points, shape (n, 2) each.
-        t
-            Time; in statics the load factor.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, 2).
-        """
+        """The force on each point, (n, 2); on directions of sections what works on their change."""
         raise NotImplementedError
 
     def potential(self, x: Array) -> float | None:
-        """The potential of the force without velocities; None if there is none.
-
-        Parameters
-        ----------
-        x
-            Places of the points, shape (n, 2).
-        """
+        """The potential of the force without velocities; None if there is none."""
         return None
 
     def potential_at(self, x: Array, t: float) -> float | None:
-        """The potential at a time, of items whose energy depends on it.
-
-        Parameters
-        ----------
-        x, t
-            Places of the points, shape (n, 2), and the time.
-        """
+        """The potential at a time, of items whose energy depends on it."""
         return self.potential(x)
 
     def gain(self, x: Array, y: Array, t: float) -> float | None:
-        """The potential at y less that at x; None if there is none.
-
-        Parameters
-        ----------
-        x, y, t
-            Places of the points at the start and the end of a step, shape (n, 2) each, and the
-            time in the middle of it.
-        """
+        """The potential at y less that at x; None if there is none."""
         before = self.potential_at(x, t)
         after = None if before is None else self.potential_at(y, t)
         return None if before is None or after is None else after - before
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
-        """A mean of the force without velocities whose work is what the potential loses.
+        """A mean (n, 2) of the force without velocity whose work is what the potential loses.
 
         By default that in the middle, corrected along the change of the places (Gonzalez 1996):
         the work is exact, but the correction may have a moment. What keeps angular momentum
         exactly is a mean of its own, as of :class:`Spring` and :class:`TorsionalSpring`.
-
-        Parameters
-        ----------
-        x, y
-            Places of the points at the start and the end of a step, shape (n, 2) each.
-        t
-            Time in the middle of it.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, 2).
         """
         d = y - x
         force = np.asarray(self.force(0.5 * (x + y), 0.0 * x, t), dtype=float)
@@ -195,33 +155,14 @@ class ForceElement(Item):
         return force - (gain + np.sum(force * d)) / square * d
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
-        """Derivative of the force by the places; by a complex step or differences by default.
+        """Derivative of the force by the places, shape (n, 2, n, 2), the derivative's last.
 
-        Parameters
-        ----------
-        x, v, t
-            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
-
-        Returns
-        -------
-        ndarray
-            Shape (n, 2, n, 2), the derivative's last.
+        By a complex step or differences by default.
         """
         return derivative(lambda y: self.force(y, v, t), x)
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
-        """Derivative of the force by the velocities, as :meth:`stiffness`.
-
-        Parameters
-        ----------
-        x, v, t
-            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
-
-        Returns
-        -------
-        ndarray
-            Shape (n, 2, n, 2).
-        """
+        """Derivative of the force by the velocities, as :meth:`stiffness`."""
         return derivative(lambda w: self.force(x, w, t), v)
 
     def unheld(self) -> ForceElement:
@@ -229,11 +170,11 @@ class ForceElement(Item):
         return self
 
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
-        """Rows, columns and values that it adds to the mass matrix, shapes (k,); None for none."""
+        """Rows, columns and values (k,) that it adds to the mass matrix; None for none."""
         return None
 
     def parts(self) -> list[Part] | None:
-        """Of what the texts know, once it is bound; None for an element of your own."""
+        """Of what kernels know, once it is bound; None for a user-defined element."""
         return None
 
     def __repr__(self) -> str:
@@ -268,19 +209,12 @@ def derivative(function: Callable[[Array], Any], x: Array) -> Array:
 
 
 def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
-    """A copy of a force element, bound to a scene and tried there.
+    """A copy of a force element, bound to a scene and tried there; or InputError.
 
     Parameters
     ----------
-    element
-        A :class:`ForceElement`.
-    layout
-        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-
-    Raises
-    ------
-    InputError
-        If the element does not keep to the interface of :class:`ForceElement`.
+    element, layout
+        As it was given, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     """
     bound = element._thawed()
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]

@@ -138,13 +138,7 @@ class Control(ForceElement):
     # what it does
 
     def measured(self, x: Array, v: Array) -> dict[str, Any]:
-        """What the law is told, by name.
-
-        Parameters
-        ----------
-        x, v
-            Places and velocities of the points, shape (n, 2) each.
-        """
+        """What the law is given, by name."""
         out: dict[str, Any] = {}
         k = self._ends
         for name, _ in self.points:
@@ -159,13 +153,7 @@ class Control(ForceElement):
         return out
 
     def ask(self, x: Array, v: Array, t: float) -> Any:
-        """The value of the law: a number, or a force (2,).
-
-        Parameters
-        ----------
-        x, v, t
-            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
-        """
+        """The value of the law: a number, or a force (2,)."""
         values = self.measured(x, v)
         if self.kind == "moment":
             return ask_number("law(t = {:g})", lambda t: self.law(t, **values), float(t))
@@ -176,8 +164,6 @@ class Control(ForceElement):
 
         Parameters
         ----------
-        x, v, t
-            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
         first
             A motion begins: what was held before is forgotten.
         """

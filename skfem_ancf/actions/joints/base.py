@@ -67,6 +67,20 @@ class Joint(Item):
     tabled : bool
         Of the package's own joints: Phi is at most quadratic in u, with second derivatives that do
         not depend on t. Those of others are tried.
+
+    Other Parameters
+    ----------------
+    layout
+        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+    u, v, t
+        Displacement of the scene's degrees of freedom and a direction, shape (N,); time, in statics
+        the load factor.
+    multipliers
+        Those of the equations, shape (m,).
+    u0, u1, v0, v1
+        Displacements and velocities at the ends of a step, shape (N,); ``t`` is in its middle.
+    times, N
+        Times, shape (n,), and the number of the scene's degrees of freedom.
     """
 
     equations: tuple[str, ...] = ()
@@ -94,81 +108,28 @@ class Joint(Item):
             cls.jacobian = jacobian  # type: ignore[method-assign]
 
     def bind(self, layout: Layout) -> None:
-        """Find the points and sections; the scene calls it of a copy.
-
-        Parameters
-        ----------
-        layout
-            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-        """
+        """Find the points and sections; the scene calls it of a copy."""
         raise NotImplementedError
 
     def value(self, u: Array, t: float) -> Array:
-        """The equations Phi, which are zero where the joint is closed.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        t
-            Time; in statics the load factor.
-
-        Returns
-        -------
-        ndarray
-            Shape (m,).
-        """
+        """The equations Phi, which are zero where the joint is closed; shape (m,)."""
         raise NotImplementedError
 
     def jacobian(self, u: Array, t: float) -> Array:
-        """Derivative of Phi by u; by default that of :meth:`entries`.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        t
-            Time; in statics the load factor.
-
-        Returns
-        -------
-        ndarray
-            Shape (m, N).
-        """
+        """Derivative of Phi by u, shape (m, N); by default that of :meth:`entries`."""
         raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """The entries of :meth:`jacobian` that are not zero; those at one place add up.
+        """Rows, columns and values (k,) of :meth:`jacobian`; those at one place add up.
 
         A joint that defines them costs what it holds, however many beams a scene has; else they
         are looked for in the dense rows.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        t
-            Time; in statics the load factor.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,).
         """
         raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
         """The sum over k of multipliers[k] d^2 Phi_k / du^2.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        t
-            Time; in statics the load factor.
-        multipliers
-            Those of its equations, shape (m,).
 
         Returns
         -------
@@ -178,17 +139,7 @@ class Joint(Item):
         return None
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        """The second derivative of Phi in a direction, a number for each equation.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        t
-            Time; in statics the load factor.
-        v
-            The direction, shape (N,).
-        """
+        """The second derivative of Phi in a direction v, shape (m,)."""
         out = np.zeros(len(self.equations))
         for k, unit in enumerate(np.eye(len(out))):
             second = self.curvature(u, t, unit)
@@ -199,44 +150,15 @@ class Joint(Item):
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
 
-        That in the middle, which is one where Phi is quadratic.
-
-        Parameters
-        ----------
-        u0, u1
-            Displacements at the ends of a step, shape (N,).
-        t
-            Time in the middle of it.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,).
+        By default that in the middle, which is one where Phi is quadratic.
         """
         return self.entries(0.5 * (u0 + u1), t)
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
-        """X with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
+        """X (N,) with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
 
-        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, which is one where Phi
-        is quadratic.
-
-        Parameters
-        ----------
-        u0, u1
-            Displacements at the ends of a step, shape (N,).
-        v0, v1
-            Velocities there that the joint allows, shape (N,).
-        t
-            Time in the middle of it.
-        multipliers
-            Shape (m,).
-
-        Returns
-        -------
-        ndarray
-            Shape (N,).
+        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, exact for quadratic Phi.
         """
         second, v = self.curvature(0.5 * (u0 + u1), t, multipliers), v0 + v1
         if second is None:
@@ -245,32 +167,11 @@ class Joint(Item):
         return -0.25 * np.bincount(rows, values * v[columns], len(v))
 
     def lost(self, u: Array) -> str:
-        """Why the joint cannot hold in a converged state, in words; "" if it can.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        """
+        """Why the joint cannot hold in a converged state, in words; "" if it can."""
         return ""
 
     def offset(self, times: Array, N: int) -> Array:
-        """Phi of the stress-free state at several times.
-
-        A joint that moves may override it to ask for its motion only.
-
-        Parameters
-        ----------
-        times
-            Times, shape (n,).
-        N
-            Number of the scene's coordinates.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, m).
-        """
+        """Phi of the reference configuration at several times, shape (n, m)."""
         zero = np.zeros(N)
         return np.array([self.value(zero, t) for t in times])
 
@@ -280,36 +181,16 @@ class Joint(Item):
         return self.moving and not self.constant
 
     def moved(self, times: Array, N: int) -> Array:
-        """Those columns of :meth:`offset` that depend on time.
-
-        Parameters
-        ----------
-        times
-            Times, shape (n,).
-        N
-            Number of the scene's coordinates.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, k).
-        """
+        """Those columns of :meth:`offset` that depend on time, shape (n, k)."""
         return self.offset(times, N)
 
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
-        """The derivative of Phi in the stress-free state at several times.
-
-        Parameters
-        ----------
-        times
-            Times, shape (n,).
-        N
-            Number of the scene's coordinates.
+        """The derivative of Phi in the reference configuration at several times.
 
         Returns
         -------
         columns, values
-            Shapes (k,) and (n, m, k): of the coordinates on which it depends.
+            Shapes (k,) and (n, m, k): of the degrees of freedom on which it depends.
         """
         zero = np.zeros(N)
         if self.turning:
@@ -321,20 +202,7 @@ class Joint(Item):
         return columns, np.broadcast_to(J, (len(times),) + J.shape)
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        """As :meth:`slope`, by its entries; a joint of many equations overrides it.
-
-        Parameters
-        ----------
-        times
-            Times, shape (n,).
-        N
-            Number of the scene's coordinates.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,), (k,) and (n, k).
-        """
+        """Rows and columns (k,) and values (n, k) of :meth:`slope`."""
         if type(self).slope is Joint.slope and not self.turning:
             rows, columns, values = self.entries(np.zeros(N), times[0])
             return rows, columns, values[None].repeat(len(times), axis=0)
@@ -344,31 +212,11 @@ class Joint(Item):
         return entry // k, columns[entry % k], values.reshape(len(times), m * k)
 
     def driven(self, times: Array, N: int) -> Array:
-        """:meth:`offset`, and beside it the values of :meth:`slope_entries`.
-
-        A joint that moves may override it to ask for its motion once.
-
-        Parameters
-        ----------
-        times
-            Times, shape (n,).
-        N
-            Number of the scene's coordinates.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, m + k).
-        """
+        """:meth:`offset`, and beside it the values of :meth:`slope_entries`, shape (n, m + k)."""
         return np.hstack([self.offset(times, N), self.slope_entries(times, N)[2]])
 
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
-        """The second derivatives of Phi in the stress-free state, equation by equation.
-
-        Parameters
-        ----------
-        N
-            Number of the scene's coordinates.
+        """The second derivatives of Phi in the reference configuration.
 
         Returns
         -------
@@ -397,19 +245,12 @@ class Joint(Item):
 
 
 def bind_joint(joint: Joint, layout: Layout) -> Joint:
-    """A copy of a joint, bound to a scene and tried there: what it returns fits the scene.
+    """A copy of a joint, bound to a scene and tried there; or InputError.
 
     Parameters
     ----------
-    joint
-        A :class:`Joint`, as it was given.
-    layout
-        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-
-    Raises
-    ------
-    InputError
-        If the joint does not keep to the interface of :class:`Joint`.
+    joint, layout
+        As it was given, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     """
     bound = joint._thawed()
     try:

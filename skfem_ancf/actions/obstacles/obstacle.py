@@ -139,10 +139,8 @@ class Obstacle(ForceElement):
 
         Parameters
         ----------
-        t
-            The time.
-        rates
-            With its velocities, else zero.
+        t, rates
+            The time, and whether its velocities are wanted, else zero.
         """
         out = np.array([0.0, 0.0, 1.0, 0.0, *self.shape.pivot, 0.0, 0.0, 0.0, t])
         if self.moves:
@@ -159,7 +157,7 @@ class Obstacle(ForceElement):
         return np.append(place, turn)
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        """Its surface at a time as straight pieces.
+        """Its surface as straight pieces: points (2, n), and both ends of each, (m, 2).
 
         Parameters
         ----------
@@ -167,11 +165,6 @@ class Obstacle(ForceElement):
             Lower left and upper right of what is to be seen, one a column, shape (2, 2).
         t
             Time; in statics the load factor.
-
-        Returns
-        -------
-        points, pieces
-            Shape (2, n), and the numbers of both ends of each, (m, 2).
         """
         if not self.moves:
             return self.shape.outline(box, t)

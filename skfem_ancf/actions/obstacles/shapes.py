@@ -52,6 +52,15 @@ class Shape(Immutable):
     inner
         How deep a point may be in it before it is closer to another side: half of its least
         thickness; infinite if there is no other side, large if that is not known.
+
+    Other Parameters
+    ----------------
+    x, t
+        Points, shape (2, ...), and time, for a shape of functions of it.
+    box
+        Lower left and upper right of what is to be seen, one a column, shape (2, 2).
+    scale
+        A length of the body whose points are x.
     """
 
     kind = CUSTOM
@@ -61,20 +70,7 @@ class Shape(Immutable):
     hollow = False
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        """The distance of points from the surface, negative in what is solid.
-
-        Parameters
-        ----------
-        x
-            Points, shape (2, ...).
-        t
-            Time, for a shape of functions of it.
-
-        Returns
-        -------
-        ndarray
-            Shape (...).
-        """
+        """The distance (...) of points from the surface, negative in what is solid."""
         raise NotImplementedError
 
     def landmarks(self) -> Array:
@@ -82,37 +78,11 @@ class Shape(Immutable):
         return np.zeros((2, 0))
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        """Its surface as straight pieces.
-
-        Parameters
-        ----------
-        box
-            Lower left and upper right of what is to be seen, shape (2, 2), one a column.
-        t
-            Time, for a shape of functions of it.
-
-        Returns
-        -------
-        points, pieces
-            Shape (2, n), and the numbers of both ends of each, (m, 2).
-        """
+        """Its surface as straight pieces: points (2, n), and both ends of each, (m, 2)."""
         raise NotImplementedError
 
     def fitted(self, x: Array, scale: float) -> Shape:
-        """The shape for a body: functions of the caller's are tried there.
-
-        Parameters
-        ----------
-        x
-            Points of the body, shape (2, n).
-        scale
-            A length of the body.
-
-        Raises
-        ------
-        CallbackError
-            If a function is not what a shape needs.
-        """
+        """The shape for a body; CallbackError if a function is not what a shape needs."""
         return self
 
     def __repr__(self) -> str:
@@ -406,20 +376,7 @@ class SignedDistance(Shape):
                          / (2.0 * step) for e in np.eye(2)[:, :, None]])
 
     def derivatives(self, x: Array, t: float) -> Array:
-        """Distance, gradient and second derivatives xx, xy, yy.
-
-        Parameters
-        ----------
-        x
-            Points, shape (2, n).
-        t
-            Time.
-
-        Returns
-        -------
-        ndarray
-            Shape (6, n).
-        """
+        """Distance, gradient and second derivatives xx, xy, yy, shape (6, n)."""
         out = np.empty((6, x.shape[1]))
         out[0], out[1:3] = self._asked("f", x, t), self._slope(x, t)
         if self.hessian is not None:
