@@ -12,7 +12,7 @@ from ...core.band import Band
 from ...core.callbacks import handle_of
 from ...core.errors import InputError
 from .active_set import project, projected, projection
-from .crossing import Passage, middle_of
+from .crossing import CrossingGuard, middle_of
 from .gap import distances, places, surface
 from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, of_contacts, push, resist, rub,
                       states, way)
@@ -396,9 +396,9 @@ class Contacts:
         return any(group.depth < np.inf for _, group in self.groups)
 
     @cached_property
-    def sweep(self) -> Passage:
+    def sweep(self) -> CrossingGuard:
         """What looks for obstacles that a body has passed through from one instant to the next."""
-        return Passage(self)
+        return CrossingGuard(self)
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Which obstacle a body has passed through between displacements and times, in words."""

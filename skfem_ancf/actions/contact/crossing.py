@@ -1,9 +1,9 @@
-"""What bodies pass through on their way from one instant to the next.
+"""A guard against steps in which bodies jump over an obstacle.
 
-The distance from an obstacle changes by no more than the way. So a point that goes the way w and
-has the distances g_0 and g_1 at its ends has been no deeper than ``(w - g_0 - g_1) / 2`` in
-between, which tells most points of most steps without looking at their way. Of the others those
-have passed through that are deeper on it than at both of its ends, and on another side at its end.
+The gap changes by no more than the way. So a point that goes the way w and has the gaps g_0 and g_1
+at its ends has been no deeper than ``(w - g_0 - g_1) / 2`` in between, which tells most points of
+most steps without looking at their way. Of the others those have crossed the obstacle that are
+deeper on the way than at both of its ends, and on another side at its end.
 """
 
 from __future__ import annotations
@@ -12,20 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .gap import outline, places, surface
+from .gap import outline
 from .poses import taken_back
-from .tables import CUSTOM, RADIUS, STIFFNESS
+from .tables import CUSTOM, STIFFNESS
 
 if TYPE_CHECKING:
     from ...core.types import Array
 
-#: Parts of a way at which points are looked at, at most.
-MOST_PARTS = 400
+#: Parts of a way at which points are looked at, at most; points that are looked at together.
+MOST_PARTS, TOGETHER = 400, 200_000
 #: Of a cubic way: its length by the largest of the displacement and of what the rates at both ends
 #: would make, and by how much they differ from it.
 LONGER, BENT = 1.6, 0.3
-#: How far points are from the middle of an element on the way, by how far at its ends.
-WIDER = 1.2
 #: The way after which short steps are looked at again, and the depth that is said, in what is half
 #: of the thickness of an obstacle.
 AGAIN, DEEP = 1.0, 0.5
@@ -34,41 +32,22 @@ AGAIN, DEEP = 1.0, 0.5
 ASIDE = 0.62
 
 
-class Passage:
-    """Looks for points that have passed through an obstacle between two instants.
-
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene.
-    """
+class CrossingGuard:
+    """Looks for points that have crossed an obstacle between two instants."""
 
     def __init__(self, contacts: Any) -> None:
-        self._poses: dict[tuple[int, float], Array] = {}
-        self._paths = [_Path(contacts, k, self._poses) for k, (_, group) in enumerate(
-            contacts.groups) if group.depth < np.inf]
+        self._paths = [_Path(contacts, k) for k, (_, group) in enumerate(contacts.groups)
+                       if group.depth < np.inf]
 
     def first(self, u: Array, v: Array | None, t: Array) -> tuple[int, str]:
-        """How many steps pass through nothing, and through what the next one does.
+        """How many steps cross nothing, and which obstacle the next one does, in words.
 
-        Parameters
-        ----------
-        u, v
-            Displacement and velocity of the coordinates at all instants, shape (n + 1, N); no
-            velocity for ways that are straight.
-        t
-            Times, shape (n + 1,); in statics load factors.
-
-        Returns
-        -------
-        int, str
-            The number of steps, n if there are no more, and the obstacle in words.
+        Of displacements and velocities at all instants, (n + 1, N), none for straight ways, and
+        times or load factors, (n + 1,).
         """
         done, text = len(t) - 1, ""
-        self._poses.clear()
         for path in self._paths:
-            rates = np.zeros((done + 1, 0)) if v is None else v[:done + 1]
-            k = path.first(u[:done + 1], rates, t[:done + 1])
+            k = path.first(u[:done + 1], None if v is None else v[:done + 1], t[:done + 1])
             if k < done:
                 done, text = k, repr(path.obstacle)
             if done == 0:
@@ -94,38 +73,29 @@ class Passage:
 class _Path:
     """The ways of the points of a group."""
 
-    def __init__(self, contacts, k, poses):
-        self._which, self._group = contacts.groups[k]
-        self.obstacle, self._poses = contacts.obstacles[self._which], poses
-        self._contacts, self._numbers = contacts, contacts.numbers(self._which)
-        self._pair = contacts.pair(k)
-        self._tables, group = contacts.tables, self._group
-        first = group.first[::group.points]
-        self._dofs = first[:, None] + np.arange(2 * len(group.weights))
-        self._range = slice(int(first.min()), int(first.max()) + self._dofs.shape[1])
-        middle = middle_of(group)
-        self._start, self._mean, self._spread = middle[:2], middle[2::2], middle[3::2]
+    def __init__(self, contacts, k):
+        self._contacts, (self._which, self._group) = contacts, contacts.groups[k]
+        self.obstacle = contacts.obstacles[self._which]
+        self._numbers, group = contacts.numbers(self._which), self._group
+        self._dofs = group.first[:, None] + np.arange(2 * len(group.weights))
+        self._range = slice(int(self._dofs.min()), int(self._dofs.max()) + 1)
         bound, half = np.abs(group.weights), len(group.weights) // 2
-        self._bound = self._spread = self._spread.max(axis=1)[1:]
         if len(group.slopes):  # normals turn by no more than twice the change of a slope
-            turned = 2.0 * np.abs(group.offsets * group.slopes)
-            bound, self._bound = bound + turned, self._bound + turned.max(axis=1)[1:]
+            bound = bound + 2.0 * np.abs(group.offsets * group.slopes)
         self._most = (bound[:half] + bound[half:]).max(axis=1)
         self._by_time = self.obstacle.moves or self.obstacle.shape.kind == CUSTOM
-        self._turns = 0.0 if self.obstacle.angle is None else 2.0
         self.deepest = self.gone = 0.0
 
     def first(self, u, v, t):
-        """The first step on which a point passes through the obstacle, or how many there are."""
+        """The first step on which a point crosses the obstacle, or how many there are."""
         steps = np.arange(len(t) - 1)
         if not self._by_time:
             steps, = np.nonzero(self._looked(LONGER * self._longest(u, v, t)))
-        if len(steps):
-            ends = [np.array([x[steps], x[steps + 1]]) for x in (u, v, t)]
-            near = self._near(*ends)
-            for k in np.nonzero(near.any(axis=1))[0]:
-                if self._passes(np.nonzero(near[k])[0], *(x[:, k] for x in ends)):
-                    return int(steps[k])
+        size = max(1, TOGETHER // len(self._dofs))
+        for k in range(0, len(steps), size):
+            found = self._first_of(steps[k:k + size], u, v, t)
+            if found is not None:
+                return found
         return len(t) - 1
 
     def _looked(self, ways):
@@ -138,97 +108,85 @@ class _Path:
 
     def _longest(self, u, v, t):
         """No less than the largest of displacements, and of what rates would make; shape (n,)."""
-        h = np.diff(t)[:, None]
         way = np.abs(np.diff(u[:, self._range], axis=0))
-        for rate in (v[:-1], v[1:]) if v.size else ():
-            way = np.maximum(way, np.abs(h * rate[:, self._range]))
-        types = 2 * len(self._most)
-        size = way.reshape(len(way), -1, types).max(axis=1).reshape(len(way), -1, 2).max(axis=2)
-        return np.sqrt(2.0) * (size @ self._most)
+        if v is not None:
+            rate = np.maximum(np.abs(v[:-1, self._range]), np.abs(v[1:, self._range]))
+            way = np.maximum(way, np.diff(t)[:, None] * rate)
+        size = way.reshape(len(way), -1, 2 * len(self._most)).max(axis=1)
+        return np.sqrt(2.0) * (size.reshape(len(way), -1, 2).max(axis=2) @ self._most)
 
-    def _near(self, u, v, t):
-        """Which elements may pass through the obstacle in each step, or be deep in it.
+    def _first_of(self, steps, u, v, t):
+        """The first of some steps on which a point crosses the obstacle, or None."""
+        ends, depth = (steps, steps + 1), self._group.depth
+        x = [self._seen(u[at], t[at]) for at in ends]
+        gap = [self._gap(y, t[at]) for y, at in zip(x, ends)]
+        self.deepest = max(self.deepest, -float(np.min(gap)))
+        way = np.hypot(*np.moveaxis(x[1] - x[0], 1, 0))
+        if v is not None:
+            h, change = (t[steps + 1] - t[steps])[:, None], u[steps + 1] - u[steps]
+            way += BENT * sum(self._sizes(h * v[at] - change) for at in ends)
+        most = depth + np.maximum(-np.minimum(*gap), 0.0)
+        long, inside = way - gap[0] - gap[1] > 2.0 * most, np.maximum(*gap) < -depth
+        for k in np.flatnonzero((long | inside).any(axis=1)):
+            at, = np.nonzero(long[k] | inside[k])
+            of = slice(steps[k], steps[k] + 2)
+            if self._crosses(at, u[of], None if v is None else v[of], t[of], way[k, at],
+                             most[k, at], long[k, at], inside[k, at]):
+                return int(steps[k])
+        return None
 
-        Of both ends of n steps, the first axis; shape (n, elements).
-        """
-        x, change = self._middles(u)
-        wide = self._group.numbers[RADIUS] + _sizes(change) @ self._spread
-        if self._by_time:
-            x = np.array([[self._seen(*each) for each in zip(*end)] for end in zip(x, t)])
-            gap = np.array([[self._asked(*each)[0] for each in zip(*end)] for end in zip(x, t)])
-        else:
-            gap = self._asked(np.moveaxis(x, 2, 0).reshape(2, -1), 0.0)[0].reshape(wide.shape)
-        self._tables.counts[0] += gap.size
-        way = np.hypot(*np.moveaxis(x[1] - x[0], 1, 0)) + self._bent(u, v, t)
-        wide = WIDER * np.maximum(wide[1], wide[0])
-        passes = way + self._turns * wide + _sizes(change[1] - change[0]) @ self._bound > (
-            2.0 * self._group.depth)
-        deep = gap[1] - wide < -DEEP * self.obstacle.shape.inner
-        return (gap[1] + gap[0] - way < 2.0 * wide) & (passes | deep)
-
-    def _middles(self, u):
-        """Middles of elements, and pairs of coordinates, the places of both nodes as one way."""
-        pairs = u[..., self._dofs].reshape(*u.shape[:2], len(self._dofs), -1, 2)
-        x = np.einsum("ntepc,pe->ntce", pairs, self._mean)
-        pairs[..., len(self._mean) // 2, :] -= pairs[..., 0, :]
-        return self._start + x, pairs[..., 1:, :]
-
-    def _bent(self, u, v, t):
-        """How much longer than straight the ways of points are, at most; (n, elements)."""
-        if not v.size:
-            return 0.0
-        h, out = (t[1] - t[0])[:, None], 0.0
-        for rate in v:
-            x, change = self._middles((h * rate - (u[1] - u[0]))[None])
-            out = out + BENT * (np.hypot(*np.moveaxis(x[0] - self._start, 1, 0))
-                                + _sizes(change[0]) @ self._bound)
-        return out
-
-    def _passes(self, elements, u, v, t):
-        """True if a point of some elements passes through the obstacle in a step."""
-        m = self._group.points
-        at = (elements[:, None] * m + np.arange(m)).ravel()
-        ends = [self._points(at, *end) for end in zip(u, t)]
-        found = [self._asked(x, time, True) for x, time in zip(ends, t)]
-        way = np.hypot(*(ends[1] - ends[0]))
-        if v.size:
-            way += np.repeat(self._bent(*(x[:, None] for x in (u, v, t)))[0, elements], m)
-        least, deep = self._group.depth, -np.minimum(found[0][0], found[1][0])
-        self.deepest = max(self.deepest, float(deep.max()))
-        most = least + np.maximum(deep, 0.0)
-        turned = np.sum(found[0][1:3] * found[1][1:3], axis=0)
-        if np.any((turned < 0.0) & (np.maximum(found[0][0], found[1][0]) < -least)):
+    def _crosses(self, at, u, v, t, way, most, long, inside):
+        """True if one of some points crosses the obstacle in a step."""
+        normals = [self._asked(x, s, True)[1:3] for x, s in zip(self._seen(u, t, at), t)]
+        cosine = np.sum(normals[0] * normals[1], axis=0)
+        if np.any(inside & (cosine < 0.0)):
             return True  # through its middle
-        chosen = (turned < ASIDE) & (way - found[0][0] - found[1][0] > 2.0 * most)
+        chosen = long & (cosine < ASIDE)
         if not chosen.any():
             return False
         at, most = at[chosen], most[chosen]
         parts = int(np.clip(np.ceil(way[chosen].max() / (2.0 * self._group.depth)), 2, MOST_PARTS))
         for s in np.arange(1, parts) / parts:
-            x = self._points(at, _between(u, v, t, s), t[0] + s * (t[1] - t[0]))
-            if np.any(-self._asked(x, t[0] + s * (t[1] - t[0]))[0] > most):
+            time = t[:1] + s * (t[1] - t[0])
+            x = self._seen(_between(u, v, t, s)[None], time, at)
+            if np.any(-self._gap(x, time) > most):
                 return True
         return False
 
-    def _points(self, at, u, t):
-        """Points of the surface, seen from the obstacle; shape (2, n)."""
-        z, x = np.empty((4, at.size)), np.empty((2, at.size))
-        places(self._pair, u, 1.0, at, z)
-        surface(self._pair, at, z, x)
-        self._tables.counts[1] += at.size
-        return self._seen(x, t)
+    def _sizes(self, u):
+        """How far points go by rates (k, N) at most, shape (k, points)."""
+        pairs = self._pairs(u, slice(None))
+        out = np.hypot(*np.einsum("kpac,ap->ckp", pairs, self._group.weights))
+        if len(self._group.slopes):
+            slopes = np.einsum("kpac,ap->ckp", pairs, self._group.slopes)
+            out += 2.0 * np.abs(self._group.offsets) * np.hypot(*slopes)
+        return out
 
-    def _seen(self, x, t):
-        """Points as the obstacle sees them that has not moved."""
-        if not self.obstacle.moves:
-            return x
-        key = self._which, float(t)
-        if key not in self._poses:
-            self._poses[key] = self._contacts.pose(self._which, float(t), False)
-        return taken_back(self._poses[key], x)
+    def _pairs(self, u, at):
+        return u[:, self._dofs[at]].reshape(len(u), -1, len(self._group.weights), 2)
+
+    def _seen(self, u, t, at=slice(None)):
+        """Points of the surface as the obstacle sees them that has not moved, (k, 2, points)."""
+        group, pairs = self._group, self._pairs(u, at)
+        x = group.starts[:2, at] + np.einsum("kpac,ap->kcp", pairs, group.weights[:, at])
+        if len(group.slopes):
+            d = group.starts[2:, at] + np.einsum("kpac,ap->kcp", pairs, group.slopes[:, at])
+            normals = np.stack([-d[:, 1], d[:, 0]], axis=1)
+            x += group.offsets[at] * normals / np.hypot(d[:, 0], d[:, 1])[:, None]
+        if self.obstacle.moves:
+            x = np.array([taken_back(self._contacts.pose(self._which, float(s), False), y)
+                          for s, y in zip(t, x)])
+        self._contacts.tables.counts[1] += x[:, 0].size
+        return x
+
+    def _gap(self, x, t):
+        """The gaps of points (k, 2, points), seen from the obstacle, at times (k,)."""
+        if self.obstacle.shape.kind == CUSTOM:
+            return np.array([self._asked(y, s)[0] for y, s in zip(x, t)])
+        return self._asked(np.moveaxis(x, 1, 0).reshape(2, -1), 0.0)[0].reshape(len(x), -1)
 
     def _asked(self, x, t, whole=False):
-        """The distance of points, seen from the obstacle, and its gradient if whole; (6, n)."""
+        """The gap of points (2, n), seen from the obstacle, and its gradient if whole; (6, n)."""
         shape, out = self.obstacle.shape, np.empty((6, x.shape[1]))
         if shape.kind != CUSTOM:
             outline(self._numbers, whole, np.ascontiguousarray(x), out)
@@ -239,16 +197,12 @@ class _Path:
         return -out if shape.hollow else out
 
 
-def _sizes(pairs):
-    return np.hypot(pairs[..., 0], pairs[..., 1])
-
-
 def _between(u, v, t, s):
     """The displacement at a part of a step: cubic, or straight without velocities."""
-    straight, change = u[0] + s * (u[1] - u[0]), u[1] - u[0]
-    if not v.size:
+    change, h = u[1] - u[0], t[1] - t[0]
+    straight = u[0] + s * change
+    if v is None:
         return straight
-    h = t[1] - t[0]
     return straight + s * (1.0 - s) * ((1.0 - s) * (h * v[0] - change) - s * (h * v[1] - change))
 
 
@@ -268,6 +222,3 @@ def middle_of(group: Any) -> Array:
     spread[half] = np.maximum(spread[half], np.abs(each[0] - mean[0][:, None]).max(axis=1))
     start = group.starts[:2].reshape(2, n, m).mean(axis=2)
     return np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])
-
-
-__all__ = ["Passage", "middle_of"]
