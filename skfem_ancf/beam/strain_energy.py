@@ -87,7 +87,7 @@ def _body(tables, numbers):
     rows, at, place = [], 0, 0
     flat = tuple(t for its in tables for t in its)
     for t in flat:
-        size, span = numbers(t) * len(t.start), 2 * t.G.shape[1] + 2
+        size, span = numbers(t) * len(t.start), 2 * t.G.shape[2] + 2
         n = 2 * t.rows.shape[1] * len(t.start) * span
         rows.append([at, at + size, t.rows.shape[1], span, place, place + n, t.kind])
         at, place = at + size, place + n

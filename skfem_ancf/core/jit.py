@@ -14,6 +14,7 @@ from types import FunctionType
 from typing import Any
 
 from numba import carray, cfunc, njit, types, typeof
+from numba.experimental import structref
 from numba.extending import intrinsic, overload
 
 from .code_cache import cannot_keep, can_keep, key, nothing_collected
@@ -25,6 +26,8 @@ from .words import Words, hints
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 #: Types of fields and arguments, by their annotations.
 SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(None): types.none}
+#: Of a small named tuple that compiled code makes, which stays a tuple: ``Annotated[Kind, MADE]``.
+MADE = "made"
 _DTYPES = {"f": types.float64, "i": types.int64}
 #: What reading or writing what is kept raises, where there is something else.
 _SPOILT = RuntimeError, OSError, EOFError, pickle.PickleError, KeyError, ValueError
@@ -50,14 +53,26 @@ def _register(function, found):
         return found if callable(found) else found[len(args)]
 
 
+@structref.register
+class Struct(types.StructRef):
+    """What a named tuple is in compiled code: passed as one pointer, where a tuple would be as
+    all numbers of all its arrays, which takes far longer to compile.
+    """
+
+
+structref.define_attributes(Struct)
+
+
 def type_of(hint: Any) -> Any:
     """Numba's type of an annotation: a number, an array as ``F1``, or a class of named tuples."""
     kind = getattr(hint, "__metadata__", [hint])[0]
+    if kind == MADE:
+        return types.NamedTuple([type_of(x) for x in hints(hint.__origin__)], hint.__origin__)
     if isinstance(kind, str):
         return types.Array(_DTYPES[kind[0]], int(kind[1]), "C")
     if kind in SCALARS:
         return SCALARS[kind]
-    return types.NamedTuple([type_of(x) for x in hints(kind)], kind)
+    return Struct([(name, type_of(x)) for name, x in zip(kind._fields, hints(kind))])
 
 
 def entry(function: Any, args: Any) -> Any:
@@ -195,26 +210,29 @@ _POINTERS = {letter: _pointer(kind) for letter, kind in _DTYPES.items()}
 @cache
 def reader(kind: Any) -> Any:
     """A function of the address of :class:`~skfem_ancf.core.words.Words`: their named tuple."""
-    names = {"carray": carray, **_POINTERS}
+    names: dict[str, Any] = {"carray": carray, "new": structref.new, **_POINTERS}
+    lines: list[str] = []
 
     def read(kind, at):
-        names[kind.__name__], fields = kind, []
-        for hint in hints(kind):
+        made = f"t{len(names)}"
+        names[f"{made}_type"] = type_of(kind)
+        lines.append(f"{made} = new({made}_type)")
+        for field, hint in zip(kind._fields, hints(kind)):
             code = getattr(hint, "__metadata__", [hint])[0]
             if isinstance(code, str):
                 shape = "".join(f"w[{at + 1 + k}], " for k in range(int(code[1])))
-                fields.append(f"carray({code[0]}(w[{at}]), ({shape}))")
+                value = f"carray({code[0]}(w[{at}]), ({shape}))"
                 at += 1 + int(code[1])
             elif code in SCALARS:
-                fields.append(f"{'x' if code is float else 'w'}[{at}]")
-                at += 1
+                value, at = f"{'x' if code is float else 'w'}[{at}]", at + 1
             else:
-                one, at = read(code, at)
-                fields.append(one)
-        return f"{kind.__name__}({', '.join(fields)})", at
+                value, at = read(code, at)
+            lines.append(f"{made}.{field} = {value}")
+        return made, at
 
     made, size = read(kind, 0)
-    code = (f"def read(address):\n    w = carray(i(address), ({size},))\n"
-            f"    x = carray(f(address), ({size},))\n    return {made}\n")
-    exec(code, names)  # noqa: S102
+    code = "".join(f"    {line}\n" for line in (
+        f"w = carray(i(address), ({size},))", f"x = carray(f(address), ({size},))", *lines,
+        f"return {made}"))
+    exec(f"def read(address):\n{code}", names)  # noqa: S102
     return njit(**OPTIONS)(names["read"])

@@ -30,10 +30,10 @@ PARTS = "StrainTables", "elements", "contacts"
 PROBLEMS: list[str] = []
 #: Seconds that compiling takes, about: kernels, force elements and contact, each if a scene has it,
 #: and what calls them; and loading what lies on disk.
-COMPILING = {"StrainTables": 40.0, "elements": 7.0, "contacts": 19.0,
-             "equilibrium": 30.0, "steps": 45.0, "evaluate": 5.0}
+COMPILING = {"StrainTables": 23.0, "elements": 3.0, "contacts": 10.0,
+             "equilibrium": 12.0, "steps": 26.0, "evaluate": 2.0}
 #: The same for what is compiled where it is used, not beforehand.
-WHERE_USED = {"collocate": 45.0}
+WHERE_USED = {"collocate": 25.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds that NumPy takes for an iteration, about, and what each element adds to them.

@@ -1,7 +1,7 @@
 """Large parts of compiled code, each behind an address: kernels, force elements, contact, laws."""
 
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,15 +12,15 @@ from ..beam.kernels.strain import evaluate
 from ..beam.kernels.tables import StrainTables
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
-from ..core.jit import address, caller, reader
+from ..core.jit import MADE, address, caller, reader
 from ..core.origin import ours
 from ..core.source import F1, F3
 from ..core.words import Words
 from .tables import Equations
 
 _STRAIN = StrainTables, int, F1, F1, F1, F1, F1, F1, int
-_KINDS = Kinds, int, F1, F1, float, F1
-_CONTACTS = ContactTables, Question, F1, F1, F1
+_KINDS = Annotated[Kinds, MADE], int, F1, F1, float, F1
+_CONTACTS = ContactTables, Annotated[Question, MADE], F1, F1, F1
 _LAW = F1, F3, F3
 _read = reader(StrainTables)
 _call_strain, _call_law = caller(*_STRAIN), caller(*_LAW)

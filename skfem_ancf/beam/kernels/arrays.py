@@ -41,7 +41,7 @@ def _of_elements(A, at):
 @step
 def gathered(t, first, last, u):
     """Degrees of freedom (nb - 1, 2, ne) of the elements, as their left nodes see them."""
-    m, start = t.G.shape[1], t.start[first:last]
+    m, start = t.G.shape[2], t.start[first:last]
     U = u[start + np.arange(2, 2 * m + 2)[:, None]].reshape(m, 2, -1)
     U[m // 2] -= u[start + np.arange(2)[:, None]]
     return U
@@ -50,7 +50,7 @@ def gathered(t, first, last, u):
 @step
 def displaced(t, first, last, u):
     """Displacements (rows, 2, ne) of the rows of the elements from ``first`` to ``last``."""
-    return _product(t.G.transpose(0, 2, 1), _at(t, first, last, OF_G), gathered(t, first, last, u))
+    return _product(t.G, _at(t, first, last, OF_G), gathered(t, first, last, u))
 
 
 @step
@@ -58,16 +58,15 @@ def sampled(t, first, d, dd):
     """Strains (ns, ne) at d, and directions X (2, ns, 2, ne) in which rows g and h do work.
 
     What the strain changes by from d to d + dd is ``X[0] . dd_g + X[1] . dd_h``; where dd is 0, X
-    are its derivatives.
+    are its derivatives. Where g and h are the same row, X[1] is zero.
     """
-    x, (g, h) = _of_elements(
-        t.frame, _at(t, first, first + d.shape[2], OF_FRAME)).swapaxes(0, 1), t.rows
+    x, (g, h) = _of_elements(t.frame, _at(t, first, first + d.shape[2], OF_FRAME)), t.rows
     r = x + d
     if t.kind == SECTION:
         c = np.where(g == h, 0.5, 1.0)[:, None, None]
-        strain = (c * (r[g] * d[h] + d[g] * x[h])).sum(axis=1)
         middle = r + 0.5 * dd
-        return strain, np.array([c * middle[h], c * middle[g]])
+        return ((c * (r[g] * d[h] + d[g] * x[h])).sum(axis=1),
+                np.array([middle[h], np.where(c == 1.0, middle[g], 0.0)]))
     n, s = len(d) // 2, r + dd
     (a0, b0), (a, b), (a1, b1) = ((y[:n], y[n:]) for y in (x, r, s))
     length0, length, length1 = (np.sqrt((y * y).sum(axis=1)) for y in (a0, a, a1))
@@ -98,9 +97,41 @@ def changed(t, dd, X):
 
 
 @step
+def middle(strain, change):
+    """The mean of strains (ns, ne) before and after a change, of size 0 for none."""
+    return strain + 0.5 * change if change.size else strain
+
+
+@step
+def difference(X, Y):
+    """``X - Y``."""
+    return X - Y
+
+
+@step
+def shifted(E, first, shift):
+    """E (k, points, ne) and what is added to that of the elements from ``first`` on."""
+    return E + shift[:, :, first:first + E.shape[2]]
+
+
+@step
+def stresses_at(given, first, last):
+    """Of stresses (all elements, ns) those of some elements, (ns, ne)."""
+    return given[first:last].T
+
+
+@step
+def put_stresses(T, first, more, out):
+    """Write stresses (ns, ne) to (all elements, ns), and what they are added to, if any."""
+    last = first + T.shape[1]
+    out[first:last] = T.T + more[first:last] if more.size else T.T
+
+
+@step
 def own_moduli(t, first, last):
-    """Moduli of a linear law between samples, (1, nq) or (ne, nq)."""
-    return t.H if len(t.H) == 1 else t.H[_at(t, first, last, OF_H)]
+    """Moduli of a linear law between samples, (nq, ne)."""
+    return np.broadcast_to(_of_elements(t.H, _at(t, first, last, OF_H)),
+                           (t.H.shape[1], last - first))
 
 
 @step
@@ -111,10 +142,10 @@ def at_points(t, strain):
 
 @step
 def moduli_of(t, first, D):
-    """Moduli between samples, (ne, nq), from those at the points, (9, points, ne)."""
+    """Moduli between samples, (nq, ne), from those at the points, (9, points, ne)."""
     D = D * _of_elements(t.weights, _at(t, first, first + D.shape[2], OF_WEIGHTS))
     (s, m), A = t.pairs, t.along.reshape(3, -1, t.along.shape[1])
-    return np.einsum("cpq,cdpe,dpq->eq", A[:, :, s], D.reshape(3, 3, *D.shape[1:]), A[:, :, m],
+    return np.einsum("cpq,cdpe,dpq->qe", A[:, :, s], D.reshape(3, 3, *D.shape[1:]), A[:, :, m],
                      optimize=True)
 
 
@@ -127,23 +158,18 @@ def from_points(t, first, S):
 
 @step
 def weighted(t, H, strain):
-    """Moduli times strains, (ns, ne)."""
-    return _dense(t, H) @ strain if len(H) == 1 else (
-        _dense(t, H) @ strain.T[:, :, None])[..., 0].T
-
-
-def _dense(t, H):
-    """The matrices of moduli, (ns, ns), or (ne, ns, ns)."""
-    dense = np.zeros((len(H), t.rows.shape[1], t.rows.shape[1]), H.dtype)
-    dense[:, t.pairs[0], t.pairs[1]] = H
-    return dense[0] if len(H) == 1 else dense
+    """Moduli (nq, ne) times strains, (ns, ne)."""
+    (s, m), T = t.pairs, np.zeros((len(strain), H.shape[1]), np.result_type(H, strain))
+    np.add.at(T, s, H * strain[m])
+    np.add.at(T, m[s != m], (H * strain[s])[s != m])
+    return T
 
 
 @step
 def add_forces(t, first, X, T, f):
     """Add the forces of weighted stresses (ns, ne)."""
     at = _at(t, first, first + T.shape[1], OF_G)
-    _add_to_nodes(t, first, sum(_product(t.G[:, :, rows], at, T[:, None] * Y)
+    _add_to_nodes(t, first, sum(_product(t.G[:, rows].transpose(0, 2, 1), at, T[:, None] * Y)
                                 for rows, Y in zip(t.rows, X)), f)
 
 
@@ -168,8 +194,7 @@ def add_constant(t, first, last, u, f):
 @step
 def derivatives(t, first, X, B):
     """Write the derivatives of the strains, (ne, ns, 2 nb - 2)."""
-    G = t.G.transpose(0, 2, 1)
-    G = G if len(G) == 1 else G[_at(t, first, first + len(B), OF_G)]
+    G = t.G if len(t.G) == 1 else t.G[_at(t, first, first + len(B), OF_G)]
     both, X = B.reshape(*B.shape[:2], -1, 2), X.transpose(0, 3, 1, 2)
     for i in range(2):
         both[..., i] = sum(G[:, rows] * Y[..., i, None] for rows, Y in zip(t.rows, X))
@@ -178,49 +203,57 @@ def derivatives(t, first, X, B):
 @step
 def moved(t, H, B, HB):
     """Write moduli times derivatives of the strains, (ne, ns, 2 nb - 2)."""
-    HB[:] = _dense(t, H) @ B
+    dense, (s, m) = np.zeros((len(B), B.shape[1], B.shape[1])), t.pairs
+    dense[:, s, m] = dense[:, m, s] = H.T
+    HB[:] = dense @ B
 
 
 @step
-def between(B, HB, K):
-    """Write B^T HB of each element, (ne, 2 nb - 2, 2 nb - 2)."""
-    K[:] = B.transpose(0, 2, 1) @ HB
+def add_material(t, H, X, Y, w):
+    """Add the coefficients (np, 4, ne) of the part due to moduli H (nq, ne)."""
+    product, a, b, q = t.terms
+    X, Y = X.reshape(-1, 2, X.shape[3]), Y.reshape(-1, 2, X.shape[3])
+    half = np.where(a == b, 0.5, 1.0)[:, None] * H[q]
+    x = half[:, None, None] * X[a][:, :, None] * Y[b][:, None]
+    np.add.at(w, product, x.reshape(len(a), 4, -1))
+
+
+@step
+def add_geometric(t, first, d, T, w):
+    """Add the coefficients of the part due to weighted stresses (ns, ne)."""
+    if t.kind == SECTION:
+        x = np.where(t.rows[0] == t.rows[1], 0.5, 1.0)[:, None] * T
+        np.add.at(w, t.of, x[:, None] * np.array([1.0, 0.0, 0.0, 1.0])[:, None])
+        return
+    n = len(T) // 2
+    r = _of_elements(t.frame, _at(t, first, first + T.shape[1], OF_FRAME)) + d
+    (a, b), (ax, ay) = (x.transpose(1, 0, 2) for x in (r[:n], r[n:]))
+    square = a * a + b * b
+    kappa = (a * ay - b * ax) / square
+    N, M = 0.5 * T[:n] / (square * np.sqrt(square)), T[n:] / square**2
+    c, y, zx, zy = 4.0 * kappa * M, kappa * square, 2.0 * M * a * b, M * (b * b - a * a)
+    xx = c * a * a + N * b * b - M * (2.0 * ay * a + y)
+    yy = c * b * b + N * a * a + M * (2.0 * ax * b - y)
+    xy = (c - N) * a * b - M * (ay * b - ax * a)
+    w[t.of[:n]] += np.stack([xx, xy, xy, yy], axis=1)
+    w[t.of[n:]] += np.stack([zx, zy, zy, -zx], axis=1)
+
+
+@step
+def add_products(t, first, w, one, other, K):
+    """Add the matrices Q (ne, 2 nb - 2, 2 nb - 2) of coefficients: ``one Q + other Q^T``."""
+    G, n, m = t.G, len(K), t.G.shape[2]
+    G = G if len(G) == 1 else G[_at(t, first, first + n, OF_G)]
+    g, h = t.products
+    both = (G[:, g, :, None] * G[:, h, None]).reshape(len(G), len(g), m * m)
+    Q = (w.transpose(2, 1, 0) @ both).reshape(n, 2, 2, m, m).transpose(0, 3, 1, 4, 2)
+    K += (one * Q + other * Q.transpose(0, 3, 4, 1, 2)).reshape(K.shape)
 
 
 @step
 def add_stiffness(t, first, K):
     """Add the constant stiffness."""
     K += t.C[_at(t, first, first + len(K), OF_C)] if len(t.C) > 1 else t.C
-
-
-@step
-def add_geometric(t, first, d, T, K):
-    """Add the part due to weighted stresses (ns, ne)."""
-    m, (g, h), T, G = t.G.shape[1], t.rows, T.T, t.G.transpose(0, 2, 1)
-    G = G if len(G) == 1 else G[_at(t, first, first + len(K), OF_G)]
-    K = K.reshape(-1, m, 2, m, 2)
-    if t.kind == SECTION:
-        c = np.where(g == h, 0.5, 1.0)[:, None, None]
-        both = (c * G[:, g, :, None] * G[:, h, None]).reshape(len(G), len(g), -1)
-        P = (T @ both[0] if len(G) == 1 else (T[:, None] @ both)).reshape(-1, m, m)
-        P = P + P.transpose(0, 2, 1)
-        K[:, :, 0, :, 0] += P
-        K[:, :, 1, :, 1] += P
-        return
-    n, r = T.shape[1] // 2, _of_elements(
-        t.frame, _at(t, first, first + len(K), OF_FRAME)).swapaxes(0, 1) + d
-    (a, b), (ax, ay) = (x.transpose(1, 2, 0) for x in (r[:n], r[n:]))
-    square = a * a + b * b
-    kappa = (a * ay - b * ax) / square
-    N, M = T[:, :n] / (square * np.sqrt(square)), 2.0 * T[:, n:] / square**2
-    c, y, zx, zy = 4.0 * kappa * M, kappa * square, M * a * b, 0.5 * M * (b * b - a * a)
-    one, two = (G[:, :n, :, None] * x[:, :, None] for x in (G[:, :n], G[:, n:]))
-    two = two + two.transpose(0, 1, 3, 2)
-    xx = c * a * a + N * b * b - M * (2.0 * ay * a + y)
-    yy = c * b * b + N * a * a + M * (2.0 * ax * b - y)
-    xy = (c - N) * a * b - M * (ay * b - ax * a)
-    for i, j, p, q in ((0, 0, xx, zx), (1, 1, yy, -zx), (0, 1, xy, zy), (1, 0, xy, zy)):
-        K[:, :, i, :, j] += (p[..., None, None] * one + q[..., None, None] * two).sum(axis=1)
 
 
 @step

@@ -19,7 +19,7 @@ from ...core.linear import first_order
 from ...core.quadrature import gauss
 from .kernel import ElementKernel, strains
 from .law import NO_LAW
-from .tables import CABLE, StrainTables, apart
+from .tables import CABLE, StrainTables, apart, products_of
 
 if TYPE_CHECKING:
     from ...core.types import Array
@@ -109,31 +109,30 @@ class CableKernel(ElementKernel):
         EA, ES, EI = self._across.moments(
             self.points, np.zeros(1, int) if same and self._across.constant else None)
         s, coupled = np.arange(n), [(0, 0, EA), (1, 1, EI)]
-        coupled += [(0, 1, -ES), (1, 0, -ES)] if np.any(ES) else []
+        coupled += [(0, 1, -ES)] if np.any(ES) else []
         pairs = np.concatenate([[c * n + s, d * n + s] for c, d, _ in coupled], axis=1)
         H, order = [x * self._rule[1] * L for *_, x in coupled], np.lexsort(pairs[::-1])
         pairs, H = pairs[:, order], np.concatenate(H, axis=1)[:, order]
-        frame = self._frame(mesh, element, n, G)
+        rows, frame = np.array([[*s, *s], [*s, *(n + s)]]), self._frame(mesh, element, n, G)
         C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
              self.constant[:, 2:, 2:])
         each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
         return StrainTables(
             CABLE, nb * mesh.t[0].astype(np.int64),
             np.outer(np.arange(ne), each).astype(np.int64), *map(np.ascontiguousarray, (
-                G[:, :, 1:].transpose(0, 2, 1), frame, np.array([[*s, *s], [*s, *(n + s)]]),
-                pairs, H, C)), NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
+                G[:, :, 1:], frame, rows, pairs, *products_of(rows, pairs), H, C)),
+            NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
 
     def _frame(self, mesh, element, n, G):
-        """r_X and r_XX in the reference configuration, (1 or ne, 2, rows)."""
+        """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
         if mesh.is_straight:
             p, k = mesh.p, 1 if mesh.is_uniform else mesh.nelements
-            e, frame = (p[:, mesh.t[1]] - p[:, mesh.t[0]]) / mesh.lengths, np.zeros((k, 2, 2 * n))
-            frame[:, :, :n] = e.T[:k, :, None]
+            e, frame = (p[:, mesh.t[1]] - p[:, mesh.t[0]]) / mesh.lengths, np.zeros((k, 2 * n, 2))
+            frame[:, :n] = e.T[:k, None]
             return frame
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
-        return (G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
-                ).transpose(0, 2, 1)
+        return G @ self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
 
     @property
     def weights(self) -> Array:
@@ -161,7 +160,7 @@ class CableKernel(ElementKernel):
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the fibres at the bottom and at the top, (2, points, ne)."""
         t, (eps, kappa) = self.tables[0], first_order(self.strain(u))
-        a, b = np.split(t.frame.transpose(0, 2, 1), 2, axis=1)
+        a, b = np.split(t.frame, 2, axis=1)
         kappa0 = (cross(a, b) / np.sum(a * a, axis=-1)).T
         Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
         return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])

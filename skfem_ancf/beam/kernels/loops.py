@@ -13,7 +13,7 @@ def block():
 
 @source
 def gathered(t, first, last, u):
-    m, n, start = t.G.shape[1], last - first, t.start[first:last]
+    m, n, start = t.G.shape[2], last - first, t.start[first:last]
     U = np.empty((m, 2, n))
     for k in range(m):
         for i in range(2):
@@ -49,7 +49,7 @@ def product(A, at, X, transposed):
 
 @source
 def displaced(t, first, last, u):
-    return product(t.G, t.at[first:last, OF_G], gathered(t, first, last, u), True)
+    return product(t.G, t.at[first:last, OF_G], gathered(t, first, last, u), False)
 
 
 @source
@@ -57,21 +57,22 @@ def sampled(t, first, d, dd):
     ns, n = t.rows.shape[1], d.shape[2]
     strain, X, x = np.empty((ns, n)), np.zeros((2, ns, 2, n)), np.empty(d.shape)
     for g in range(d.shape[0]):
-        for i in range(2):
-            for e in range(n):
-                x[g, i, e] = t.frame[t.at[first + e, OF_FRAME], i, g]
+        for e in range(n):
+            row = t.frame[t.at[first + e, OF_FRAME], g]
+            x[g, 0, e], x[g, 1, e] = row[0], row[1]
     if t.kind == SECTION:
         for s in range(ns):
             g, h = t.rows[0, s], t.rows[1, s]
+            for i in range(2):
+                for e in range(n):
+                    X[0, s, i, e] = x[h, i, e] + d[h, i, e] + 0.5 * dd[h, i, e]
+                for e in range(n if g != h else 0):
+                    X[1, s, i, e] = x[g, i, e] + d[g, i, e] + 0.5 * dd[g, i, e]
             c = 0.5 if g == h else 1.0
             for e in range(n):
-                u, v, p, q = d[g, 0, e], d[g, 1, e], d[h, 0, e], d[h, 1, e]
-                a, b, r, w = x[g, 0, e] + u, x[g, 1, e] + v, x[h, 0, e], x[h, 1, e]
-                strain[s, e] = c * (a * p + b * q + u * r + v * w)
-                X[0, s, 0, e] = c * (r + p + 0.5 * dd[h, 0, e])
-                X[0, s, 1, e] = c * (w + q + 0.5 * dd[h, 1, e])
-                X[1, s, 0, e] = c * (a + 0.5 * dd[g, 0, e])
-                X[1, s, 1, e] = c * (b + 0.5 * dd[g, 1, e])
+                strain[s, e] = c * (
+                    (x[g, 0, e] + d[g, 0, e]) * d[h, 0, e] + d[g, 0, e] * x[h, 0, e]
+                    + (x[g, 1, e] + d[g, 1, e]) * d[h, 1, e] + d[g, 1, e] * x[h, 1, e])
         return strain, X
     for p in range(ns // 2):
         q = ns // 2 + p
@@ -109,12 +110,55 @@ def changed(t, dd, X):
 
 
 @source
+def middle(strain, change):
+    out = strain.copy()
+    for s in range(len(change)):
+        for e in range(strain.shape[1]):
+            out[s, e] += 0.5 * change[s, e]
+    return out
+
+
+@source
+def difference(X, Y):
+    out = np.empty(X.shape)
+    a, b, c = X.reshape(X.size), Y.reshape(X.size), out.reshape(X.size)
+    for k in range(X.size):
+        c[k] = a[k] - b[k]
+    return out
+
+
+@source
+def shifted(E, first, shift):
+    out = np.empty(E.shape)
+    for c in range(E.shape[0]):
+        for p in range(E.shape[1]):
+            for e in range(E.shape[2]):
+                out[c, p, e] = E[c, p, e] + shift[c, p, first + e]
+    return out
+
+
+@source
+def stresses_at(given, first, last):
+    T = np.empty((given.shape[1], last - first))
+    for s in range(len(T)):
+        for e in range(last - first):
+            T[s, e] = given[first + e, s]
+    return T
+
+
+@source
+def put_stresses(T, first, more, out):
+    for e in range(T.shape[1]):
+        for s in range(len(T)):
+            out[first + e, s] = T[s, e] + (more[first + e, s] if more.size > 0 else 0.0)
+
+
+@source
 def own_moduli(t, first, last):
-    if len(t.H) == 1:
-        return t.H
-    H = np.empty((last - first, t.H.shape[1]))
-    for e in range(len(H)):
-        H[e] = t.H[t.at[first + e, OF_H]]
+    H = np.empty((t.H.shape[1], last - first))
+    for q in range(len(H)):
+        for e in range(last - first):
+            H[q, e] = t.H[t.at[first + e, OF_H], q]
     return H
 
 
@@ -126,9 +170,9 @@ def at_points(t, strain):
 @source
 def moduli_of(t, first, D):
     n, points = D.shape[2], t.weights.shape[1]
-    H = np.zeros((n, t.pairs.shape[1]))
+    H = np.zeros((t.pairs.shape[1], n))
     for p in range(points):
-        for q in range(H.shape[1]):
+        for q in range(len(H)):
             s, m = t.pairs[0, q], t.pairs[1, q]
             for c in range(3):
                 x = t.along[c * points + p, s]
@@ -136,7 +180,7 @@ def moduli_of(t, first, D):
                     y = x * t.along[k * points + p, m]
                     for e in range(n if y != 0.0 else 0):
                         w = t.weights[t.at[first + e, OF_WEIGHTS], p]
-                        H[e, q] += w * y * D[3 * c + k, p, e]
+                        H[q, e] += w * y * D[3 * c + k, p, e]
     return H
 
 
@@ -153,31 +197,27 @@ def from_points(t, first, S):
 
 @source
 def weighted(t, H, strain):
-    ns, n = strain.shape
-    out = np.zeros((ns, n))
-    for q in range(H.shape[1]):
+    T = np.zeros(strain.shape)
+    for q in range(len(H)):
         s, m = t.pairs[0, q], t.pairs[1, q]
-        if len(H) == 1:
-            h = H[0, q]
-            for e in range(n):
-                out[s, e] += h * strain[m, e]
-        else:
-            for e in range(n):
-                out[s, e] += H[e, q] * strain[m, e]
-    return out
+        for e in range(H.shape[1]):
+            T[s, e] += H[q, e] * strain[m, e]
+        for e in range(H.shape[1] if s != m else 0):
+            T[m, e] += H[q, e] * strain[s, e]
+    return T
 
 
 @source
 def add_forces(t, first, X, T, f):
     ns, n = X.shape[1], X.shape[3]
-    F = np.zeros((t.G.shape[2], 2, n))
+    F = np.zeros((t.G.shape[1], 2, n))
     for s in range(ns):
-        for k in range(2):
+        for k in range(2 if t.rows[0, s] != t.rows[1, s] else 1):
             g = t.rows[k, s]
             for i in range(2):
                 for e in range(n):
                     F[g, i, e] += T[s, e] * X[k, s, i, e]
-    add_to_nodes(t, first, product(t.G, t.at[first:first + n, OF_G], F, False), f)
+    add_to_nodes(t, first, product(t.G, t.at[first:first + n, OF_G], F, True), f)
 
 
 @source
@@ -193,39 +233,114 @@ def add_to_nodes(t, begin, F, f):
 
 @source
 def add_constant(t, first, last, u, f):
-    U, m = gathered(t, first, last, u), t.G.shape[1]
+    U, m = gathered(t, first, last, u), t.G.shape[2]
     F = product(t.C, t.at[first:last, OF_C], U.reshape(2 * m, 1, last - first), False)
     add_to_nodes(t, first, F.reshape(U.shape), f)
 
 
 @source
 def derivatives(t, first, X, B):
-    ns, n, m = X.shape[1], X.shape[3], t.G.shape[1]
+    ns, n, m = X.shape[1], X.shape[3], t.G.shape[2]
     for e in range(n):
         one, G = B[e], t.G[t.at[first + e, OF_G]]
         for s in range(ns):
-            g, h = t.rows[0, s], t.rows[1, s]
-            a, b, c, d = X[0, s, 0, e], X[0, s, 1, e], X[1, s, 0, e], X[1, s, 1, e]
-            for k in range(m):
-                x, y = G[k, g], G[k, h]
-                one[s, 2 * k], one[s, 2 * k + 1] = x * a + y * c, x * b + y * d
+            x, y = G[t.rows[0, s]], G[t.rows[1, s]]
+            for i in range(2):
+                a, b = X[0, s, i, e], X[1, s, i, e]
+                for k in range(m):
+                    one[s, 2 * k + i] = x[k] * a + y[k] * b
 
 
 @source
 def moved(t, H, B, HB):
     HB[:] = 0.0
     for e in range(len(B)):
-        row, x, y = H[e if len(H) > 1 else 0], B[e], HB[e]
-        for q in range(len(row)):
-            s, m, h = t.pairs[0, q], t.pairs[1, q], row[q]
+        x, y = B[e], HB[e]
+        for q in range(len(H)):
+            s, m, h = t.pairs[0, q], t.pairs[1, q], H[q, e]
             for i in range(x.shape[1]):
                 y[s, i] += h * x[m, i]
+            for i in range(x.shape[1] if s != m else 0):
+                y[m, i] += h * x[s, i]
 
 
 @source
-def between(B, HB, K):
-    for e in range(len(B)):
-        np.dot(B[e].T, HB[e], K[e])
+def add_material(t, H, X, Y, w):
+    n = H.shape[1]
+    x, y, h = X.reshape(2 * X.shape[1], 2, n), Y.reshape(2 * X.shape[1], 2, n), np.empty(n)
+    for k in range(t.terms.shape[1]):
+        p, a, b, q = t.terms[0, k], t.terms[1, k], t.terms[2, k], t.terms[3, k]
+        c = 0.5 if a == b else 1.0
+        for i in range(2):
+            for e in range(n):
+                h[e] = c * H[q, e] * x[a, i, e]
+            for j in range(2):
+                for e in range(n):
+                    w[p, 2 * i + j, e] += h[e] * y[b, j, e]
+
+
+@source
+def add_geometric(t, first, d, T, w):
+    if t.kind == SECTION:
+        for s in range(len(T)):
+            c, p = 0.5 if t.rows[0, s] == t.rows[1, s] else 1.0, t.of[s]
+            for e in range(T.shape[1]):
+                w[p, 0, e] += c * T[s, e]
+                w[p, 3, e] += c * T[s, e]
+        return
+    for p in range(len(T) // 2):
+        q = len(T) // 2 + p
+        one, two = w[t.of[p]], w[t.of[q]]
+        for e in range(T.shape[1]):
+            x = t.frame[t.at[first + e, OF_FRAME]]
+            a, b = x[p, 0] + d[p, 0, e], x[p, 1] + d[p, 1, e]
+            ax, ay = x[q, 0] + d[q, 0, e], x[q, 1] + d[q, 1, e]
+            square = a * a + b * b
+            kappa = (a * ay - b * ax) / square
+            N, M = 0.5 * T[p, e] / (square * np.sqrt(square)), T[q, e] / (square * square)
+            c, y = 4.0 * kappa * M, kappa * square
+            xy = (c - N) * a * b - M * (ay * b - ax * a)
+            zx, zy = 2.0 * M * a * b, M * (b * b - a * a)
+            one[0, e] += c * a * a + N * b * b - M * (2.0 * ay * a + y)
+            one[1, e] += xy
+            one[2, e] += xy
+            one[3, e] += c * b * b + N * a * a + M * (2.0 * ax * b - y)
+            two[0, e] += zx
+            two[1, e] += zy
+            two[2, e] += zy
+            two[3, e] -= zx
+
+
+@source
+def add_products(t, first, w, one, other, K):
+    size, n, m = len(w), len(K), t.G.shape[2]
+    both, Q = np.empty((size, m, m)), np.empty((4 * n, m * m))
+    flat = both.reshape(size, m * m)
+    if len(t.G) == 1:
+        products(t.products, t.G[0], both)
+        np.dot(w.reshape(size, 4 * n).T, flat, Q)
+    else:
+        for e in range(n):
+            products(t.products, t.G[t.at[first + e, OF_G]], both)
+            Q[e::n] = np.dot(np.ascontiguousarray(w[:, :, e].T), flat)
+    P, blocks = Q.reshape(2, 2, n, m, m), K.reshape(n, m, 2, m, 2)
+    for e in range(n):
+        for i in range(2):
+            for j in range(2):
+                for k in range(m):
+                    for l in range(m):
+                        blocks[e, k, i, l, j] += (one * P[i, j, e, k, l]
+                                                  + other * P[j, i, e, l, k])
+
+
+@source
+def products(rows, G, out):
+    """``G_g G_h^T`` of pairs of rows, (np, nb - 1, nb - 1)."""
+    for p in range(len(out)):
+        g, h = G[rows[0, p]], G[rows[1, p]]
+        for k in range(len(g)):
+            for l in range(len(h)):
+                out[p, k, l] = g[k] * h[l]
 
 
 @source
@@ -235,65 +350,6 @@ def add_stiffness(t, first, K):
         for i in range(len(C)):
             for j in range(len(C)):
                 one[i, j] += C[i, j]
-
-
-@source
-def add_geometric(t, first, d, T, K):
-    m, ns, last, points = t.G.shape[1], len(T), -1, len(T) // 2
-    both, P = np.empty((ns, m * m)), np.empty((len(K), m * m))
-    if t.kind == SECTION:
-        if len(t.G) == 1:
-            products(t.rows, t.G[0], both)
-            np.dot(np.ascontiguousarray(T.T), both, P)
-        for e in range(len(K)):
-            if len(t.G) > 1:
-                if t.at[first + e, OF_G] != last:
-                    last = t.at[first + e, OF_G]
-                    products(t.rows, t.G[last], both)
-                np.dot(T[:, e].copy(), both, P[e])
-            one = K[e]
-            for k in range(m):
-                for l in range(m):
-                    x = P[e, k * m + l]
-                    one[2 * k, 2 * l] += x
-                    one[2 * k + 1, 2 * l + 1] += x
-        return
-    for e in range(len(K)):
-        if t.at[first + e, OF_G] != last:
-            last = t.at[first + e, OF_G]
-            products(t.rows, t.G[last], both)
-        one, x = K[e], t.frame[t.at[first + e, OF_FRAME]]
-        for p in range(points):
-            q = points + p
-            a, b = x[0, p] + d[p, 0, e], x[1, p] + d[p, 1, e]
-            ax, ay = x[0, q] + d[q, 0, e], x[1, q] + d[q, 1, e]
-            square = a * a + b * b
-            kappa = (a * ay - b * ax) / square
-            N, M = T[p, e] / (square * np.sqrt(square)), 2.0 * T[q, e] / (square * square)
-            c, y = 4.0 * kappa * M, kappa * square
-            xx = c * a * a + N * b * b - M * (2.0 * ay * a + y)
-            yy = c * b * b + N * a * a + M * (2.0 * ax * b - y)
-            xy = (c - N) * a * b - M * (ay * b - ax * a)
-            zx, zy = M * a * b, 0.5 * M * (b * b - a * a)
-            for k in range(m):
-                for l in range(m):
-                    f, g = both[p, k * m + l], both[q, k * m + l]
-                    one[2 * k, 2 * l] += xx * f + zx * g
-                    one[2 * k + 1, 2 * l + 1] += yy * f - zx * g
-                    one[2 * k, 2 * l + 1] += xy * f + zy * g
-                    one[2 * k + 1, 2 * l] += xy * f + zy * g
-
-
-@source
-def products(rows, G, out):
-    """``G_g G_h^T + G_h G_g^T`` of each sample, half of it where g is h; (ns, (nb - 1)^2)."""
-    m = len(G)
-    for s in range(len(out)):
-        g, h = rows[0, s], rows[1, s]
-        c = 0.5 if g == h else 1.0
-        for k in range(m):
-            for l in range(m):
-                out[s, k * m + l] = c * (G[k, g] * G[l, h] + G[k, h] * G[l, g])
 
 
 @source

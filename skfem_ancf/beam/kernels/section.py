@@ -14,7 +14,7 @@ from ...core.quadrature import product_rule
 from .arrays import displaced
 from .kernel import ElementKernel
 from .law import LINEAR, law_tables
-from .tables import OF_FRAME, SECTION, StrainTables
+from .tables import OF_FRAME, SECTION, StrainTables, products_of
 
 if TYPE_CHECKING:
     from ...core.types import Array
@@ -106,7 +106,8 @@ class SectionKernel(ElementKernel):
         self.tables.append(StrainTables(
             SECTION, nb * self.t[0].astype(np.int64),
             np.outer(np.arange(ne), each).astype(np.int64), *map(np.ascontiguousarray, (
-                G, frame, samples.rows, pairs, H, C)), law, *map(np.ascontiguousarray, (
+                G, frame, samples.rows, pairs, *products_of(samples.rows, pairs), H, C)), law,
+            *map(np.ascontiguousarray, (
                     along, weights))))
         return samples, volumes
 
@@ -133,7 +134,7 @@ class SectionKernel(ElementKernel):
         for one, t in zip(self.integrals, self.tables):
             if one.first:
                 x = t.frame if len(t.frame) == 1 else t.frame[t.at[:, OF_FRAME]]
-                r = displaced(t, 0, len(t.start), u) + x.transpose(2, 1, 0)
+                r = displaced(t, 0, len(t.start), u) + x.transpose(1, 2, 0)
                 yield [r[rows[one.samples.component == component]] for rows in t.rows]
 
     def inverted(self, u: Array) -> bool:
@@ -213,7 +214,7 @@ def samples_of(at_xx: Any, at_yy: Any, at_xy: Any, eta: Any) -> Samples:
 
 
 def _rows(mesh, element, samples, tind):
-    """G and the frame, (1 or ne, nb - 1, rows) and (1 or ne, 2, rows)."""
+    """G and the frame, (1 or ne, rows, nb - 1) and (1 or ne, rows, 2)."""
     X, (x, y) = samples.X, samples.where
     if mesh.is_straight and mesh.heights is None and element.by_reference:
         unit, n, h = element.unit_slopes(X[:, x], X[:, y]), len(x), mesh.height
@@ -222,14 +223,14 @@ def _rows(mesh, element, samples, tind):
         scale = np.repeat(np.concatenate([1.0 / L, np.full_like(L, 1.0 / h)], axis=1),
                           [n, len(unit) - n], axis=1)
         G = unit * (scale[:, :, None] * element.powers(h, L)[:, None])
-        frame = np.empty((len(L), 2, len(unit)))
-        e = ((mesh.p[:, t[1]] - mesh.p[:, t[0]]) / L.T).T[:, :, None]
-        frame[:, :, :n], frame[:, :1, n:], frame[:, 1:, n:] = e, -e[:, 1:], e[:, :1]
+        frame = np.empty((len(L), len(unit), 2))
+        e = ((mesh.p[:, t[1]] - mesh.p[:, t[0]]) / L.T).T[:, None]
+        frame[:, :n], frame[:, n:, 0], frame[:, n:, 1] = e, -e[..., 1], e[..., 0]
     else:
         both, frames = beam_gradients(mesh, element, X, tind)
         G = np.concatenate([both[0][:, x], both[1][:, y]], axis=1)
-        frame = np.concatenate([frames[0][:, x], frames[1][:, y]], axis=1).transpose(0, 2, 1)
-    return G[:, :, 1:].transpose(0, 2, 1), frame
+        frame = np.concatenate([frames[0][:, x], frames[1][:, y]], axis=1)
+    return G[:, :, 1:], frame
 
 
 def _interpolation(samples, term):
@@ -243,7 +244,8 @@ def _moduli(samples, term, law, weights):
     """Pairs of samples with a modulus between them, and these, (2, nq) and (1 or ne, nq)."""
     A, c = _interpolation(samples, term), samples.component
     D = law.D[c[:, None], c] if law.kind == LINEAR else np.ones((len(c), len(c)))
-    s, t = np.nonzero((np.abs(A).T @ np.abs(A) > 0.0) & (D != 0.0) | np.eye(len(c), dtype=bool))
+    s, t = np.nonzero(np.triu((np.abs(A).T @ np.abs(A) > 0.0) & (D != 0.0)
+                              | np.eye(len(c), dtype=bool)))
     D, A = law.D[c[s], c[t]], (A[:, s] * A[:, t]).T
     H = weights @ A.T
     keep = (s == t) | (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ np.abs(A).T)).any(axis=0)

@@ -8,9 +8,14 @@ are weighted stresses T, whose work on the samples is that of the stress in the 
 
 Left nodes take no part: G multiplies the other functions, and the right node's position
 less the left one's. A translation changes nothing then, not even round-off.
+
+A tangent is a sum over pairs of rows g and h: ``w[i, j] G[g, k] G[h, l]`` adds to the entry between
+component i of function k and component j of function l. The coefficients w take few operations, and
+all else is one product of matrices.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,13 +41,20 @@ class StrainTables(NamedTuple):
     at
         Which G, frame, H, C and weights are an element's, (ne, 5).
     G
-        Derivatives of the local functions but the first, (k, nb - 1, rows).
+        Derivatives of the local functions but the first, (k, rows, nb - 1).
     frame
-        The rows x in the reference configuration, (k, 2, rows).
+        The rows x in the reference configuration, (k, rows, 2).
     rows
-        g and h of each sample, (2, ns); of a normal strain of a section both are the same.
+        g and h of each sample, (2, ns); both are the same where there is one only.
     pairs
-        Samples s and t of each modulus, sorted by s, with all s = t; (2, nq).
+        Samples s <= t of each modulus, sorted by s, with all s = t; (2, nq).
+    products
+        Rows g <= h of the products that tangents are made of, (2, np).
+    terms
+        Which product, which two rows a and b of samples, and which modulus make a coefficient, (4,
+        nt): rows g of the samples are the first ns, rows h the others.
+    of
+        The product of g and h of each sample, (ns,).
     H
         Moduli between samples, with weights: ``T[s] = sum H[s, t] strain[t]``; (k, nq). Of laws
         that are not linear those without strain.
@@ -65,12 +77,43 @@ class StrainTables(NamedTuple):
     frame: F3
     rows: I2
     pairs: I2
+    products: I2
+    terms: I2
+    of: I1
     H: F2
     C: F3
     law: LawTables
     along: F2
     weights: F2
     address: int = 0
+
+
+@lru_cache(64)
+def _products(rows, pairs, size):
+    """:attr:`StrainTables.products`, ``terms`` and ``of``, from the bytes of rows and pairs."""
+    g, h = np.frombuffer(rows, np.int64).reshape(2, size)
+    ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
+    row = np.concatenate([g, h])
+    found: dict[tuple[int, int], int] = {}
+
+    def product(a, b):
+        return found.setdefault((min(row[a], row[b]), max(row[a], row[b])), len(found))
+
+    of = [product(s, size + s) for s in range(size)]
+    terms = []
+    for q, (s, t) in enumerate(np.frombuffer(pairs, np.int64).reshape(2, -1).T):
+        for a in ends[s]:
+            for b in ends[t]:
+                if s < t or a <= b:
+                    terms.append([product(a, b), *sorted((a, b), key=lambda c: row[c]), q])
+    return tuple(np.array(x, np.int64) for x in (
+        np.transpose(list(found)), np.transpose(terms), of))
+
+
+def products_of(rows: Any, pairs: Any) -> Any:
+    """The products, terms and ``of`` of :class:`StrainTables` with such rows and pairs."""
+    return _products(*(np.ascontiguousarray(x, np.int64).tobytes() for x in (rows, pairs)),
+                     rows.shape[1])
 
 
 class Destination(NamedTuple):
@@ -85,7 +128,7 @@ class Destination(NamedTuple):
 
 def apart(t: StrainTables) -> StrainTables:
     """The tables with degrees of freedom for each element, one element behind the other."""
-    return t._replace(start=(2 * t.G.shape[1] + 2) * np.arange(len(t.start)))
+    return t._replace(start=(2 * t.G.shape[2] + 2) * np.arange(len(t.start)))
 
 
 def repeated(t: StrainTables, n: int, N: int) -> StrainTables:
