@@ -75,6 +75,13 @@ def type_of(hint: Any) -> Any:
     return Struct([(name, type_of(x)) for name, x in zip(kind._fields, hints(kind))])
 
 
+def compiled(function: Any) -> Any:
+    """A user's function for compiled code; what is compiled or marked already as it is."""
+    register()
+    return function if function in MARKED or hasattr(function, "py_func") else njit(
+        **OPTIONS)(function)
+
+
 def entry(function: Any, args: Any) -> Any:
     """The compiled function for Python, compiled or taken from disk.
 
@@ -99,12 +106,12 @@ def entry(function: Any, args: Any) -> Any:
     run = names["run"]
     run.__name__, run.__module__ = function.__name__, function.__module__
     signature = tuple(types.int64 if isinstance(x, tuple) else typeof(x) for x in args)
-    compiled = _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(run)))
+    found = _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(run)))
     known: dict[int, Words] = {}
 
     def call(*args):
         words = [_words(x, known) if isinstance(x, tuple) else x for x in args]
-        return compiled(*[x.address if type(x) is Words else x for x in words])
+        return found(*[x.address if type(x) is Words else x for x in words])
 
     return call
 
@@ -137,10 +144,10 @@ def address(function: Any, hints: Any, name: str = "", kept: bool = True) -> int
     """
     signature = types.void(*map(type_of, hints))
 
-    def compiled(**options):
+    def made(**options):
         return cfunc(signature, **options, **OPTIONS)(_named(function, name))
 
-    found = _kept(compiled) if kept else compiled()
+    found = _kept(made) if kept else made()
     _alive.append(found)
     return found.address
 
@@ -157,16 +164,16 @@ def _named(function, name=""):
     return copy
 
 
-def _kept(compiled):
-    """What ``compiled(cache=True)`` returns, or without where nothing can be kept."""
+def _kept(make):
+    """What ``make(cache=True)`` returns, or without where nothing can be kept."""
     register()
     with nothing_collected():
         if can_keep():
             try:
-                return compiled(cache=True)
+                return make(cache=True)
             except _SPOILT as error:
                 cannot_keep(error)
-        return compiled()
+        return make()
 
 
 def caller(*hints: Any) -> Any:

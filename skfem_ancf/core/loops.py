@@ -421,3 +421,7 @@ def own_distance(handle, obstacle, t, x, out):
 
 def log1p(x):
     return np.log1p(x)
+
+
+def everywhere(condition):
+    return condition

@@ -84,7 +84,7 @@ class Machine:
         elif any(pack.law.kind == OWN
                  for pack in self.tables.plain.body.packs):
             self._plain = ("a law of your own in Python, where a "
-                           "skfem_ancf.materials.TextMaterial is compiled")
+                           "skfem_ancf.materials.PointwiseMaterial is compiled")
 
     @property
     def _off(self):

@@ -1,18 +1,19 @@
 """Large parts of compiled code, each behind an address: kernels, force elements, contact, laws."""
 
 from functools import cache
+from types import FunctionType
 from typing import Annotated, Any
 
 import numpy as np
 
 from ..actions.forces.contact_texts import ContactTables, Question, of_contacts
 from ..actions.forces.texts import Kinds, of_kinds
-from ..beam.kernels.law import text_of
+from ..beam.kernels.law import point_of
 from ..beam.kernels.strain import evaluate
 from ..beam.kernels.tables import StrainTables
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
-from ..core.jit import MADE, address, caller, reader
+from ..core.jit import MADE, address, caller, compiled, reader
 from ..core.origin import ours
 from ..core.source import F1, F3
 from ..core.words import Words
@@ -35,7 +36,7 @@ def run(t, what, u, v, f, given, out, flat, ld):
     _call_strain(t.address, (t, what, u, v, f, given, out, flat, ld))
 
 
-def run_text(law, strain, out):
+def evaluate_points(law, strain, out):
     _call_law(law.address, (law.constants, strain, out))
 
 
@@ -67,7 +68,30 @@ def part(name: str) -> int:
 @cache
 def law(function: Any) -> int:
     """The address of a material law; one of another package is compiled in each process."""
-    return address(function, _LAW, f"_{function.__module__}", ours(function))
+    kernel = FunctionType(_of_points.__code__, {"point": compiled(function)}, "_of_points")
+    kernel.__module__ = __name__
+    return address(kernel, _LAW, f"_{function.__module__}_{function.__qualname__}", ours(function))
+
+
+def _of_points(constants, strain, out):
+    """What ``point`` gives at all points: energies, stresses or moduli as ``out`` is long."""
+    for p in range(strain.shape[1]):
+        for e in range(strain.shape[2]):
+            W, S, D = point(constants, strain[0, p, e], strain[1, p, e], strain[2, p, e])
+            if len(out) == 1:
+                out[0, p, e] = W
+            elif len(out) == 3:
+                out[0, p, e], out[1, p, e], out[2, p, e] = S
+            else:
+                out[0, p, e], out[4, p, e], out[8, p, e] = D[0], D[3], D[5]
+                out[1, p, e] = out[3, p, e] = D[1]
+                out[2, p, e] = out[6, p, e] = D[2]
+                out[5, p, e] = out[7, p, e] = D[4]
+
+
+def point(constants, xx, yy, xy):
+    """The function of the law, in the namespace of a copy of :func:`_of_points`."""
+    raise NotImplementedError
 
 
 def flat(plain: Equations) -> tuple[Equations, list[Words]]:
@@ -94,7 +118,7 @@ def _flat_body(body, words):
 
 
 def _with_addresses(t):
-    t, function = t._replace(address=part("StrainTables")), text_of(t.law)
+    t, function = t._replace(address=part("StrainTables")), point_of(t.law)
     if function is None:
         return t
     try:

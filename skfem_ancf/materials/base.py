@@ -30,9 +30,9 @@ class Material(Immutable):
 
     A user-defined law is a subclass that defines :meth:`energy` and :meth:`stress`, and
     :meth:`moduli` if the complex step of ``stress`` is not good enough; in plane stress also
-    :meth:`thickness_stretch` if Cauchy stress is asked for. Scenes with it run in NumPy:
-    a :class:`~skfem_ancf.materials.text.TextMaterial` is compiled. A subclass of a law of the
-    package that overrides ``stress`` alone has the energy of that stress, integrated from zero
+    :meth:`thickness_stretch` if Cauchy stress is asked for. Scenes with it run in NumPy; a
+    :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial` is compiled. A subclass of a law of
+    the package that overrides ``stress`` alone has the energy of that stress, integrated from zero
     along the strain, and its moduli. Strains and stresses are in the beam's frame (first index
     along the axis, second across the section):
 

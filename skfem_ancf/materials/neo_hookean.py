@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.source import lanes, primitive, source
-from .text import TextMaterial
+from ..core.source import primitive, source
+from .pointwise import PointwiseMaterial
 
 if TYPE_CHECKING:
     from ..core.types import Array, Law
@@ -21,74 +21,59 @@ def log1p(x):
         return np.log1p(x)
 
 
+@primitive("skfem_ancf.core.loops")
+def everywhere(condition):
+    """True if a condition holds at all points."""
+    return np.all(condition)
+
+
 @source
-def neo_hookean(constants: Array, strain: Array, out: Array) -> None:
+def log_thickness(G, lame, log_det):
+    """x = ln C_33 of plane stress, ``G (C_33 - 1) + lambda ln J = 0``, by Newton's method."""
+    x = 0.0 * log_det
+    for _ in range(60):
+        change = np.expm1(x)
+        dx = ((G * change + 0.5 * lame * (log_det + x)) / (G * (change + 1.0) + 0.5 * lame))
+        dx = np.maximum(dx, -1.0)  # convex: from above it comes down by itself
+        x = x - dx
+        if everywhere(np.abs(dx) <= 1e-14 * (1e-14 + np.abs(x))):
+            break
+    return x
+
+
+@source
+def log_determinant(xx, yy, xy):
+    """ln det C, which keeps the digits of small strains."""
+    return log1p(2.0 * (xx + yy) + 4.0 * xx * yy - xy * xy)
+
+
+@source
+def neo_hookean(constants, xx, yy, xy):
     """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2 and its derivatives.
 
     S = G (I - C^-1) + lambda ln J C^-1; the moduli are condensed with S_33 = 0 in plane stress.
-
-    Parameters
-    ----------
-    constants
-        :attr:`NeoHookean.constants`, shape (3,).
-    strain
-        Shape (3, n, elements).
-    out
-        The stress, if of shape (3, n, elements); the moduli (9, ...), the energy (1, ...), or
-        ln det C and ln C_33, (2, ...).
+    Arguments are those of :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial`.
     """
-    G, lame, plane_stress = constants
-    n, size = strain.shape[1], strain.shape[2]
-    log_det, x = np.empty((n, size), strain.dtype), np.empty((n, size), strain.dtype)
-    for p in lanes(n):
-        for e in lanes(size):
-            # det C = 1 + ...: log1p keeps the digits of small strains
-            log_det[p, e] = log1p(2.0 * (strain[0, p, e] + strain[1, p, e])
-                                  + 4.0 * strain[0, p, e] * strain[1, p, e]
-                                  - strain[2, p, e] * strain[2, p, e])
-            x[p, e] = 0.0 * log_det[p, e]
-    moved = np.ones((n, size), np.bool_)
-    for k in range(60):  # x = ln C_33: G (C_33 - 1) + lambda ln J = 0, by Newton
-        if plane_stress == 0.0 or not np.any(moved):
-            break
-        for p in lanes(n):
-            for e in lanes(size):
-                change = np.expm1(x[p, e])
-                dx = ((G * change + 0.5 * lame * (log_det[p, e] + x[p, e]))
-                      / (G * (change + 1.0) + 0.5 * lame))
-                dx = np.maximum(dx, -1.0)  # convex: from above it comes down by itself
-                x[p, e] -= dx
-                moved[p, e] = np.abs(dx) > 1e-14 * (1e-14 + np.abs(x[p, e]))
-    for p in lanes(n):
-        for e in lanes(size):
-            E1, E2, C12 = strain[0, p, e], strain[1, p, e], strain[2, p, e]
-            log_J = 0.5 * (log_det[p, e] + x[p, e])
-            inverse = np.exp(-log_det[p, e])
-            a, b, c = (1.0 + 2.0 * E2) * inverse, (1.0 + 2.0 * E1) * inverse, -C12 * inverse
-            if len(out) == 3:
-                # det C (I - C^-1), written so that it vanishes without cancellation
-                g, m = G * inverse, lame * log_J
-                out[0, p, e] = g * (2.0 * E1 * (1.0 + 2.0 * E2) - C12 * C12) + m * a
-                out[1, p, e] = g * (2.0 * E2 * (1.0 + 2.0 * E1) - C12 * C12) + m * b
-                out[2, p, e] = g * C12 + m * c
-            elif len(out) == 9:
-                m = G - lame * log_J
-                # lambda, or 2 m lambda / (2 m + lambda) in plane stress
-                part = 2.0 * m * plane_stress + 1.0 - plane_stress
-                stiff = lame * part / (part + plane_stress * lame)
-                out[0, p, e], out[4, p, e] = (stiff + 2 * m) * a * a, (stiff + 2 * m) * b * b
-                out[8, p, e] = stiff * c * c + m * (a * b + c * c)
-                out[1, p, e] = out[3, p, e] = stiff * a * b + 2 * m * c * c
-                out[2, p, e] = out[6, p, e] = (stiff + 2 * m) * a * c
-                out[5, p, e] = out[7, p, e] = (stiff + 2 * m) * b * c
-            elif len(out) == 1:
-                trace = 2.0 * (E1 + E2) + np.expm1(x[p, e])
-                out[0, p, e] = 0.5 * G * trace - G * log_J + 0.5 * lame * log_J * log_J
-            else:
-                out[0, p, e], out[1, p, e] = log_det[p, e], x[p, e]
+    G, lame, plane_stress = constants[0], constants[1], constants[2]
+    log_det = log_determinant(xx, yy, xy)
+    x = log_thickness(G, lame, log_det) if plane_stress > 0.0 else 0.0 * log_det
+    log_J, inverse = 0.5 * (log_det + x), np.exp(-log_det)
+    a, b, c = (1.0 + 2.0 * yy) * inverse, (1.0 + 2.0 * xx) * inverse, -xy * inverse
+    energy = (0.5 * G * (2.0 * (xx + yy) + np.expm1(x)) - G * log_J + 0.5 * lame * log_J * log_J)
+    # det C (I - C^-1), written so that it vanishes without cancellation
+    g, m = G * inverse, lame * log_J
+    stress = (g * (2.0 * xx * (1.0 + 2.0 * yy) - xy * xy) + m * a,
+              g * (2.0 * yy * (1.0 + 2.0 * xx) - xy * xy) + m * b, g * xy + m * c)
+    m = G - lame * log_J
+    # lambda, or 2 m lambda / (2 m + lambda) in plane stress
+    part = 2.0 * m * plane_stress + 1.0 - plane_stress
+    stiff = lame * part / (part + plane_stress * lame)
+    both = stiff + 2.0 * m
+    return energy, stress, (both * a * a, stiff * a * b + 2.0 * m * c * c, both * a * c,
+                            both * b * b, both * b * c, stiff * c * c + m * (a * b + c * c))
 
 
-class NeoHookean(TextMaterial):
+class NeoHookean(PointwiseMaterial):
     """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2.
 
     For small strains it agrees with Hooke's law of the same ``E`` and ``nu``. Unlike
@@ -110,7 +95,7 @@ class NeoHookean(TextMaterial):
     1.098901
     """
 
-    text = staticmethod(neo_hookean)
+    point = staticmethod(neo_hookean)
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
@@ -133,7 +118,10 @@ class NeoHookean(TextMaterial):
     def thickness_stretch(self, strain: Array) -> Array:
         if not self._fits("thickness_stretch"):
             return super().thickness_stretch(strain)
-        return np.exp(0.5 * self.evaluated(np.real(strain), 2)[1])
+        log_det = log_determinant(*np.real(strain))
+        if self.plane != "stress":
+            return np.ones_like(log_det)
+        return np.exp(0.5 * log_thickness(self.G, self.lame, log_det))
 
     def stress_zz(self, strain: Array) -> Array:
         if self.plane == "stress" or not self._fits("stress_zz"):

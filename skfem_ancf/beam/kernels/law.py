@@ -1,4 +1,4 @@
-"""Laws in kernels: Hooke's, those with texts, and any other by calls of its methods."""
+"""Laws in kernels: Hooke's, functions of the strain at a point, and methods of any other."""
 
 import weakref
 from itertools import count
@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...materials import LinearLaw, TextMaterial
+from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
 from ...core.source import F1, F2, lanes, primitive, room, source
 
-#: Kinds of laws: constant moduli, a law with texts, and any other.
-LINEAR, TEXT, OWN = 0, 1, 2
+#: Kinds of laws: constant moduli, a function of the strain at a point, and any other.
+LINEAR, POINTWISE, OWN = 0, 1, 2
 
 #: By handle, as long as a kernel has them: compiled code holds no Python objects.
 _LAWS: dict[int, Any] = {}
@@ -24,13 +24,13 @@ class LawTables(NamedTuple):
     Attributes
     ----------
     kind, handle
-        One of :data:`LINEAR`, :data:`TEXT`, :data:`OWN`, and what finds the law of the latter two.
+        :data:`LINEAR`, :data:`POINTWISE` or :data:`OWN`, and what finds the law of the latter two.
     address
-        That of the compiled text; 0 for the plain one.
+        That of the compiled law; 0 in NumPy.
     D
         Moduli, those without strain where they depend on it, shape (3, 3).
     constants
-        Of a law with texts.
+        Of a pointwise law.
     scale
         Factors on the strain, and on the stress: that of shear is sqrt(k_s). Shape (3,).
     """
@@ -52,14 +52,14 @@ def own_evaluate(handle, strain, out):
 
 
 @primitive("skfem_ancf.equations.loops")
-def run_text(law, strain, out):
-    """Energy, stress or moduli of a law with a text; compiled, by its address."""
-    _LAWS[law.handle].text(law.constants, strain, out)
+def evaluate_points(law, strain, out):
+    """Energy, stress or moduli of a pointwise law; compiled, by its address."""
+    out[...] = _LAWS[law.handle].evaluated(strain, len(out))
 
 
-def text_of(law: LawTables) -> Any:
-    """The text of a law, None for one without."""
-    return _LAWS[law.handle].text if law.kind == TEXT else None
+def point_of(law: LawTables) -> Any:
+    """The function of the strain at a point, None for a law without."""
+    return _LAWS[law.handle].point if law.kind == POINTWISE else None
 
 
 @source
@@ -83,8 +83,8 @@ def law_evaluate(law, strain, out):
         for p in lanes(n):
             for e in lanes(size):
                 x[c, p, e] = y * strain[c, p, e]
-    if law.kind == TEXT:
-        run_text(law, x, out)
+    if law.kind == POINTWISE:
+        evaluate_points(law, x, out)
     else:
         own_evaluate(law.handle, x, out)
     for k in range(len(out)):
@@ -146,8 +146,8 @@ def law_tables(law: Any, owner: Any) -> LawTables:
         return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
     handle, kind, constants = next(_handles), OWN, np.zeros(3)
-    if isinstance(base, TextMaterial) and base.has_text:
-        kind, constants = TEXT, np.array(base.constants, dtype=float)
+    if isinstance(base, PointwiseMaterial) and base.is_pointwise:
+        kind, constants = POINTWISE, np.array(base.constants, dtype=float)
     _LAWS[handle] = base
     weakref.finalize(owner, _LAWS.pop, handle, None)
     with np.errstate(all="ignore"):
