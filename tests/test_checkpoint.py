@@ -1,9 +1,6 @@
 """Motions that are written to files, killed, and gone on with."""
 
-import json
-import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -84,96 +81,6 @@ def test_a_finished_file_gives_the_history(tmp_path):
     assert_identical(swinging().resume(path), whole)
     swinging().integrate(0.01, 2.5e-3, checkpoint=path)  # a finished one may be replaced
     assert swinging().resume(path).t[-1] == pytest.approx(0.01)
-
-
-# killed
-
-CHILD = '''
-import json, os, random, signal, sys, time, warnings
-sys.path[:0] = {paths!r}
-import numpy as np
-from skfem_ancf.dynamics import checkpoint
-from test_restart import swinging
-
-path, every, end = sys.argv[1], 3, 0.1
-def whole():
-    return swinging(False).integrate(end, 2.5e-3)
-def run():
-    done = os.path.exists(path)
-    scene = swinging(False)
-    return (scene.resume(path) if done else
-            scene.integrate(end, 2.5e-3, checkpoint=path, every=every))
-def child(work):
-    pid = os.fork()
-    if pid == 0:
-        try:
-            work()
-            os._exit(0)
-        except BaseException as error:
-            print(repr(error), file=sys.stderr, flush=True)
-            os._exit(3)
-    return pid
-def same(a, b):
-    return all(np.array_equal(getattr(a, n), getattr(b, n))
-               for n in ("t", "u", "v", "acceleration", "multipliers"))
-'''
-
-
-def in_child(code, path):
-    """Run code after CHILD, in a process of its own; what it prints last, from JSON."""
-    here = Path(__file__).parent
-    head = CHILD.format(paths=[str(here.parent), str(here)])
-    out = subprocess.run([sys.executable, "-W", "error", "-c", head + code, str(path)],
-                         capture_output=True, text=True, timeout=300,
-                         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-                         check=False)
-    assert out.returncode == 0, out.stderr
-    return json.loads(out.stdout.strip().splitlines()[-1])
-
-
-needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
-
-
-@needs_fork
-def test_killed_while_writing(tmp_path):
-    """After a part of the file, before it is on the disk, before and after it gets its name."""
-    found = in_child('''
-def at(n, module, name, after):
-    """Kill this process at the n-th call of a function."""
-    function, count = getattr(module, name), [0]
-    def killing(*args, **kwargs):
-        count[0] += 1
-        if count[0] == n and not after:
-            os.kill(os.getpid(), signal.SIGKILL)
-        out = function(*args, **kwargs)
-        if count[0] == n:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return out
-    setattr(module, name, killing)
-
-def half(n):
-    savez, count = np.savez, [0]
-    def killing(file, **arrays):
-        count[0] += 1
-        if count[0] == n:
-            file.write(b"PK" + bytes(1000)); file.flush()
-            os.kill(os.getpid(), signal.SIGKILL)
-        savez(file, **arrays)
-    np.savez = killing
-
-out = []
-for prepare in (lambda: half(3), lambda: at(5, os, "fsync", False),
-                lambda: at(4, os, "replace", False), lambda: at(4, os, "replace", True)):
-    pid = child(lambda: (prepare(), run()))
-    status = os.waitpid(pid, 0)[1]
-    out.append([status == signal.SIGKILL, float(checkpoint.read(path)["now.t"])])
-    assert len(os.listdir(os.path.dirname(path))) == 1 + min(3, len(out))
-history = run()
-print(json.dumps([out, same(history, whole()), len(os.listdir(os.path.dirname(path))) - 4]))
-''', tmp_path / "run.npz")
-    killed, identical, new = found
-    assert all(k for k, _ in killed) and identical and new == 0
-    assert killed[0][1] < killed[1][1] < killed[3][1] < 0.1
 
 
 # where it cannot be written

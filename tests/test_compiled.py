@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.actions.joints import JOINTS, Joint
-from skfem_ancf.actions.joints.base import point
+from skfem_ancf.actions.joints import JOINTS
 from skfem_ancf.core.switch import compiled_off
 
 if compiled_off() is not None:
@@ -172,45 +171,6 @@ def test_same_motion_with_moving_supports_and_varying_loads(scheme):
     end = fast.position((0, 0))
     assert_allclose(end[:, 0], 0.05 * np.sin(8 * fast.t), rtol=0, atol=1e-14)
     assert_allclose(fast.velocity((0, 0))[1:, 0], 0.4 * np.cos(8 * fast.t[1:]), rtol=0, atol=1e-7)
-
-
-@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
-@pytest.mark.parametrize("flag", [False, True])
-def test_a_joint_that_is_not_quadratic_is_asked_by_the_steps(flag, scheme):
-    class Distance(Joint):
-        """|r - c| = R, with a root: the same motion as on the circle."""
-
-        equations = ("force",)
-        constant = False
-        at, center = (1.0, 0.0), np.array([0.4, 0.1])
-
-        def bind(self, scene):
-            self.r, self.N = point(scene, "forearm", self.at), scene.N
-            self.R = np.hypot(*(self.r.start - self.center))
-
-        def value(self, u, t):
-            return np.array([np.hypot(*(self.r(u) - self.center)) - self.R])
-
-        def jacobian(self, u, t):
-            d = self.r(u) - self.center
-            return self.r.row(d / np.hypot(*d), self.N)[None]
-
-        def curvature(self, u, t, multipliers):
-            d, w = self.r(u) - self.center, self.r.weights
-            s = np.hypot(*d)
-            H = (np.eye(2) - np.outer(d, d) / s**2) / s * multipliers[0]
-            values = np.einsum("ij,ik,jl->ikjl", H, w, w)
-            rows = np.broadcast_to(self.r.dofs[:, :, None, None], values.shape)
-            columns = np.broadcast_to(self.r.dofs[None, None], values.shape)
-            return rows.ravel(), columns.ravel(), values.ravel()
-
-    rooted, squared = elbow(flag), elbow(flag)
-    rooted.joint(Distance())
-    squared.joint("circle", **JOINED["circle"])
-    assert rooted.system.machine.tables.plain.joints.own
-    assert not squared.system.machine.tables.plain.joints.own
-    a, b = (s.integrate(0.05, 2.5e-3, scheme=scheme, tol=1e-12) for s in (rooted, squared))
-    assert_allclose(a.u, b.u, rtol=0, atol=1e-9 if scheme == "generalized-alpha" else 1e-4)
 
 
 @pytest.mark.parametrize("name", JOINTS)

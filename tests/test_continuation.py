@@ -38,17 +38,6 @@ def around_the_minimum():
     return until
 
 
-def past_the_maximum():
-    """Stop below 97 % of the largest load."""
-    been = [0.0]
-
-    def until(point):
-        been.append(point.load)
-        return point.load < 0.97 * max(been)
-
-    return until
-
-
 def lee_limits(element, n, ds, h=2.0, L=120.0, b=3.0, E=720.0):
     path = lee(element, n, h, L, b, E).continuation(steps=400, ds=ds, ds_max=ds,
                                                     until=around_the_minimum())
@@ -73,26 +62,6 @@ def test_limits_of_lee_frame_with_quintic_cables():
         s = np.clip(np.sum((r - a) * d, axis=1) / np.sum(d * d, axis=1), 0, 1)
         gaps.append(np.min(np.linalg.norm(a + s[:, None] * d - r, axis=1)))
     assert max(gaps) < 1e-3  # of the chords between points
-
-
-def arch(element, n, h=1e-3, angle=215.0):
-    """Clamped at the left, hinged at the right; the load factor is in EI / R^2."""
-    a = np.deg2rad(angle) / 2
-    mesh = MeshBeam.init_curve(lambda s: np.array([np.sin(s), np.cos(s)]),
-                               np.linspace(-a, a, n + 1), h)
-    beam = Beam(mesh, element, StVenantKirchhoff(12 / (h**3 * 0.01), 0.3), 0.01,
-                formulation="assumed")
-    scene = Scene(beam).clamp("left", thickness="free").pin("right")
-    return scene.point_force((0, -1), at=(0, 1))
-
-
-@pytest.mark.parametrize("element, n, tol", [
-    (ElementBeamCable(5), 32, 1e-5), (ElementBeamANCFCubic(2), 48, 5e-3),
-    (ElementBeamANCF(2), 64, 0.2)])
-def test_limit_of_the_deep_arch(element, n, tol):
-    limits = arch(element, n).continuation(until=past_the_maximum()).limit_points()
-    assert len(limits) == 1
-    assert abs(limits[0] - exact.clamped_hinged_arch_limit()) < tol
 
 
 SPAN, RISE, EA, EI = 12.943, 0.386, 1.885e6, 9.27e3
@@ -208,21 +177,6 @@ def shallow(rise, element=None, n=8, force=1.0):
     beam = Beam(mesh, element or ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3), 0.01,
                 formulation="assumed")
     return Scene(beam).pin("left").pin("right").point_force((0, -force), at=(0.5, rise))
-
-
-@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCFCubic(2)])
-@pytest.mark.parametrize("rise", [0.02, 0.025])
-def test_stability_changes_at_limit_points(rise, element):
-    path = shallow(rise, element).continuation(steps=60, ds=1e-3, ds_max=1e-3)
-    assert len(path.limit_points()) == 2
-    rising = np.array([p.rate > 0 for p in path.points[:-1]])
-    assert path.stable[:-1] == rising.tolist()
-
-
-def test_stability_is_lost_before_the_limit_point_where_the_path_branches():
-    path = shallow(0.035).continuation(steps=40, ds=1e-3, ds_max=1e-3)
-    lost = path.stable.index(False)
-    assert path.load[lost] < 0.98 * path.limit_points()[0] and path.points[lost].rate > 0
 
 
 # what a path offers

@@ -264,50 +264,6 @@ def test_an_arc_weighs_what_its_area_and_length_say(element):
         assert_allclose(forces.M[0], g * mass * (1 - np.sin(1.0)), rtol=1e-2)
 
 
-@pytest.mark.parametrize("element", SHAPES)
-@pytest.mark.parametrize("body", BODIES)
-def test_gravity(body, element):
-    beam, g = make(body, element), np.array([1.3, -9.81])
-    f = asm(forms.gravity(1.7, g, WIDTH), beam.exact_basis())
-    assert_allclose(beam.rigid_motions()[:, :2].T @ f, beam.total_mass * g, rtol=1e-13)
-    uniform = np.zeros((beam.N // beam.nd, beam.nd // 2, 2))
-    uniform[:, 0] = g
-    assert_allclose(f, beam.mass() @ uniform.ravel(), atol=1e-13)
-    # by the scene, and as the user's own form
-    own = LinearForm(lambda v, w: 1.7 * WIDTH * (g[0] * v[0] + g[1] * v[1]))
-    for scene in (Scene(beam).gravity(g), Scene(beam).load(own)):
-        assert_allclose(scene.loads[0].force(None), f, atol=1e-14)
-    u = deformed(beam)
-    assert abs(scene.loads[0].potential(u) + f @ u) < 1e-14
-
-
-def test_traction():
-    beam = make("unequal", "3")  # x from -1 to 1.1, h = 0.3
-    T = beam.rigid_motions()
-    for name, length, arm in (("top", 2.1, (0, 0.15)), ("bottom", 2.1, (0, -0.15)),
-                              ("right", 0.3, (1.05, 0)), ("left", 0.3, (-1.05, 0))):
-        t = np.array([0.7, -0.2])
-        f = asm(forms.traction(t, WIDTH), beam.facet_basis(name))
-        middle = np.array([0.05, 0.0]) + arm - beam.origin
-        force = t * WIDTH * length
-        assert_allclose(T.T @ f, [*force, middle[0] * force[1] - middle[1] * force[0]], atol=1e-14)
-        assert_allclose(Scene(beam).traction(name, t).loads[0].vector, f, atol=1e-15)
-    # a traction that varies: resultant and first moment of sin over the top
-    scene = Scene(beam).traction("top", lambda x: np.array([0 * x[0], np.sin(3 * x[0])]))
-    f = scene.loads[0].vector
-    assert abs(T[:, 1] @ f - WIDTH * (np.cos(-3.0) - np.cos(3.3)) / 3) < 1e-9
-
-
-def test_point_force():
-    beam = make("arc", "3")
-    r = np.array([np.cos(0.5), np.sin(0.5)]) * 1.1
-    force = np.array([0.3, -2.0])
-    f = Scene(beam).point_force(force, at=r).loads[0].vector
-    x = r - beam.origin
-    assert_allclose(beam.rigid_motions().T @ f, [*force, x[0] * force[1] - x[1] * force[0]],
-                    atol=1e-12)
-
-
 # follower loads
 
 ENDS = ["left", "right", "top", "bottom"]

@@ -175,34 +175,6 @@ def test_two_welded_beams_are_one(angle):
     assert np.allclose(f1, f2, rtol=0.02)
 
 
-@pytest.mark.parametrize("angle", [np.pi / 2, 2.0, -0.8])
-def test_frame_against_slope_deflection(angle):
-    """A column with a rigid corner and a beam off it, loaded across the beam's end.
-
-    Small deflections: the beam's tip moves across by P L^3 / (3 EI) + (corner rotation) L, the
-    corner turns by P L H / (EI) plus the column's own share.
-    """
-    H, L, h, P = 1.0, 0.8, 0.02, 1e-5
-    EI = E * h**3 * 0.1 / 12
-    # at the corner the column ends in the direction (0, 1); the beam leaves at `angle` to it
-    d = np.array([-np.sin(angle), np.cos(angle)])
-    n = np.array([-d[1], d[0]])
-    corner = np.array([0.0, H])
-    a = between((0, 0), corner, 4, h=h, nu=0.0)
-    b = between(corner, corner + L * d, 4, h=h, nu=0.0)
-    scene = Scene(a, b).clamp("left", beam=a).point_force(P * n, corner + L * d, beam=b)
-    scene.joint("weld", beams=(a, b), at=("right", "left"))
-    state = scene.solve_static()
-    # column under an end force across it, Q = P n . (-1, 0), and an end moment P L
-    Q, M = -P * n[0], P * L
-    turn = Q * H**2 / (2 * EI) + M * H / EI
-    sway = Q * H**3 / (3 * EI) + M * H**2 / (2 * EI)
-    tip = np.array([-sway, 0.0]) + n * (turn * L + P * L**3 / (3 * EI))
-    found = state.displacement(corner + L * d, beam=b)
-    assert np.abs(found - tip).max() < 0.01 * np.hypot(*tip)
-    assert np.hypot(*tip) < 0.01
-
-
 def test_hinge_reactions_of_a_three_hinged_arch():
     """Two bars that meet at the top: the thrust of a load there is P / (2 tan a)."""
     P, a = 0.1, 0.6
@@ -336,34 +308,6 @@ def repeated(more):
         if more == "hinge, clamp":
             held.append(scene.joint("line", beam=a, at=(0, 0.02), direction=(1, 1)))
     return scene, held
-
-
-#: What is repeated, by what, and how many equations repeat others.
-REPEATED = [("hinge", "hinge, twice", 2), ("hinge", "hinge, three times", 4),
-            ("weld", "weld, hinge", 2), ("line", "line, third", 1), ("hinge", "hinge, clamp", 1)]
-
-
-def pull(state, held):
-    """The sum of what joints do to the first beam, along x and y, of lines to the second one."""
-    forces = [state.joint_force(joint) for joint in held if len(joint.equations) > 1]
-    return np.sum([force[:2] for force in forces], axis=0)
-
-
-@pytest.mark.parametrize("once, more, number", REPEATED)
-def test_repeated_joints_change_nothing_in_statics(once, more, number):
-    (plain, one), (scene, held) = repeated(once), repeated(more)
-    with pytest.warns(ModelWarning, match=f"^{number} of .* repeat others"):
-        assert scene.system.constraints.m == plain.system.constraints.m
-    a, b = plain.solve_static(), scene.solve_static()
-    assert_allclose(b.u, a.u, rtol=0, atol=1e-9)
-    assert_allclose(pull(b, held), pull(a, one), rtol=0, atol=1e-7)
-    assert_allclose(b.reactions("left", beam=0).force, a.reactions("left", beam=0).force, rtol=0,
-                    atol=1e-7)
-    assert_allclose(scene.modes(3).frequencies, plain.modes(3).frequencies, rtol=1e-8)
-    assert_allclose(scene.modes(3, state=b).frequencies, plain.modes(3, state=a).frequencies,
-                    rtol=1e-7)
-    if once != "line":  # whose load goes to the ground
-        assert_allclose(scene.buckling(1).factors, plain.buckling(1).factors, rtol=1e-7)
 
 
 def test_forces_of_repeated_joints_are_the_smallest():

@@ -10,7 +10,6 @@ import pytest
 from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.core import code_cache
 from skfem_ancf.core.errors import CompilationWarning
-from skfem_ancf.core.source import lanes, source
 from skfem_ancf.core.switch import expecting
 from skfem_ancf.equations import backend
 
@@ -105,16 +104,6 @@ def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
     assert loads == ["steps", "evaluate"]
 
 
-def test_what_lies_on_disk_is_loaded_for_tasks_longer_than_loading(auto, monkeypatch, capsys):
-    s, loads = auto
-    monkeypatch.setattr(code_cache, "on_disk", lambda *names: True)
-    s.solve_static()
-    s.integrate(0.01, 1e-3)
-    assert not loads
-    s.integrate(0.05, 1e-3)
-    assert loads == ["steps"] and not capsys.readouterr().err
-
-
 def test_members_and_steps_count(auto, monkeypatch):
     """A sweep, a path and a motion of automatic steps are as large as what they repeat."""
     from skfem_ancf import sweep
@@ -131,31 +120,6 @@ def test_members_and_steps_count(auto, monkeypatch):
     small = scene()
     assert not small.system.machine._missing("equilibrium")  # and so it is used at once
     assert small.plan()["compiled loop"].reason.endswith("compiled code is loaded")
-
-
-def test_no_clock_decides(auto, monkeypatch):
-    """The same blocks of steps, and the same way, on a machine that is a thousand times slower."""
-    import itertools
-    import time
-
-    def blocks():
-        taken, steps = [], s.system.machine.of
-
-        def of(text):
-            function = steps(text)
-            return lambda *args: taken.append(text.__name__) or function(*args)
-
-        with monkeypatch.context() as patch:
-            patch.setattr(s.system.machine, "of", of)
-            s.integrate(0.02, 1e-3)
-        return taken
-
-    s, loads = auto
-    usual = blocks()
-    clock = itertools.count()
-    for name in "perf_counter", "monotonic", "process_time", "time":
-        monkeypatch.setattr(time, name, lambda: 1000.0 * next(clock))
-    assert blocks() == usual and not loads
 
 
 def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_path):
@@ -232,25 +196,3 @@ print(y.tolist())
         for path in kept:
             path.write_bytes(b"" if damage == "empty" else b"\x80 no code")
     assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
-
-
-@source
-def loops(first, last, out):
-    for i in range(last):
-        out[0] += 1.0 + i
-    for i in range(first, last):
-        for k in range(5):
-            if k > 2:
-                break
-            out[1] += 10.0 * i + k
-    add_steps(first, last, out[2:4])
-    for i in lanes(3, 5):
-        out[i] += 100.0
-
-
-@source
-def add_steps(first, last, out):
-    for i in range(last, first, -2):
-        out[0] += 1.0 + i
-    for i in lanes(0, 2, 1):
-        out[i] += 1.0

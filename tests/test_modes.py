@@ -11,7 +11,6 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, S
 from skfem_ancf.core.errors import ConvergenceError, InputError, ModelWarning, SupportError
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
-from skfem_ancf.results.state import State
 
 E, RHO, B = 1e9, 1000.0, 0.1
 
@@ -111,35 +110,6 @@ def test_modes_with_joints():
     four = hinged.modes(7).frequencies
     assert np.abs(four[:4]).max() < 1e-3 * four[4]  # the bars turn freely
     assert four[4] == pytest.approx(one[4], rel=0.02)  # the antisymmetric one stays
-
-
-def test_pendulum_on_a_hinge_and_on_a_circle():
-    """Small swings of a hanging rod, omega^2 = 3 g / (2 L), stiffened by the weight it carries.
-
-    A bar whose two ends hang on circles of radius R swings without turning, omega^2 = g / R: here
-    the restoring force is the joints' own curvature.
-    """
-    L, R, g = 0.5, 0.8, 9.81
-    rod = straight(2, 0.01, L=L, angle=-np.pi / 2)
-
-    def hung(still):
-        scene = Scene(rod).pin("left").gravity((0, -g))
-        return scene.fix("right", "r^1") if still else scene
-
-    def swing(still):
-        scene = Scene(straight(2, 0.02, L=L)).gravity((0, -g))
-        for x in (0, L):
-            scene.joint("circle", at=(x, 0), center=(x, R))
-        return scene.fix("left", "r^1") if still else scene
-
-    def omega(make):
-        state = make(still=True).solve_static()  # statics wants the swing held
-        scene = make(still=False)
-        return scene.modes(1, State(scene.system, state.u, multipliers=state.multipliers)
-                           ).frequencies[0]
-
-    assert omega(hung) == pytest.approx(np.sqrt(1.5 * g / L), rel=1e-3)
-    assert omega(swing) == pytest.approx(np.sqrt(g / R), rel=2e-3)
 
 
 # buckling

@@ -74,15 +74,6 @@ def test_a_plane_is_one_up_to_round_off_of_its_size(size):
 
 # names
 
-def test_data_of_cells_are_no_groups_unless_they_are_named():
-    cells = [("line", [[0, 1], [1, 2]])]
-    mesh = meshio.Mesh(ARC[:3], cells, cell_data={"part-id": [[0, 1]], "material-no": [[1, 1]]})
-    frame = Frame.from_meshio(mesh, **OPTIONS)
-    assert [beam.name for beam in frame.beams] == ["lines"]
-    for options in ({"groups": ["part", "id"]}, {"sections": {"part": {"height": 0.01}}}):
-        named = Frame.from_meshio(mesh, **OPTIONS, **options)
-        assert [beam.name for beam in named.beams] == ["part", "id"]
-
 
 def test_sets_of_abaqus_may_overlap(tmp_path):
     path = abaqus(tmp_path / "arc.inp", "*ELEMENT, TYPE=B31, ELSET=left\n1, 1,2\n2, 2,3\n"

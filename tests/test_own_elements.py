@@ -69,6 +69,12 @@ def eigenvalues(beam):
 # the quintic elements
 
 @pytest.mark.parametrize("name", OWN)
+def test_no_mode_is_stabilised_in_vain(name):
+    sizes = [np.abs(mode.weights).max() for mode in OWN[name]().stabilised]
+    assert min(sizes, default=1.0) > 1e-6
+
+
+@pytest.mark.parametrize("name", OWN)
 def test_space_and_coordinates(name):
     """X^a Y^k from coordinates taken analytically, its values and gradients."""
     element, L, h = OWN[name](), 0.7, 0.3

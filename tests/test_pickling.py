@@ -124,20 +124,6 @@ def beam():
     return Beam(MeshBeam.init_line([0, 0.5, 1], 0.05), ElementBeamANCF(1), MATERIAL, 0.02)
 
 
-@pytest.mark.parametrize("change", [
-    lambda s: s.gravity((0, -1), amplitude=lambda t: t),
-    lambda s: s.pin(lambda x: x[0] > 0.9),
-    lambda s: s.joint("position", at=(1, 0), r=lambda t: (1, 0)),
-    lambda s: s.load(LinearForm(lambda v, w: v[0])),
-])
-def test_functions_without_a_name_can_be_copied_only(change):
-    made = Scene(beam()).clamp("left")
-    change(made)
-    with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
-        pickle.dumps(made)
-    same(copy.deepcopy(made).solve_static().u, made.solve_static().u)
-
-
 def test_errors_keep_their_state():
     made = Scene(beam()).clamp("left").point_force((0, -1e3), at=(1, 0))
     with pytest.raises(AncfError) as failure:

@@ -32,21 +32,6 @@ def test_the_rule(place, facets):
     assert_array_equal(facets_of(line(), place), facets)
 
 
-def test_rows_of_an_array_are_points():
-    a, b = beam(name="a"), beam(line(origin=(2, 0)), name="b")
-    for at in ([(2, 0), (2, 0)], np.array([[2, 0], [2, 0]])):
-        joint = Scene(a, b).joint("hinge", beams=("a", "b"), at=at)
-        assert joint.equations == ("force along x", "force along y")
-    ends = [(2, 0), (2, 1)]
-    state = [Scene(a).clamp("left").spring(1e3, between).gravity((0, -1.0)).solve_static()
-             for between in (ends, np.array(ends))]
-    assert_allclose(state[1].displacement((2, 0)), state[0].displacement((2, 0)), rtol=1e-12)
-    graded = [line().graded(at) for at in ([(0, 0), (1, 0)], np.array([[0, 0], [1, 0]]))]
-    assert_allclose(graded[1].p, graded[0].p, rtol=0, atol=1e-14)
-    with pytest.raises(InputError, match="more than 16777216 elements"):
-        line().graded(size=1e-300)
-
-
 @pytest.mark.parametrize("place, error, message", [
     ((1, 1), MeshError, r"the point \(1, 1\) is on no section .* node 2 with its axis at \(1, 0\)"),
     ((0.9, 0), MeshError, r"nearest is that of node 2 with its axis at \(1, 0\), 0.1 away"),
@@ -96,20 +81,6 @@ def test_a_point_is_where_it_says():
         facets_of(arc, (1, 0))
     with pytest.raises(InputError, match=r"pin holds the axis, at \(0, 1\)"):
         Scene(beam(arc)).pin((0, 1.03))
-
-
-def test_material_points():
-    scene = Scene(beam())
-    for point in ((1, 2, 3), 1.0, None, ("1", "0"), (1, 2j), (True, False)):
-        with pytest.raises(InputError, match="material point"):
-            scene.point_force((0, -1), at=point)
-        with pytest.raises(InputError, match="material point"):
-            scene.state().displacement(point)
-    for point, message in ("rigth", "name of an end.*got 'rigth'"), ("top", "not one section"):
-        with pytest.raises(MeshError, match=message):
-            scene.point_force((0, -1), at=point)
-        with pytest.raises(MeshError, match=message):
-            scene.state().displacement(point)
 
 
 def test_ends_are_material_points():

@@ -89,24 +89,6 @@ def test_points_of_several_beams():
         state.strain(xa, beam="c")
 
 
-def test_points_of_a_motion():
-    scene = Scene(Beam(LINE, ElementBeamANCF(2), STEEL, 0.1)).pin("left").gravity((0, -9.81))
-    history = scene.integrate(0.05, 0.01)
-    x = inside(LINE, 20)[2]
-    for name in METHODS:
-        many = getattr(history, name)(x)
-        assert many.shape == (len(history), 3 if name in ("strain", "stress") else 2, 20)
-        assert_allclose(getattr(history, name)(x[:, 3]), many[:, :, 3], atol=1e-12 * np.abs(
-            many).max())
-        assert_allclose(getattr(history.state(4), name)(x), many[4], atol=1e-12 * np.abs(
-            many).max())
-    # the velocity is the rate of the position
-    dt = 1e-6
-    y = history.state(3)
-    moved = y.replace(u=y.u + dt * y.v).position(x) - y.replace(u=y.u - dt * y.v).position(x)
-    assert_allclose(moved / (2 * dt), y.velocity(x), rtol=1e-6, atol=1e-8)
-
-
 @pytest.mark.parametrize("mesh", [LINE, quarter_arc(height=0.1)], ids=["straight", "arc"])
 def test_velocity_off_the_axis_of_a_turning_cable(mesh):
     """omega x r, with the axis where it is and the sections normal to it."""

@@ -9,8 +9,6 @@ from test_sections import (BIMETAL, BRASS, PROFILES, SANDWICH, STEEL, H, cantile
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         Scene, Section)
-from skfem_ancf.sections.measure import Uniform
-from skfem_ancf.sections.section import layer_of
 
 T = Section.profile("T", width=0.06, web=0.01, flange=0.015)
 ELEMENTS = [ElementBeamANCF(2), ElementBeamANCFCubic(2), ElementBeamCable(5)]
@@ -168,16 +166,3 @@ def test_tapered_profiles_are_the_plane_body(name):
         assert state.displacement((1, 0))[1] == pytest.approx(tip[1], rel=error)
         area = 0.75 * sum((b - a) * width for a, b, _, width in pieces)
         assert beam.total_mass == pytest.approx(7800 * area, rel=1e-9)
-
-
-class Strip(Section):
-    """A user-defined section."""
-
-    def layers_on(self, mesh, material):
-        return [layer_of(material, 0.02, Uniform())]
-
-
-def test_sections_of_ones_own_are_recovered():
-    state = cantilever(Beam(line(), ElementBeamANCF(2), STEEL, section=Strip()), (0.0, -P))
-    assert state.recovered == {0: ""}
-    assert state.stress((0.5, 0.0))[2] == pytest.approx(-1.5 * P / 0.002, rel=1e-5)

@@ -11,7 +11,6 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.obstacles import Line
 from skfem_ancf.core.quadrature import gauss
-from skfem_ancf.dynamics import GeneralizedAlpha
 
 ELEMENTS = [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]
 
@@ -144,23 +143,6 @@ def test_the_shear_force_of_a_cable_that_may_touch():
     right = free.solve_static().resultants()
     assert not own.recovered and right.recovered
     assert_allclose(own.Q, right.Q, atol=0.04 * np.abs(right.Q).max())
-
-
-def test_motion():
-    """In the pin the section force is the reaction; inertia is in it."""
-    scene = Scene(line(12, h=0.02, E=1e8)).pin("left").gravity((0, -9.81))
-    history = scene.integrate(0.1, 5e-3, scheme=GeneralizedAlpha(0.8))
-    many = history.resultants([(0.0, 0.0), (0.4, 0.0), (1.0, 0.0)])
-    one = history.resultants((0.4, 0.0))
-    assert many.N.shape == (len(history), 3) and one.N.shape == (len(history),)
-    assert_allclose(many.M[:, 1], one.M)
-    assert history.state(12).resultants().recovered
-    weight = 7800 * 9.81 * 4e-4
-    for k in (4, 12, 20):
-        state = history.state(k)
-        assert_allclose(many.force[k][:, 0], -state.reactions("left").force, atol=1e-3 * weight)
-        assert abs(many.M[k, 2]) < 1e-3 * weight
-        assert state.resultants((0.4, 0)).Q == pytest.approx(many.Q[k, 1], rel=1e-9)
 
 
 def test_diagrams(tmp_path):

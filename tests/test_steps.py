@@ -5,6 +5,7 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, GeneralizedAlpha,
                         MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf.core.band import BandMatrix, fix
 
 
 def stiff_pendulum(slenderness, element, flag, law=StVenantKirchhoff, rods=1, n=16):
@@ -61,3 +62,16 @@ def test_few_iterations_where_more_strains_are_sampled_than_the_axis_has(degree,
     assert history.iterations <= 8 * history.steps
     assert history.factorizations <= 1.3 * history.steps
     assert np.ptp(history.total_energy) < 1e-12 * history.kinetic_energy.max()
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_fixed_rows_and_columns_of_a_band_are_those_of_the_identity(symmetric):
+    n, width, fixed, free = 9, 2, np.array([4, 0]), np.ones(9)
+    i, j = np.nonzero(abs(np.arange(n)[:, None] - np.arange(n)) <= width)
+    inside = (i >= j) | (not symmetric)
+    A = BandMatrix(n, width, symmetric)
+    A.add(i[inside], j[inside], 2.0 + np.sin(i + 7.0 * j)[inside])
+    free[fixed] = 0.0
+    wanted = A.tocsc().toarray() * np.outer(free, free) + np.diag(1.0 - free)
+    fix(A.band, fixed)
+    assert np.array_equal(A.tocsc().toarray(), wanted)

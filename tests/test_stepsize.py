@@ -9,9 +9,8 @@ from test_dynamics import GRAVITY, by_scipy, soft
 
 from skfem_ancf import Scene
 from skfem_ancf.core.errors import InputError
-from skfem_ancf.dynamics import SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Radau
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha
 from skfem_ancf.dynamics.base import in_steps
-from skfem_ancf.dynamics.energy_momentum import PARTS
 from skfem_ancf.equations.momentum import momentum
 
 
@@ -56,39 +55,6 @@ def test_error_is_in_proportion_to_the_tolerance(scheme, name):
         ratios.append(error / rtol)
     assert np.abs(u).max() > 0.1
     assert 0.05 < min(ratios) and max(ratios) < 2.5, ratios
-
-
-def one_step(scheme, u, v, x):
-    """A step, of the length 1, of the vibration of the frequency x: its end, and its stages."""
-    if scheme.name == "energy-momentum-4":  # rotations, by the midpoint rule
-        turn = np.prod([(1 + 0.5j * x * part) / (1 - 0.5j * x * part) for part in PARTS])
-        z = (u - 1j * v / x) * turn
-        return z.real, -x * z.imag, None
-    c = scheme.points
-    k = np.arange(1, len(c) + 1)
-    fit = np.linalg.inv(np.vander(c, increasing=True))
-    A, b = (c[:, None]**k / k) @ fit, (1.0 / k) @ fit
-    W = np.linalg.solve(np.eye(len(c)) + x * x * A @ A, -x * x * (u + c * v))
-    return u + v + b @ (A @ W), v + b @ W, (u + c * v + A @ A @ W)[:, None]
-
-
-@pytest.mark.parametrize("scheme", [*map(Gauss, (1, 2, 3, 4)), Radau(), EnergyMomentum4()],
-                         ids=repr)
-def test_estimates_are_the_errors_of_vibrations(scheme):
-    """The root mean square of some hundred steps, against the exact solution from each start."""
-    x, u, v = 0.5, 1.0, 0.0
-    old = Motion(0.0, *(np.array([a]) for a in (u, v, -x * x * u, 0.0)), np.zeros(0), np.zeros(0))
-    estimates, errors = [], []
-    for n in range(1, 200):
-        (u1, v1, stages), z = one_step(scheme, u, v, x), (u - 1j * v / x) * np.exp(1j * x)
-        memory = {"stages": stages, "start": np.array([[u], [v]])}
-        new = Motion(float(n), *(np.array([a]) for a in (u1, v1, -x * x * u1, 0.0)),
-                     *np.zeros((2, 0)), before=1.0, memory=None if stages is None else memory)
-        estimates.append(scheme.local_error(old, new, 1.0)[0])
-        errors.append(u1 - z.real)
-        old, u, v = new, u1, v1
-    sizes = [np.sqrt(np.mean(np.square(e[8:]))) for e in (estimates, errors)]
-    assert sizes[0] == pytest.approx(sizes[1], rel=0.1)
 
 
 @pytest.mark.parametrize("name, rtol, tol", [("swinging", 1e-6, 1e-3), ("vibrating", 1e-4, 1e-2)])

@@ -9,7 +9,6 @@ from scipy.integrate import solve_bvp
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, InputError, MeshBeam, MeshError, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.beam.interpolation import locate
 from skfem_ancf.core.errors import CallbackError
 from skfem_ancf.core.quadrature import gauss
 
@@ -186,23 +185,6 @@ def test_width_as_a_function_of_both_coordinates(element):
     assert state.displacement((1.0, 0.0))[1] == pytest.approx(tip, rel=2e-3)
     assert state.resultants((0.5, 0.0)).M == pytest.approx(M, rel=1e-4)
     assert state.resultants((0.5, 0.0), recover=False).M == pytest.approx(M, rel=2e-2)
-
-
-@pytest.mark.parametrize("mesh", [straight(), curved()])
-def test_points_are_found_and_meshes_refined(mesh):
-    X = np.random.default_rng(2).uniform(0, 1, (2, 20))
-    e = np.arange(20) % mesh.nelements
-    x = mesh.mapping().F(X[:, :, None], e)[..., 0]
-    assert_allclose(mesh.mapping().invF(x[:, :, None], e)[..., 0], X, atol=1e-9)
-    beam = Beam(mesh, ElementBeamANCF(2), STEEL, width=0.1)
-    assert_allclose([locate(beam, p)[0] for p in x.T], e)
-    fine = mesh.refined()
-    s = fine.s[fine.t]
-    function = taper if mesh.is_straight else circle
-    assert_allclose(fine.heights, function(s[0] + np.arange(4)[:, None] / 3 * (s[1] - s[0])))
-    part = mesh.restrict([1, 2])
-    assert_allclose(part.heights, mesh.heights[:, 1:3])
-    assert_allclose(mesh.scaled(2.0).refined().heights, 2.0 * fine.heights)
 
 
 @pytest.mark.parametrize("height, kind, words", [

@@ -4,7 +4,6 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import quarter_arc
 from numpy.testing import assert_allclose
 from test_io import affine, bent, turn
 
@@ -68,26 +67,11 @@ def test_slender_beams_are_drawn_thicker_and_say_so():
     assert not state.plot(thickness=1).texts
 
 
-def test_stress_free_body_behind(state):
-    behind = [c for c in state.plot().collections if type(c).__name__ == "PolyCollection"]
-    box = behind[0].get_paths()[0].get_extents()
-    assert_allclose([box.x0, box.y0, box.x1, box.y1], [0, -0.05, 1, 0.05], atol=1e-12)
-    assert not [c for c in state.plot(undeformed=False).collections
-                if type(c).__name__ == "PolyCollection"]
-
-
 def test_limits_clip_with_arrows(state):
     ax = state.plot("S_xx", limits=(-1, 2))
     image = drawn(ax)
     assert image.get_clim() == (-1, 2) and image.colorbar.extend == "both"
     assert drawn(state.plot("S_xx")).colorbar.extend == "neither"
-
-
-@pytest.mark.parametrize("A", [np.eye(2), turn(1.0), 3 * np.eye(2)])
-def test_fields_without_a_range_or_without_values(A, tmp_path):
-    """No strain at all; and a Cauchy stress that is NaN everywhere."""
-    beam = Beam(quarter_arc(), ElementBeamANCF(1), STEEL, 1.0)
-    affine(beam, A).plot("sigma_xx", filename=tmp_path / "none.png", dpi=50)
 
 
 @pytest.mark.parametrize("options, error, message", [
