@@ -5,7 +5,8 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, GeneralizedAlpha,
                         MeshBeam, Scene, StVenantKirchhoff)
-from skfem_ancf.core.band import BandMatrix, fix
+from skfem_ancf.core.band import fix
+from skfem_ancf.core.linalg import BandMatrix
 
 
 def stiff_pendulum(slenderness, element, flag, law=StVenantKirchhoff, rods=1, n=16):
