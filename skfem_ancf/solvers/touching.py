@@ -82,7 +82,7 @@ def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
         memory[ANCHORED], memory[BILATERAL] = 0.0, 1.0
         for k, ((_, group), flag) in enumerate(zip(contacts.groups, flags)):
             pair = contacts.pair(k)
-            far = FAR * group.height * hardening(contacts.tables, pair)
+            far = FAR * group.height * hardening(pair)
             pair.memory[MULTIPLIER], memory[LARGEST + k] = far * flag, far
         yield
     finally:

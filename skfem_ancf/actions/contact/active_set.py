@@ -18,33 +18,33 @@ BEYOND = 4.0
 
 
 @source
-def projection(tables, pair, which, u):
+def projection(pair, which, u):
     """The slot of the projections at u; if there is none, the elements are searched.
 
     Their slot is not that which was asked last: the begin of a mean stays beside its end.
     """
-    h, slot = pair.header, tables.counts[2 + pair.k]
+    h, slot = pair.header, pair.counts[2 + pair.k]
     n, span = h[ELEMENTS], h[SPAN]
     now, pose = u[h[LOWEST]:h[LOWEST] + span], pair.poses[which]
     for _ in range(SLOTS):
         row = pair.cache[slot]
         if not (differs(now, row[:span]) or differs(pose, row[span:span + POSE])):
-            tables.counts[2 + pair.k] = slot
+            pair.counts[2 + pair.k] = slot
             return slot
         slot = 1 - slot
     slot = 1 - slot
-    tables.counts[2 + pair.k] = slot
+    pair.counts[2 + pair.k] = slot
     row, rows = pair.cache[slot], np.empty((9, n))
     x, found, radius = rows[:2], rows[2:8], rows[8]
     copy(now, row[:span])
     copy(pose, row[span:span + POSE])
     middles(pair, u, 1.0, x, radius)
-    distances(tables.own, pair, which, False, x, found)
+    distances(pair, which, False, x, found)
     gap = row[span + POSE:span + POSE + n]
     for e in lanes(n):
         gap[e] = found[0, e] - radius[e]
     clear(projected(pair, slot)[KNOWN])
-    tables.counts[0] += n
+    pair.counts[0] += n
     return slot
 
 
@@ -63,12 +63,12 @@ def chosen(at, flags):
 
 
 @source
-def near_points(tables, pair, what, begin, end):
+def near_points(pair, what, begin, end):
     """Numbers of the points of elements that may touch in either slot."""
-    h, reach = pair.header, tables.memory[LARGEST + pair.k]
+    h, reach = pair.header, pair.common[LARGEST + pair.k]
     n, span = h[ELEMENTS], h[SPAN] + POSE
     if what == SETTLE and pair.numbers[FRICTION] > 0.0:  # also what may touch next
-        reach = BEYOND * pair.numbers[RADIUS] if tables.memory[RATE] > 0.0 else 1e300
+        reach = BEYOND * pair.numbers[RADIUS] if pair.common[RATE] > 0.0 else 1e300
     a, b = pair.cache[begin][span:span + n], pair.cache[end][span:span + n]
     m, flags = pair.first.size // n, np.empty(pair.first.size)
     for p in range(m):
@@ -79,7 +79,7 @@ def near_points(tables, pair, what, begin, end):
 
 
 @source
-def project(tables, pair, which, slot, u, at):
+def project(pair, which, slot, u, at):
     """Project those of some points that were not yet."""
     known = projected(pair, slot)
     flags = np.empty(at.size)
@@ -92,19 +92,19 @@ def project(tables, pair, which, slot, u, at):
     z, x = rows[:4], rows[4:6]
     places(pair, u, 1.0, new, z)
     surface(pair, new, z, x)
-    distances(tables.own, pair, which, False, x, rows[GAP:])
+    distances(pair, which, False, x, rows[GAP:])
     for c in range(KNOWN):
         for i in lanes(new.size):
             known[c, new[i]] = rows[c, i]
     for i in lanes(new.size):
         known[KNOWN, new[i]] = 1.0
-    tables.counts[1] += new.size
+    pair.counts[1] += new.size
 
 
 @source
-def touching(tables, pair, begin, end, at):
+def touching(pair, begin, end, at):
     """The active set: those of some points that touch in either slot."""
-    part, flags = 1.0 / hardening(tables, pair), np.empty(at.size)
+    part, flags = 1.0 / hardening(pair), np.empty(at.size)
     a, b, multiplier = projected(pair, begin)[GAP], projected(pair, end)[GAP], pair.memory[
         MULTIPLIER]
     for i in lanes(at.size):

@@ -331,7 +331,7 @@ class Contacts:
             z, x, found = (np.empty((rows, at.size)) for rows in (4, 2, 6))
             places(pair, u, 1.0, at, z)
             surface(pair, at, z, x)
-            distances(self.tables.own, pair, NOW, False, x, found)
+            distances(pair, NOW, False, x, found)
             out.append((group, x, found[0]))
         return out
 
@@ -348,17 +348,17 @@ class Contacts:
         out = []
         for k, (which, group) in enumerate(self.groups):
             pair, at = self.pair(k), np.arange(len(group.first))
-            w, slot = np.zeros((ROWS, at.size)), projection(self.tables, pair, NOW, u)
-            project(self.tables, pair, NOW, slot, u, at)
+            w, slot = np.zeros((ROWS, at.size)), projection(pair, NOW, u)
+            project(pair, NOW, slot, u, at)
             gap = projected(pair, slot)[GAP].copy()
-            states(self.tables, pair, slot, slot, at, w)
-            push(self.tables, pair, at, w)
-            rub(self.tables, pair, True, at, w)
+            states(pair, slot, slot, at, w)
+            push(pair, at, w)
+            rub(pair, True, at, w)
             force, pressure = -w[PUSH:PUSH + 2], w[PRESSURE] / group.areas
             if v is not None and group.numbers[DAMPING] > 0.0:
                 places(pair, v, 0.0, at, w[RATES:DEPTH])
                 way(w)
-                resist(self.tables, pair, 0.0, at, w)
+                resist(pair, 0.0, at, w)
                 force = force - w[PUSH:PUSH + 2]
             out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure, gap))
         return out

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.callbacks import own_distance
 from ...core.source import lanes, source
-from .tables import CUSTOM, KIND, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE, START
+from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE, START
 
 TINY = 1e-200
 #: The least square of a slope: sections have none, and levers of no length.
@@ -91,7 +91,7 @@ def carried(q, p, x, y):
 
 
 @source
-def distances(own, pair, which, whole, x, out):
+def distances(pair, which, whole, x, out):
     """Gap, its gradient and second derivatives xx, xy, yy at points x, shape (6, n).
 
     Derivatives where ``whole`` is true.
@@ -102,9 +102,9 @@ def distances(own, pair, which, whole, x, out):
         a, b = x[0, i] - pose[0] - pose[4], x[1, i] - pose[1] - pose[5]
         y[0, i], y[1, i] = cos * a + sin * b + pose[4], cos * b - sin * a + pose[5]
     if pair.header[KIND] == CUSTOM:
-        own_distance(own, pair.header[OBSTACLE], pose[9], y, out)
+        own_distance(pair.own, pair.header[OBSTACLE], pose[9], y, out)
     else:
-        outline(pair.shape, whole, y, out)
+        outline(pair.numbers[NUMBERS:], whole, y, out)
     for i in lanes(x.shape[1]):
         out[0, i] *= side
     if not whole:

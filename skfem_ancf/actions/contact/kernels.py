@@ -39,7 +39,7 @@ NX, NY = FOUND + 1, FOUND + 2
 def of_contacts(tables, asked, u, v, out):
     """Add what is asked of all pairs, a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     for k in range(tables.number):
-        _of_pair(tables, pair_of(tables, k), asked, u, v, out)
+        _of_pair(pair_of(tables, k), asked, u, v, out)
 
 
 @primitive("skfem_ancf.equations.loops")
@@ -49,7 +49,7 @@ def run_contacts(tables, asked, u, v, out):
 
 
 @source
-def _of_pair(tables, pair, asked, u, v, out):
+def _of_pair(pair, asked, u, v, out):
     """Add what is asked, of the points that touch."""
     what, same = asked.what, asked.span == 0.0
     if what == ALONG:
@@ -57,36 +57,36 @@ def _of_pair(tables, pair, asked, u, v, out):
     resists = what == RESISTING or what == DAMPED_TANGENT
     if resists and pair.numbers[DAMPING] == 0.0:
         return
-    begin = projection(tables, pair, NOW if same else BEGIN, u)
-    end = begin if same else projection(tables, pair, END, v)
-    at = near_points(tables, pair, what, begin, end)
+    begin = projection(pair, NOW if same else BEGIN, u)
+    end = begin if same else projection(pair, END, v)
+    at = near_points(pair, what, begin, end)
     if at.size == 0:
         return
-    project(tables, pair, NOW if same else BEGIN, begin, u, at)
+    project(pair, NOW if same else BEGIN, begin, u, at)
     if not same:
-        project(tables, pair, END, end, v, at)
+        project(pair, END, end, v, at)
     if what < SETTLE:
-        at = touching(tables, pair, begin, end, at)
+        at = touching(pair, begin, end, at)
     if at.size == 0:
         return
     w = np.empty((ROWS, at.size))
-    states(tables, pair, begin, end, at, w)
+    states(pair, begin, end, at, w)
     if what == AUGMENT:
-        _augment(tables, pair, at, w, out)
+        _augment(pair, at, w, out)
         return
     if resists or what == ALONG:
         places(pair, v, 0.0, at, w[RATES:DEPTH])
         way(w)
     if resists:
-        resist(tables, pair, asked.factor, at, w)
+        resist(pair, asked.factor, at, w)
     else:
-        push(tables, pair, at, w)
+        push(pair, at, w)
         if what == FORCE:
             _keep_work(pair, w)
         if what == SETTLE:
-            _settle(tables, pair, same, at, w, out)
+            _settle(pair, same, at, w, out)
             return
-        rub(tables, pair, same, at, w)
+        rub(pair, same, at, w)
     if what == FORCE or what == RESISTING:
         _add_force(pair, at, w, out)
     else:
@@ -99,10 +99,10 @@ def _of_pair(tables, pair, asked, u, v, out):
 
 
 @source
-def states(tables, pair, begin, end, at, w):
+def states(pair, begin, end, at, w):
     """Fill the rows of points up to the derivative by the slope, by two projections."""
     a, b, multiplier = projected(pair, begin), projected(pair, end), pair.memory[MULTIPLIER]
-    part = 1.0 / hardening(tables, pair)
+    part = 1.0 / hardening(pair)
     for c in range(4):
         for i in lanes(at.size):
             w[RATES + c, i] = b[c, at[i]] - a[c, at[i]]
@@ -111,7 +111,7 @@ def states(tables, pair, begin, end, at, w):
         more = part * multiplier[at[i]]
         w[DEPTH, i], w[DEPTH + 1, i] = more - a[GAP, at[i]], more - b[GAP, at[i]]
         w[LAST, i], w[LAST + 1, i] = b[4, at[i]], b[5, at[i]]
-    if begin != end and tables.moving > 0:
+    if begin != end and pair.moving > 0:
         _carry(pair, a, at, w)
     if begin != end:
         for c in range(4):
@@ -119,7 +119,7 @@ def states(tables, pair, begin, end, at, w):
                 w[MIDDLE + c, i] += 0.5 * w[RATES + c, i]
     surface(pair, at, w[MIDDLE:RATES], w[PLACE:FOUND])
     levers(pair, at, w[MIDDLE:RATES], w[LEVER:PUSH])
-    distances(tables.own, pair, NOW, True, w[PLACE:FOUND], w[FOUND:LEVER])
+    distances(pair, NOW, True, w[PLACE:FOUND], w[FOUND:LEVER])
     way(w)
 
 
@@ -150,11 +150,11 @@ def way(w):
 
 
 @source
-def push(tables, pair, at, w):
+def push(pair, at, w):
     """The force of the pressure, and its derivative."""
     area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], pair.numbers[WIDTH]
-    part = hardening(tables, pair)
-    stiffness, holds = pair.numbers[STIFFNESS] * part, tables.memory[BILATERAL] / part
+    part = hardening(pair)
+    stiffness, holds = pair.numbers[STIFFNESS] * part, pair.common[BILATERAL] / part
     for i in lanes(at.size):
         a, b, scale, pulls = w[DEPTH, i], w[DEPTH + 1, i], stiffness * area[at[i]], holds * (
             multiplier[at[i]])
@@ -181,22 +181,22 @@ def _keep_work(pair, w):
 
 
 @source
-def _tangential(tables, pair):
+def _tangential(pair):
     """The coefficient of friction, zero where nothing sticks, and the stiffness per area."""
-    firmness = tables.memory[LARGEST + tables.number + pair.k]
-    return (pair.numbers[FRICTION] * tables.memory[ANCHORED],
+    firmness = pair.common[LARGEST + pair.number + pair.k]
+    return (pair.numbers[FRICTION] * pair.common[ANCHORED],
             pair.numbers[STICKING] * (1.0 + firmness))
 
 
 @source
-def rub(tables, pair, same, at, w):
+def rub(pair, same, at, w):
     """Add friction by Coulomb's law, and its derivative."""
-    friction, sticking = _tangential(tables, pair)
+    friction, sticking = _tangential(pair)
     if friction == 0.0:
         return
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     # what vibrates on the springs comes to rest: in a mean by itself
-    calms = 1.0 if same and tables.memory[RATE] > 0.0 else 0.0
+    calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
     for i in lanes(at.size):
         nx, ny = w[NX, i], w[NY, i]
         slip = slip_of(pose, nx, ny, w[LAST, i], w[LAST + 1, i], memory[ANCHOR_X, at[i]],
@@ -215,10 +215,10 @@ def rub(tables, pair, same, at, w):
 
 
 @source
-def resist(tables, pair, factor, at, w):
+def resist(pair, factor, at, w):
     """The force of damping in proportion to the pressure, and its derivative."""
     area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
-    stiffness, width = pair.numbers[STIFFNESS] * hardening(tables, pair), pair.numbers[WIDTH]
+    stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), pair.numbers[WIDTH]
     for i in lanes(at.size):
         k, a, nx, ny = stiffness * area[at[i]], w[DEPTH, i], w[NX, i], w[NY, i]
         loss = damping_loss(pose, damping, nx, ny, w[PLACE, i], w[PLACE + 1, i], w[WAY, i],
@@ -234,9 +234,9 @@ def resist(tables, pair, factor, at, w):
 
 
 @source
-def _settle(tables, pair, same, at, w, out):
+def _settle(pair, same, at, w, out):
     """Anchors follow points that slip, to where these just do not; ``out[0]`` grows by the work."""
-    friction, sticking = _tangential(tables, pair)
+    friction, sticking = _tangential(pair)
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     augmented, lost, where = pair.numbers[TOLERANCE] > 0.0, np.empty(at.size), 0 * at
     for i in lanes(at.size):
@@ -246,7 +246,7 @@ def _settle(tables, pair, same, at, w, out):
             w[WAY, i] * ny)
         if same:
             gone = slip - memory[SLIP, at[i]]
-        calms = 1.0 if same and tables.memory[RATE] > 0.0 else 0.0
+        calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
         T, _ = return_mapping(k * (slip + calms * gone), limit)
         after, _ = return_mapping(slip, limit / k)
         lost[i] = T * gone
@@ -260,13 +260,13 @@ def _settle(tables, pair, same, at, w, out):
 
 
 @source
-def _augment(tables, pair, at, w, out):
+def _augment(pair, at, w, out):
     """Multipliers grow by the penetration, and shrink by the gap, where these are too large."""
     tolerance, multiplier = pair.numbers[TOLERANCE], pair.memory[MULTIPLIER]
     if tolerance == 0.0:
         return
     where, far, square = 0 * at, np.empty(at.size), np.empty(at.size)
-    k = hardening(tables, pair)
+    k = hardening(pair)
     for i in lanes(at.size):
         before = multiplier[at[i]] / k
         change = np.maximum(w[DEPTH, i], 0.0) - before
@@ -275,7 +275,7 @@ def _augment(tables, pair, at, w, out):
         multiplier[at[i]] = after
         square[i] = after * after
     add_each(out, where, far)
-    largest = tables.memory[LARGEST + pair.k:LARGEST + pair.k + 1]
+    largest = pair.common[LARGEST + pair.k:LARGEST + pair.k + 1]
     largest[0] = 0.0
     add_each(largest, where, square)
     largest[0] = np.sqrt(largest[0])  # no less than it

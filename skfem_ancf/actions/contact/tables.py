@@ -121,10 +121,14 @@ class Pair(NamedTuple):
 
     ``first`` is the first degree of freedom of each point's element, (n,); ``weights`` and
     ``slopes`` those of pairs of degrees of freedom in its place and slope, (pairs, n); ``middles``
-    places and weights of the elements' middles.
+    places and weights of the elements' middles; behind its numbers are those of the shape.
+    ``common`` is the memory of all pairs.
     """
 
     k: Any
+    number: Any
+    moving: Any
+    own: Any
     header: Any
     first: Any
     weights: Any
@@ -132,10 +136,11 @@ class Pair(NamedTuple):
     points: Any
     middles: Any
     numbers: Any
-    shape: Any
     poses: Any
     memory: Any
     cache: Any
+    common: Any
+    counts: Any
 
 
 @source
@@ -149,21 +154,20 @@ def pair_of(tables, k):
     numbers = middles + (2 + 2 * pairs) * elements
     pose, slot = h[OBSTACLE] * POSES, h[SPAN] + POSE + elements + PROJECTED * n
     return Pair(
-        k, h, tables.ints[h[INTS]:h[INTS] + n],
+        k, tables.number, tables.moving, tables.own, h, tables.ints[h[INTS]:h[INTS] + n],
         shaped(floats[at:at + pairs * n], (pairs, n)),
         shaped(floats[at + pairs * n:points], (slopes, n)),
         shaped(floats[points:middles], (6, n)),
         shaped(floats[middles:numbers], (2 + 2 * pairs, elements)),
-        floats[numbers:numbers + NUMBERS],
-        floats[numbers + NUMBERS:numbers + NUMBERS + h[SHAPE]],
+        floats[numbers:numbers + NUMBERS + h[SHAPE]],
         shaped(tables.poses[pose:pose + POSES], (3, POSE)),
         shaped(tables.memory[h[MEMORY]:h[MEMORY] + 4 * n], (4, n)),
-        shaped(tables.cache[h[CACHE]:h[CACHE] + SLOTS * slot], (SLOTS, slot)))
+        shaped(tables.cache[h[CACHE]:h[CACHE] + SLOTS * slot], (SLOTS, slot)),
+        tables.memory, tables.counts)
 
 
 @source
-def hardening(tables, pair):
+def hardening(pair):
     """How many times the stiffness is as large as given, by what a load has found or in a step."""
-    numbers = pair.numbers
-    return (1.0 + tables.memory[LARGEST + tables.number + pair.k]
-            + numbers[INERTIA] * tables.memory[RATE] / numbers[STIFFNESS])
+    return (1.0 + pair.common[LARGEST + pair.number + pair.k]
+            + pair.numbers[INERTIA] * pair.common[RATE] / pair.numbers[STIFFNESS])
