@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..beam.strain_energy import add_viscous_force, body_tangent
-from ..actions.forces.texts import add_resisting_force
+from ..actions.forces.kernels import add_resisting_force
 from ..core.source import F2, lanes, source
 
 

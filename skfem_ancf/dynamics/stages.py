@@ -15,7 +15,7 @@ from ..core.band import (SPARE, Band, add_multiple, clear, copy, factorize,
 from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, body_gradients,
                                   body_mean_stress, body_mixed, body_stress, body_tangent,
                                   body_tangent_by, carry_by)
-from ..actions.forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
+from ..actions.forces.kernels import (add_elastic_force, add_element_damping, add_element_tangent,
                                     element_damping, element_stiffness, pace_contact, put_between,
                                     settle_contact)
 from ..core.source import F1, F2, F3, lanes, shaped, source

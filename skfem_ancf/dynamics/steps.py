@@ -22,7 +22,7 @@ from ..core.band import (Band, add_halves, add_multiple, clear, copy, dot, facto
 from ..beam.strain_energy import (add_force_of, add_turned, body_carry, body_force, body_mean,
                                   body_mixed, body_stress, body_tangent, quadratic)
 from ..actions.contact.tables import PRESSURES
-from ..actions.forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
+from ..actions.forces.kernels import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                                     augment_contact, element_stiffness, pace_contact, put_between,
                                     settle_contact)
 from ..core.callbacks import own_joints, own_solve

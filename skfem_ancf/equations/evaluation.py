@@ -4,7 +4,7 @@ import numpy as np
 
 from ..beam.strain_energy import (add_viscous_force, body_carry, body_force, body_mean, body_stress,
                                   body_tangent)
-from ..actions.forces.texts import AT_ONCE, add_elastic_force, add_element_tangent
+from ..actions.forces.kernels import AT_ONCE, add_elastic_force, add_element_tangent
 from ..core.source import source
 from ..actions.tables import add_load_stiffness
 

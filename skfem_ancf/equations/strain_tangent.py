@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 from .condensation import Condensed
 from ..core.errors import ConvergenceError, SupportError
-from ..actions.forces.texts import add_elastic_force
+from ..actions.forces.kernels import add_elastic_force
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ..actions.forces.system import Forces
-from ..actions.forces.texts import add_resisting_force
+from ..actions.forces.kernels import add_resisting_force
 from ..actions.joints.director import UnitDirector
 from ..beam.kinematics import folded
 from ..beam.points import Points

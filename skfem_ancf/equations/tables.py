@@ -10,7 +10,7 @@ import numpy as np
 from ..core.band import Band
 from ..beam.strain_energy import (BEGIN, KIND, FlatBody, body_of, copies_of, pushed_body_of,
                                   stress_size, viscous_body_of)
-from ..actions.forces.texts import ForceTables
+from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.law import LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import linearised
@@ -47,7 +47,7 @@ class Equations(NamedTuple):
     K
         The band for the tangent, work space.
     forces
-        :class:`~skfem_ancf.actions.forces.texts.ForceTables`.
+        :class:`~skfem_ancf.actions.forces.kernels.ForceTables`.
     viscous
         As ``body``, of what resists the rates of strains; the same where nothing does.
     copies

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
                          weighted)
 from ..beam.strain_energy import body_carry, body_force, body_tangent
-from ..actions.forces.texts import (add_elastic_force, add_element_tangent, contact_along,
+from ..actions.forces.kernels import (add_elastic_force, add_element_tangent, contact_along,
                                     contact_work)
 from ..core.callbacks import own_solve
 from ..core.source import F1, lanes, source

@@ -34,7 +34,7 @@ class Part(NamedTuple):
     Attributes
     ----------
     kind
-        Of :mod:`skfem_ancf.actions.forces.texts`.
+        Of :mod:`skfem_ancf.actions.forces.kernels`.
     d, e
         Its two vectors.
     numbers

@@ -15,7 +15,7 @@ from ...mesh.places import is_point
 from ...beam.rigid import RigidBody
 from .base import ForceElement, differences
 from .springs import end_of
-from .texts import turned, turning
+from .kernels import turned, turning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

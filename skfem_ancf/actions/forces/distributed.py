@@ -15,7 +15,7 @@ from ...beam.distribution import AXIS, Facets
 from ...beam.surfaces import groups_of, surfaces_of
 from ..places import Vector
 from .base import ForceElement, Part
-from .texts import DRAG, FOUNDATION
+from .kernels import DRAG, FOUNDATION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

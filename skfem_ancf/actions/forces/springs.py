@@ -13,7 +13,7 @@ from ...beam.rigid import RigidBody, on_body
 from .base import ForceElement, Part
 from ...beam.kernels.moments import mean_turning
 from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
-from .texts import SPRING, TINY, TORSION, turned, turning
+from .kernels import SPRING, TINY, TORSION, turned, turning
 
 if TYPE_CHECKING:
     from ...beam.layout import Layout

@@ -11,8 +11,8 @@ import numpy as np
 from .base import Part
 from ..contact.contacts import NO_CONTACTS, Contacts
 from .control import Control
-from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness, potential,
-                    run_kinds, turned, vectors_of)
+from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
+                      potential, run_kinds, turned, vectors_of)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -1,0 +1,438 @@
+"""Force elements: springs, foundations, drag as tables, and their forces and derivatives.
+
+An element has vectors that depend affinely on the coordinates: places of points, differences of
+them, directions of sections. Elements of the kinds below have two, ``d`` and ``e``, four numbers
+that are rows of arrays (4, n), elements of one kind side by side; behind them in one array are
+user-defined elements. Forces are those that resist, as internal forces do.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.band import clear, dot
+from ...beam.kernels.moments import mean_turning
+from ...core.callbacks import own_elements, own_poses
+from ...core.source import F1, I1, lanes, primitive, shaped, source
+from ..tables import add_products
+from ..contact.kernels import run_contacts
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
+                              ContactTables, Question)
+from ..contact.tables import RESISTING as RUBBING
+
+#: Kinds of elements.
+SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
+#: Numbers of an element. Spring: stiffness, length without force, damping. Torsion: stiffness,
+#: damping, cosine and sine of the angle without moment. Foundation: stiffness, damping, normal,
+#: and 1 if it only pushes. Drag: factors of squares of normal and tangential velocity.
+#: Then rows of the vectors, and of the derivatives by them. Numba compiles for each int.
+NUMBERS, VECTORS, BLOCK = map(np.int64, (5, 4, 16))
+TINY = 1e-200
+#: For the layout of a band where there is none.
+NONE = np.int64(0)
+#: The span of a mean between two states at one time.
+AT_ONCE = 1e-300
+
+
+class Kinds(NamedTuple):
+    """Of the elements of the kinds above: their number, where each begins, and their numbers."""
+
+    number: int
+    ends: I1
+    numbers: F1
+
+
+class ForceTables(NamedTuple):
+    """The force elements of a scene.
+
+    Attributes
+    ----------
+    start
+        The vectors in the stress-free state, all numbers of them.
+    at, of, weight
+        Which of them grows with which coordinate, and how.
+    number, ends
+        Of elements of the kinds above, and where the kinds begin and end among them.
+    numbers
+        Their numbers, those of one name side by side, shape (5 n,).
+    size
+        Of the derivative by the vectors: 16 n, and what user-defined elements have.
+    band_at, band_of, band_weight
+        Where in the tangent's band each derivative goes.
+    row_at, row_of
+        Where it goes between the rows of elements that couple what is far apart.
+    own
+        Handle of what has user-defined elements; 0 for none.
+    contacts
+        The obstacles, a :class:`~skfem_ancf.actions.contact.tables.ContactTables`.
+    address
+        That of the compiled :func:`of_kinds`; 0 in NumPy.
+    """
+
+    start: F1
+    at: I1
+    of: I1
+    weight: F1
+    number: int
+    ends: I1
+    numbers: F1
+    size: int
+    band_at: I1
+    band_of: I1
+    band_weight: F1
+    row_at: I1
+    row_of: I1
+    own: int
+    contacts: ContactTables
+    address: int = 0
+
+
+@source
+def vectors_of(tables, u, factor, out):
+    """factor times the vectors in the stress-free state, and what u adds to them."""
+    for k in lanes(out.size):
+        out[k] = factor * tables.start[k]
+    add_products(out, tables.at, tables.weight, u, tables.of)
+
+
+@source
+def _part(kinds, kind, rows, x):
+    """The rows of the elements of one kind, a view of a flat array."""
+    n = kinds.number
+    return shaped(x[:rows * n], (rows, n))[:, kinds.ends[kind]:kinds.ends[kind + 1]]
+
+
+@source
+def _of(kinds, kind, y, w, rows, out):
+    """Numbers, vectors, their ends or rates, and results of one kind."""
+    return (_part(kinds, kind, NUMBERS, kinds.numbers), _part(kinds, kind, VECTORS, y),
+            _part(kinds, kind, VECTORS, w), _part(kinds, kind, rows, out))
+
+
+#: What is asked of the kinds.
+ELASTIC, RESISTING, DERIVATIVES = range(3)
+
+
+@primitive("skfem_ancf.equations.loops")
+def run_kinds(tables, what, y, w, factor, out):
+    """As :func:`of_kinds`; compiled once, and not anew in each text that calls it."""
+    of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)
+
+
+@source
+def _evaluate(tables, what, t, factor, y, w, out):
+    """What is asked, of the kinds and of user-defined elements."""
+    run_kinds(tables, what, y, w, factor, out)
+    if tables.own > 0:
+        own_elements(tables.own, what, t, factor, y, w, out)
+
+
+@source
+def _add_force(tables, what, t, u, v, start, f):
+    """Add a force of the vectors at u, and of those at v or, without their start, their rates."""
+    size = tables.start.size
+    if size == 0:
+        return
+    y, w, F = np.empty(size), np.empty(size), np.zeros(size)
+    vectors_of(tables, u, 1.0, y)
+    vectors_of(tables, v, start, w)
+    _evaluate(tables, what, t, 0.0, y, w, F)
+    add_products(f, tables.of, tables.weight, F, tables.at)
+
+
+@source
+def add_elastic_force(tables, t, span, u0, u1, f):
+    """Add the force without velocity whose work from u0 to u1 is the change of the potential.
+
+    A mean over a span of time about t; the force at t where both states are one and the span zero.
+    """
+    _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
+    add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
+
+
+@source
+def add_resisting_force(tables, t, u, v, f):
+    """Add the part of the force that velocities cause."""
+    _add_force(tables, np.int64(RESISTING), t, u, v, 0.0, f)
+    add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
+
+
+@source
+def add_contact(contacts, asked, u, v, out):
+    """Add what is asked of obstacles, a
+    :class:`~skfem_ancf.actions.contact.tables.Question`."""
+    if contacts.number > 0:
+        if contacts.moving > 0:
+            own_poses(contacts.own, asked.t, asked.span, contacts.poses)
+        run_contacts(contacts, asked, u, v, out)
+
+
+@source
+def _at(what, t):
+    """A question at one time."""
+    return Question(what, t, 0.0, 0.0, NONE, NONE)
+
+
+@source
+def add_contact_tangent(tables, t, span, u0, u1, A):
+    """Add to a band the derivative of their mean force by its end: twice, unless both are one."""
+    add_contact(tables.contacts, Question(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
+
+
+@source
+def add_rubbing_tangent(tables, t, factor, u, v, A):
+    """Add to a band the derivative of friction and damping, that by velocities with a factor."""
+    add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
+                A.flat)
+
+
+@source
+def contact_work(tables, t, u, du, f):
+    """The product of the force at u and du; f is room, which is left at zero."""
+    add_contact(tables.contacts, _at(FORCE, t), u, u, f)
+    work = dot(f, du)
+    clear(f)
+    return work
+
+
+@source
+def contact_along(tables, t, u, du, out):
+    """Its derivative along du, and the largest way of an element, into out, shape (2,)."""
+    out[0], out[1] = 0.0, 0.0
+    add_contact(tables.contacts, _at(ALONG, t), u, du, out)
+
+
+@source
+def pace_contact(tables, dt):
+    """Tell obstacles the size of a step in time."""
+    tables.contacts.memory[RATE] = 1.0 / (dt * dt)
+
+
+@source
+def augment_contact(tables, t, u, out):
+    """Where points at u are too deep pressures reach on; their number is put into out, (1,)."""
+    out[0] = 0.0
+    add_contact(tables.contacts, _at(AUGMENT, t), u, u, out)
+
+
+@source
+def settle_contact(tables, t, span, u0, u1, out):
+    """Anchors follow at the end of a step; what it has taken is put into out, (1,)."""
+    out[0] = 0.0
+    add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
+
+
+@source
+def element_stiffness(tables, t, u, v, factor, D):
+    """The derivative by the vectors and, with a factor, by their velocities, shape (size,)."""
+    size = tables.start.size
+    y, w = np.empty(size), np.empty(size)
+    vectors_of(tables, u, 1.0, y)
+    vectors_of(tables, v, 0.0, w)
+    clear(D)
+    _evaluate(tables, np.int64(DERIVATIVES), t, factor, y, w, D)
+
+
+@source
+def add_element_tangent(tables, t, u, A):
+    """Add the derivative of :func:`add_elastic_force` to a band matrix, for near elements."""
+    if tables.start.size > 0:
+        D, v = np.empty(tables.size), np.zeros(u.size)
+        element_stiffness(tables, t, u, v, 0.0, D)
+        add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+    add_contact_tangent(tables, t, 0.0, u, u, A)
+
+
+@source
+def add_element_damping(tables, t, u, v, A):
+    """Add the derivative of :func:`add_resisting_force` by v to a band, for near elements."""
+    if tables.start.size > 0:
+        D = np.empty(tables.size)
+        element_damping(tables, t, u, v, D)
+        add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+
+
+@source
+def element_damping(tables, t, u, v, D):
+    """The derivative by the velocities of the vectors, shape (size,)."""
+    elastic = np.empty(tables.size)
+    element_stiffness(tables, t, u, v, 1.0, D)
+    element_stiffness(tables, t, u, v, 0.0, elastic)
+    for i in lanes(D.size):
+        D[i] -= elastic[i]
+
+
+@source
+def put_between(tables, D, factor, first, S):
+    """Put derivatives of far elements, times a factor, between their rows: from ``first`` on."""
+    k = S.shape[0] - first
+    between = np.zeros(k * k)
+    add_products(between, tables.row_at, np.ones(tables.row_at.size), D, tables.row_of)
+    for a in range(k):
+        for b in range(k):
+            S[first + a, first + b] = factor * between[a * k + b]
+
+
+# the kinds
+
+
+@source
+def of_kinds(kinds, what, y, w, factor, out):
+    """What is asked of all kinds, from their vectors y, and those at the end or their rates w."""
+    if what == ELASTIC:
+        elastic(kinds, y, w, out)
+    elif what == RESISTING:
+        resisting(kinds, y, w, out)
+    else:
+        derivatives(kinds, y, w, factor, out)
+
+
+@source
+def elastic(kinds, y0, y1, F):
+    """The forces of the kinds, means between two states; both may be the same."""
+    p, a, b, f = _of(kinds, SPRING, y0, y1, VECTORS, F)
+    for e in lanes(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
+        length = (np.sqrt(a[0, e] * a[0, e] + a[1, e] * a[1, e])
+                  + np.sqrt(b[0, e] * b[0, e] + b[1, e] * b[1, e]))
+        c = 0.5 * p[0, e] * (1.0 - 2.0 * p[1, e] / np.maximum(length, TINY))
+        f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
+    p, a, b, f = _of(kinds, TORSION, y0, y1, VECTORS, F)
+    mean_moments(p, a, b, f)
+    p, a, b, f = _of(kinds, FOUNDATION, y0, y1, VECTORS, F)
+    for e in lanes(p.shape[1]):
+        s0 = pressed(p[2, e], p[3, e], a[0, e], a[1, e])
+        s1 = pressed(p[2, e], p[3, e], b[0, e], b[1, e])
+        p0 = s0 * (1.0 - p[4, e] * (s0 < 0.0))
+        p1 = s1 * (1.0 - p[4, e] * (s1 < 0.0))
+        same = np.abs(s1 - s0) < TINY
+        share = (p1 - p0) / (s1 - s0 + same) * (1.0 - same) + same * (
+            1.0 - p[4, e] * (s0 + s1 < 0.0))
+        c = 0.5 * p[0, e] * (p0 + p1) * share
+        f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
+
+
+@source
+def mean_moments(p, a, b, f):
+    """The forces of torsional springs, means between two states."""
+    turn = np.empty((2, a.shape[1]))
+    turned(p, a, turn[0])
+    turned(p, b, turn[1])
+    mean_turning(a, b, f)
+    for i in lanes(4):
+        for e in lanes(p.shape[1]):
+            f[i, e] *= 0.5 * p[0, e] * (turn[0, e] + turn[1, e])
+
+
+@source
+def pressed(nx, ny, x, y):
+    """How far a point has moved along a normal."""
+    return nx * x + ny * y
+
+
+@source
+def turned(p, y, out):
+    """The angle from e to d, less that without a moment, in (-pi, pi]."""
+    for e in lanes(out.size):
+        cross = y[2, e] * y[1, e] - y[3, e] * y[0, e]
+        dot = y[0, e] * y[2, e] + y[1, e] * y[3, e]
+        out[e] = np.arctan2(p[2, e] * cross - p[3, e] * dot, p[2, e] * dot + p[3, e] * cross)
+
+
+@source
+def turning(y, g):
+    """The derivative of the angle from e to d by both."""
+    for e in lanes(g.shape[1]):
+        d, s = y[0, e] ** 2 + y[1, e] ** 2, y[2, e] ** 2 + y[3, e] ** 2
+        g[0, e], g[1, e] = -y[1, e] / d, y[0, e] / d
+        g[2, e], g[3, e] = y[3, e] / s, -y[2, e] / s
+
+
+@source
+def resisting(kinds, y, w, G):
+    """The forces of the kinds that resist velocities w."""
+    p, d, v, f = _of(kinds, SPRING, y, w, VECTORS, G)
+    for e in lanes(p.shape[1]):
+        square = d[0, e] * d[0, e] + d[1, e] * d[1, e]
+        c = p[2, e] * (d[0, e] * v[0, e] + d[1, e] * v[1, e]) / np.maximum(square, TINY)
+        f[0, e], f[1, e] = c * d[0, e], c * d[1, e]
+    p, d, v, f = _of(kinds, TORSION, y, w, VECTORS, G)
+    turning(d, f)
+    for e in lanes(p.shape[1]):
+        c = p[1, e] * (f[0, e] * v[0, e] + f[1, e] * v[1, e] + f[2, e] * v[2, e]
+                       + f[3, e] * v[3, e])
+        f[0, e], f[1, e], f[2, e], f[3, e] = c * f[0, e], c * f[1, e], c * f[2, e], c * f[3, e]
+    p, d, v, f = _of(kinds, FOUNDATION, y, w, VECTORS, G)
+    for e in lanes(p.shape[1]):
+        apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
+        c = p[1, e] * (1.0 - p[4, e] * apart) * pressed(p[2, e], p[3, e], v[0, e], v[1, e])
+        f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
+    p, d, v, f = _of(kinds, DRAG, y, w, VECTORS, G)
+    for e in lanes(p.shape[1]):
+        size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
+        x, z = d[2, e] / size, d[3, e] / size
+        along, across = v[0, e] * x + v[1, e] * z, v[1, e] * x - v[0, e] * z
+        q, r = p[1, e] * np.abs(along) * along, p[0, e] * np.abs(across) * across
+        f[0, e], f[1, e] = q * x - r * z, q * z + r * x
+
+
+@source
+def derivatives(kinds, y, w, factor, D):
+    """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j of zeros."""
+    p, d, v, s = _of(kinds, SPRING, y, w, BLOCK, D)
+    for e in lanes(p.shape[1]):
+        square = np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY)
+        k = p[0, e] * p[1, e] / np.sqrt(square)
+        c = (k + factor * p[2, e]) / square
+        s[0, e] = p[0, e] - k + c * d[0, e] * d[0, e]
+        s[5, e] = p[0, e] - k + c * d[1, e] * d[1, e]
+        s[1, e] = c * d[0, e] * d[1, e]
+        s[4, e] = c * d[0, e] * d[1, e]
+    p, d, v, s = _of(kinds, TORSION, y, w, BLOCK, D)
+    moment_derivatives(p, d, factor, s)
+    p, d, v, s = _of(kinds, FOUNDATION, y, w, BLOCK, D)
+    for e in lanes(p.shape[1]):
+        apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
+        c = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * apart)
+        s[0, e], s[5, e] = c * p[2, e] * p[2, e], c * p[3, e] * p[3, e]
+        s[1, e], s[4, e] = c * p[2, e] * p[3, e], c * p[2, e] * p[3, e]
+    p, d, v, s = _of(kinds, DRAG, y, w, BLOCK, D)
+    for e in lanes(p.shape[1]):
+        size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
+        x, z = d[2, e] / size, d[3, e] / size
+        q = 2.0 * factor * p[1, e] * np.abs(v[0, e] * x + v[1, e] * z)
+        r = 2.0 * factor * p[0, e] * np.abs(v[1, e] * x - v[0, e] * z)
+        s[0, e], s[5, e] = q * x * x + r * z * z, q * z * z + r * x * x
+        s[1, e], s[4, e] = (q - r) * x * z, (q - r) * x * z
+
+
+@source
+def moment_derivatives(p, d, factor, s):
+    """The derivatives of torsional springs."""
+    g, turn = np.empty(d.shape), np.empty(d.shape[1])
+    turning(d, g)
+    turned(p, d, turn)
+    for i in range(4):
+        for j in range(4):
+            for e in lanes(p.shape[1]):
+                s[4 * i + j, e] = (p[0, e] + factor * p[1, e]) * g[i, e] * g[j, e]
+    for k in range(2):  # the second derivative of the angle of d, and minus that of e
+        for e in lanes(p.shape[1]):
+            x, z = d[2 * k, e], d[2 * k + 1, e]
+            c = (1.0 - 2.0 * k) * p[0, e] * turn[e] / (x * x + z * z) ** 2
+            s[10 * k, e] += 2.0 * c * x * z
+            s[10 * k + 5, e] -= 2.0 * c * x * z
+            s[10 * k + 1, e] += c * (z * z - x * x)
+            s[10 * k + 4, e] += c * (z * z - x * x)
+
+
+def potential(tables: ForceTables, y: np.ndarray) -> float:
+    """The potential of the kinds at vectors y, shape (rows,)."""
+    p, d = _part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, VECTORS, y)
+    total = 0.5 * np.sum(p[0] * (np.hypot(d[0], d[1]) - p[1]) ** 2)
+    p, d = _part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, VECTORS, y)
+    angle = np.empty(p.shape[1])
+    turned(p, d, angle)
+    total += 0.5 * np.sum(p[0] * angle**2)
+    p, d = _part(tables, FOUNDATION, NUMBERS, tables.numbers), _part(tables, FOUNDATION, VECTORS, y)
+    s = pressed(p[2], p[3], d[0], d[1])
+    return float(total + 0.5 * np.sum(p[0] * s**2 * (1.0 - p[4] * (s < 0.0))))
