@@ -59,7 +59,9 @@ def functions(module):
             elif isinstance(value, cached_property):
                 value = value.func
             # other names of a private function are no methods of their own
-            if inspect.isfunction(value) and value.__name__.startswith("_") == (key == "__init__"):
+            if not inspect.isfunction(value) or value in MARKED:
+                continue
+            if value.__name__.startswith("_") == (key == "__init__"):
                 yield f"{name}.{key}", inspect.unwrap(value), thing
 
 
