@@ -8,7 +8,6 @@ the points of integration, E0 sampled and interpolated there as the formulation 
 
 from __future__ import annotations
 
-import inspect
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
@@ -21,7 +20,7 @@ from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
 from ..beam.strains import on_grid, strain_at, stretched
 from ..beam.kernels.kernel import stresses_of
 from ..core.linear import stress_of
-from .item import Item
+from .item import Item, takes_time
 from .loads import Load
 from ..beam.distribution import Spread
 
@@ -322,18 +321,6 @@ def _resultants(beam, eigen):
 
 
 # functions of time too
-
-
-def takes_time(function: Any) -> bool:
-    """True if a function takes three arguments, x, y and t."""
-    if not callable(function):
-        return False
-    try:
-        kinds = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
-        return False
-    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
-               for p in kinds) == 3
 
 
 def products(name: str, function: Callable[..., Any], beam: Beam

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -142,6 +143,18 @@ def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int)
     if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
         raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
                          f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
+
+
+def takes_time(function: Any) -> bool:
+    """True if a function takes three arguments, x, y and t."""
+    if not callable(function):
+        return False
+    try:
+        kinds = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+               for p in kinds) == 3
 
 
 def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:

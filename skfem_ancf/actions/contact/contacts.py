@@ -230,12 +230,9 @@ class Contacts:
         return state.memory if same else None
 
     def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
-        """Points stick from here on, without multipliers, or go on with what they remember.
+        """Points stick from here on, without multipliers, or go on with a memory (n,).
 
-        Returns
-        -------
-        ndarray or None
-            The memory that steps begin with, shape (n,).
+        Returns the memory that steps begin with, or None.
         """
         if not self.obstacles:
             return None
@@ -289,9 +286,8 @@ class Contacts:
     def require_penalty(self, scheme: Any, kick: float) -> None:
         """Raise InputError if the augmented Lagrangian would drive what it holds.
 
-        A force that stops a body at the end of a step acts on in those that follow, by the weights
-        that a scheme gives to accelerations: from the speed 1 it makes up to ``kick - 1``, with
-        ``(1 - alpha_m) / ((1 - alpha_f) beta)``; infinite of steps of points.
+        A force that stops a body at the end of a step acts on in those that follow: from the speed
+        1 it makes up to ``kick - 1`` with ``(1 - alpha_m) / ((1 - alpha_f) beta)``.
         """
         reason = BY_POINTS if kick == np.inf else (
             f"a body that is stopped in a step would leave up to {kick - 1.0:.2g} times as fast as "
@@ -316,13 +312,9 @@ class Contacts:
             self.put(t, 0.0, self.tables.poses)
 
     def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
-        """Where the points of all groups are.
+        """Of each group its number of obstacle and :class:`Group`, points and gaps.
 
-        Returns
-        -------
-        list
-            For each group its number of obstacle and :class:`Group`, the points (2, n) seen from
-            the origin, and their gaps, (n,).
+        Points (2, n) are seen from the origin; gaps have the shape (n,).
         """
         self._place(t)
         out = []
@@ -338,11 +330,8 @@ class Contacts:
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
         """What obstacles do to points; without velocities in statics.
 
-        Returns
-        -------
-        list
-            For each group its number of obstacle, points (2, n), forces on them (2, n), pressures
-            and gaps, (n,).
+        Of each group its number of obstacle, points (2, n), forces on them (2, n), pressures and
+        gaps, (n,).
         """
         self._place(t)
         out = []

@@ -29,17 +29,7 @@ _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class Part(NamedTuple):
-    """An element of a kind that texts know.
-
-    Attributes
-    ----------
-    kind
-        Of :mod:`skfem_ancf.actions.forces.kernels`.
-    d, e
-        Its two vectors.
-    numbers
-        Its five numbers.
-    """
+    """An element of a kind that kernels know: its kind, two vectors and five numbers."""
 
     kind: int
     d: Vector

@@ -26,29 +26,19 @@ KINDS = 4
 
 
 class Forces:
-    """The force elements of a scene.
-
-    Parameters
-    ----------
-    elements
-        Force elements, bound.
-    N, bandwidth
-        Coordinates of the scene, and subdiagonals of its band.
+    """The force elements of a scene, bound; its DOFs, and subdiagonals of its band.
 
     Attributes
     ----------
     elements, own
         All, and those that are no tables.
-    far
-        True if one couples coordinates that are not in the band.
-    symmetric
-        True if all have symmetric derivatives.
+    far, symmetric, resists
+        True if one couples DOFs that are not in the band; if all have symmetric derivatives; if
+        velocities may cause a force.
     masses
         Those that add to the mass.
     contacts
         The obstacles, a :class:`~skfem_ancf.actions.contact.contacts.Contacts`.
-    resists
-        True if velocities may cause a force.
     """
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:

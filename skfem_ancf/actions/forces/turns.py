@@ -15,19 +15,7 @@ class Turns:
     """The angles of a system by which moments have turned, and those of its rigid bodies.
 
     A displacement has them up to whole turns. They are followed from one to the next, between which
-    none changes by more than half a turn.
-
-    Parameters
-    ----------
-    system
-        The :class:`~skfem_ancf.equations.system.System`.
-
-    Attributes
-    ----------
-    moments
-        The number of moments: their angles come first, in the order of the loads.
-    number
-        Of all angles.
+    none changes by more than half a turn. Those of moments come first, in the order of the loads.
     """
 
     def __init__(self, system: Any) -> None:

@@ -23,15 +23,7 @@ ITERATIONS = 40
 
 
 class Axis:
-    """The axis of a beam: a polynomial of s in each element.
-
-    Parameters
-    ----------
-    beam
-        The :class:`~skfem_ancf.Beam`.
-    first
-        Number of its first coordinate in the scene.
-    """
+    """The axis of a beam: a polynomial of s in each element; ``first`` is the beam's first DOF."""
 
     def __init__(self, beam: Beam, first: int) -> None:
         self.beam, self.first, degree = beam, first, beam.element.axis_degree

@@ -14,15 +14,7 @@ if TYPE_CHECKING:
 
 
 class UnitDirector(Joint):
-    """(d . d - 1) / 2 = 0 for the director d of a rigid body. A system has one for each body.
-
-    Parameters
-    ----------
-    body
-        The body.
-    first
-        Number of its first coordinate.
-    """
+    """(d . d - 1) / 2 = 0 for the director d of a rigid body, whose first DOF is ``first``."""
 
     equations = ("length of the director",)
     constant = False

@@ -15,15 +15,7 @@ if TYPE_CHECKING:
 
 
 class Part(Joint):
-    """Those equations of a bound joint that do not repeat others.
-
-    Parameters
-    ----------
-    joint
-        The joint, bound.
-    kept
-        Numbers of the equations, increasing, shape (m,).
-    """
+    """Those equations of a bound joint, by increasing numbers, that do not repeat others."""
 
     def __init__(self, joint: Joint, kept: Array) -> None:
         self.joint, self.kept = joint, kept

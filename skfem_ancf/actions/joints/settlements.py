@@ -21,14 +21,9 @@ HELD = "x", "y", "angle"
 class Settlements:
     """What held nodes are displaced by: along x, along y, and in radians.
 
-    Parameters
-    ----------
-    numbers
-        Of each node, in proportion to the load of a static solution, shape (n, 3).
-    functions
-        Functions of time, in statics of the load factor, which take the place of numbers.
-    at
-        The node and the number in :data:`HELD` of each function.
+    ``numbers``, (n, 3), are in proportion to the load of a static solution; ``functions`` of time,
+    in statics of the load factor, take the place of those at the node and the number in
+    :data:`HELD` that ``at`` says.
     """
 
     def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),

@@ -36,18 +36,11 @@ def _mean(pair: Any) -> Array:
 
 
 class Family(NamedTuple):
-    """A vector, affine in the coordinates, at both parameters, and its quotient between them.
+    """A vector, affine in the DOFs, at both parameters, and its quotient between them.
 
-    Attributes
-    ----------
-    rows
-        Derivatives by the coordinates, at both parameters, shape (2, 2, n).
-    values
-        At parameter k and displacement j, shape (2, 2, 2), the last of components.
-    quotient
-        Derivative of the quotient, shape (2, n).
-    slopes
-        The quotient at both displacements, shape (2, 2).
+    ``rows`` are derivatives by the DOFs at both parameters, (2, 2, n), ``values`` those at
+    parameter k and displacement j, (2, 2, 2), ``quotient`` the derivative of the quotient, (2, n),
+    and ``slopes`` the quotient at both displacements, (2, 2).
     """
 
     rows: Array
@@ -65,15 +58,7 @@ class Family(NamedTuple):
 
 
 class Product:
-    """A product of two families between two displacements.
-
-    Parameters
-    ----------
-    times
-        The product of vectors (2,) or matrices (2, n): a function of two.
-    x, y
-        Families.
-    """
+    """A product of two families between two displacements, ``times`` being that of two vectors."""
 
     def __init__(self, times: Callable[[Array, Array], Array], x: Family, y: Family) -> None:
         self._times, self._x, self._y = times, x, y
@@ -107,20 +92,9 @@ class Product:
 class Span(NamedTuple):
     """The equations of a sleeve between two displacements.
 
-    Attributes
-    ----------
-    columns
-        Numbers of the coordinates, shape (n,).
-    change
-        ``u_1 - u_0`` of these, shape (n,).
-    way
-        ``s_1 - s_0`` in elements.
-    place
-        The Product G, which is zero at both ends.
-    equations
-        Those of the equations.
-    shares
-        ``f_s / G_s`` of each at both ends, shape (m, 2).
+    ``columns`` are numbers of DOFs, ``change`` is ``u_1 - u_0`` of these, (n,), ``way`` is
+    ``s_1 - s_0`` in elements, ``place`` the Product G, zero at both ends, ``equations`` those of
+    the equations, and ``shares`` ``f_s / G_s`` of each at both ends, (m, 2).
     """
 
     columns: Array

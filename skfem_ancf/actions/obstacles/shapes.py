@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from ...core.errors import (CallbackError, InputError, ask, require_finite, requ
                             warnings_as_errors)
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
+from ..item import takes_time
 from ...core.immutable import Immutable
 from .outlines import circle, clipped, contour
 
@@ -337,7 +337,7 @@ class SignedDistance(Shape):
             if function is not None:
                 require_function(name, function, "of x and y that returns derivatives")
         self.pivot = require_finite("pivot", pivot, (2,))
-        self._timed = {name: _takes_time(g) for name, g in (
+        self._timed = {name: takes_time(g) for name, g in (
             ("f", f), ("gradient", gradient), ("hessian", hessian))}
         self._by_steps, self._scale = False, 1.0
 
@@ -421,18 +421,6 @@ class SignedDistance(Shape):
 
     def __repr__(self) -> str:
         return f"<SignedDistance {getattr(self.f, '__name__', 'function')}>"
-
-
-def _takes_time(function):
-    """True if a function takes a third argument without a default."""
-    if function is None:
-        return False
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
-        return False
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return len([p for p in parameters if p.kind in kinds and p.default is p.empty]) > 2
 
 
 __all__ = ["Circle", "Line", "Polygon", "Shape", "SignedDistance"]
