@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .base import Scheme
     from .sensors import Sensor
 
-FORMAT = "skfem-ancf checkpoint 9"
+FORMAT = "skfem-ancf checkpoint 10"
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Points of the surface, about, at which distances of obstacles are.

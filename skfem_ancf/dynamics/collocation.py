@@ -10,7 +10,7 @@ import numpy as np
 from ..core.errors import InputError
 from .base import Motion, Scheme
 from .differences import derivative, difference_row, grown
-from .stages import Method
+from .stage_records import Method
 
 if TYPE_CHECKING:
     from ..core.types import Array

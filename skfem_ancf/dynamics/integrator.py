@@ -15,14 +15,15 @@ from ..core.errors import CheckpointError, InputError, SupportError, require_pos
 from ..core.linalg import halves
 from ..equations.condensation import Condensed, CondensedMass
 from .base import Motion, in_steps, interpolate, stored
+from .convergence import FAILURES, new_state
 from .course import SAMPLES, Course, Given
 from .dampers import Dampers, Rows, solve_rows
 from .energy_momentum import EnergyMomentum
 from .joined import Joined
 from .rates import JointMotion, JointMotions
-from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
-                    Matrices, Rule, factors, mass_factor, room_for_steps, steps)
-from .steps import Course as StepCourse
+from .records import Matrices, Rule, StepData, mass_factor, new_work
+from .steps import steps
+from .tangent import factors
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -97,7 +98,7 @@ class Integrator:
         self._rule = Rule._make([
             int(scheme.conserving), *map(float, scheme.parameters), self.tol,
             8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles])
-        self._state = np.zeros(STATE)
+        self._state = new_state()
         self.dt, self.substeps, self._lost = np.nan, 0, ""
         self.longest = max(1, min(STORED // (4 * system.N + memory), BLOCK))
 
@@ -106,41 +107,42 @@ class Integrator:
     @property
     def iterations(self) -> int:
         """Residuals solved for."""
-        return int(self._state[COUNT])
+        return int(self._state.iterations[0])
 
     @property
     def factorizations(self) -> int:
         """Tangents factorised."""
-        return int(self._state[FACTORIZED])
+        return int(self._state.factorizations[0])
 
     @property
     def energy(self) -> float:
         """The largest energy seen."""
-        return self._state[ENERGY]
+        return float(self._state.energy[0])
 
     @property
     def failure(self) -> str:
         """Why the last step has failed."""
-        return self._lost or FAILURES[int(self._state[FAILURE])]
+        return self._lost or FAILURES[int(self._state.failure[0])]
 
     @property
     def ready(self) -> bool:
         """True if there are factors of an iteration matrix."""
-        return self._state[READY] != 0.0
+        return bool(self._state.factors[0] != 0)
 
     def count(self, other: Integrator) -> None:
         """Add the counts of another, which begins from zero."""
-        self._state[[COUNT, FACTORIZED]] += other._state[[COUNT, FACTORIZED]]
+        self._state.iterations[:] += other._state.iterations
+        self._state.factorizations[:] += other._state.factorizations
         self.substeps += other.substeps
         other.reset()
 
     def reset(self) -> None:
         """Count from zero."""
-        self._state[[COUNT, FACTORIZED]], self.substeps = 0.0, 0
+        self._state.iterations[0] = self._state.factorizations[0] = self.substeps = 0
 
     def expect(self, energy: float) -> None:
         """The iteration's tolerance is relative to the largest energy of the motion."""
-        self._state[ENERGY] = max(self._state[ENERGY], energy)
+        self._state.energy[0] = max(self.energy, energy)
 
     # the start
 
@@ -220,7 +222,7 @@ class Integrator:
     def _work(self):
         """Work arrays."""
         s = self.system
-        return room_for_steps(s.N, self.m, s.machine.tables.stresses.size,
+        return new_work(s.N, self.m, s.machine.tables.stresses.size,
                               0 if self._nodes else self.m)
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
@@ -239,7 +241,7 @@ class Integrator:
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        done = self._call(steps, y, dt, rows, self._rule, _step_course(given, dt, s), self._state,
+        done = self._call(steps, y, dt, rows, self._rule, _step_data(given, dt, s), self._state,
                           work, memories, rows, multipliers, works)
         return [replace(y, t=begun + dt * (first + k + 1), u=rows[k, 0], v=rows[k, 1],
                         acceleration=rows[k, 2], algorithmic=rows[k, 3],
@@ -250,15 +252,16 @@ class Integrator:
 
     def _call(self, function: Callable, y: Motion, dt: float, rows: Array, *args: Any) -> int:
         """Take steps by a function of equations, matrices and others; how many were done."""
-        s, before = self.system, self._state.copy()
+        s, state, before = self.system, self._state, np.array(self._state)
         if dt != self.dt:
-            self.dt, self._state[READY] = dt, 0.0
-        self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
+            self.dt, state.factors[0] = dt, 0
+        state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
         try:
             with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
                 done = self._machine.of(function)(self._matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may go on from y
-            self._state[:], self._state[READY] = before, 0.0
+            self._load_state(before)
+            self.forget()
             raise
         done, self._lost = s.constraints.first_lost(rows[:done, 0])
         if done and s.forces.contacts.sweeps:
@@ -267,7 +270,7 @@ class Integrator:
             if passed:
                 self._lost = f"no step that touches {passed}, it jumps over it"
         if done < len(rows):
-            self._state[READY] = 0.0
+            self.forget()
         return done
 
     @property
@@ -352,13 +355,18 @@ class Integrator:
 
     def forget(self) -> None:
         """Make new factors in the next step."""
-        self._state[READY] = 0.0
+        self._state.factors[0] = 0
+
+    def _load_state(self, values):
+        """Take values (fields, 1) of the State."""
+        for array, value in zip(self._state, values):
+            array[:] = value
 
     # checkpoints
 
     def arrays(self) -> dict[str, Any]:
         """Arrays by name from which :meth:`load` goes on as if there had been no break."""
-        found = {"state": self._state, "dt": self.dt, "substeps": self.substeps}
+        found = {**self._state._asdict(), "dt": self.dt, "substeps": self.substeps}
         if self._nodes:
             (at, multipliers), mass = self._nodes[0].at, self._nodes[1].at
             found |= {"at": at, "multipliers at": multipliers}
@@ -369,9 +377,10 @@ class Integrator:
 
     def load(self, arrays: dict[str, Any]) -> None:
         """Go on with what :meth:`arrays` gave."""
-        for name in ("state", "dt", "substeps"):
+        for name in (*self._state._fields, "dt", "substeps"):
             stored(arrays, name, self.arrays()[name])
-        self._state[:], self.dt = arrays["state"], float(arrays["dt"])
+        self._load_state([arrays[name] for name in self._state._fields])
+        self.dt = float(arrays["dt"])
         self.substeps = int(arrays["substeps"])
         if self.ready:
             for name, array in self._factors().items():
@@ -394,12 +403,12 @@ class Integrator:
                 "carried": work.stresses[3], "rates": work.stresses[5], **beside}
 
 
-def _step_course(given: Given, dt: float, system: System) -> StepCourse:
+def _step_data(given: Given, dt: float, system: System) -> StepData:
     """Functions of time as steps take them: where the equation of motion holds, and at the end."""
     g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
     joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
                           int(system.machine.tables.motion_varies))
-    return StepCourse(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
+    return StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
                       given.supports[:, -1].copy(), joints)
 
 

@@ -15,7 +15,9 @@ from .collocation import Collocation
 from .course import Course
 from .integrator import Integrator
 from .rates import JointMotions
-from .stages import Interval, collocate, room_for_points, solve_for
+from .stage_records import Interval, new_points
+from .stage_tangent import solve_for
+from .stages import collocate
 
 if TYPE_CHECKING:
     from ..core.types import Array
@@ -45,7 +47,7 @@ class StageIntegrator(Integrator):
     def _work(self):
         s, tables = self.system, self.system.machine.tables
         M = s.mass.band
-        return room_for_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
+        return new_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
                                tables.stresses.size, gradients_size(tables.plain.body),
                                M._replace(flat=np.zeros(M.flat.size)))
 

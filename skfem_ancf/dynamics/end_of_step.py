@@ -1,0 +1,142 @@
+"""The end of a step: velocities, accelerations and multipliers."""
+
+from ..core.band import copy, dot, solve_joined, subtract_rows
+from ..actions.forces.kernels import settle_contact
+from ..core.callbacks import own_solve
+from ..core.source import lanes, source
+from ..actions.tables import add_constraint_rate
+from .convergence import DEPENDENT, EXACTLY, FAILED, GO_ON
+from .dampers import damping_force
+from .rates import acceleration_of_joints, drive_rate
+from .residual import free_velocity, kinetic_energy
+
+
+@source
+def end_velocity(joints, free, mass, rule, s, w, state, exact):
+    """v_1 of the iterate, with the joints' impulses; FAILED if these are not determined.
+
+    ``v_1 = v - M^-1 J^T impulse`` with ``d Phi / dt = 0`` at the end of the step; up to what an
+    iteration leaves, where that is not the last, unless ``exact``.
+    """
+    free_velocity(free, rule, s, w)
+    if w.m.impulse.size > 0:
+        drive_rate(joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
+        if rule.mass_solver > 0:
+            return _eliminated(joints, rule, s, w, w.x.middle, w.m.impulse, w.x.v, state, exact)
+        if not solve_joined(mass, w.J[0], w.J[1], free, not s.kept, w.J[3], w.S, w.m.impulse,
+                            w.x.v):
+            state.failure[0] = DEPENDENT
+            return FAILED
+    return GO_ON
+
+
+@source
+def _eliminated(joints, rule, s, w, at, b, x, state, exact):
+    """Change x by ``-M^-1 J^T b`` so that ``J1 x`` becomes what -b was.
+
+    The change is left in ``w.x.damping_velocity``.
+
+    Of joints that are eliminated. J is that at the displacement ``at``, J1 that at the end of the
+    step. FAILED if they depend on each other.
+    """
+    change, rate = w.x.damping_velocity, w.m.phi
+    add_constraint_rate(joints, s.joints.g[0], s.t, w.x.u, x, b)
+    for k in lanes(b.size):
+        rate[k] = -b[k]
+    copy(at, change)
+    known = w.m.l if exact > 0 else w.m.l[:0]  # none: roughly
+    if not own_solve(rule.mass_solver, s.t, w.x.u, known, x, rate, change, b):
+        state.failure[0] = DEPENDENT
+        return FAILED
+    for i in lanes(x.size):
+        x[i] += change[i]
+    return GO_ON
+
+
+@source
+def accelerations(free, rule, s, w, state):
+    """w_1 (in place of the correction) and a_1, and the multipliers at the end of the step."""
+    u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
+    a1, w1, w0, given = w.x.acceleration, w.x.du, w.y[3], s.supports[2]
+    l, impulse, l0, last = w.m.l, w.m.impulse, w.m.l0, w.m.last
+    if rule.conserving > 0:
+        # what acts in the middle of a step, extrapolated to its end from the last two
+        ahead = s.dt / (s.dt + state.last_dt[0])
+        for i in lanes(u.size):
+            w1[i] = (v[i] - v0[i]) / s.dt
+            a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * free[i] + given[i]
+        for k in lanes(l.size):
+            l[k] += impulse[k] / s.dt
+            l0[k] = l[k] + ahead * (l[k] - last[k])
+            last[k] = l[k]
+    else:
+        c = 1.0 / (rule.beta * s.dt * s.dt)
+        for i in lanes(u.size):
+            w1[i] = c * (u[i] - base[i])
+            a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + given[i]
+
+
+@source
+def close_acceleration(joints, free, mass, rule, s, w, state):
+    """Change accelerations and multipliers so that they meet the joints' second rate too."""
+    a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
+    l0, last, anew = w.m.l0, w.m.last, rule.conserving > 0  # J are those of the velocity, else
+    acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
+    share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
+    if rule.mass_solver > 0:
+        if _eliminated(joints, rule, s, w, w.x.u, dl, a1, state, EXACTLY) == FAILED:
+            return FAILED
+        for i in lanes(w1.size):
+            w1[i] += share * w.x.damping_velocity[i]
+    else:
+        if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[3], w.S, dl, a1):
+            state.failure[0] = DEPENDENT
+            return FAILED
+        for k in lanes(l.size):
+            shared[k] = share * dl[k]
+        subtract_rows(w.J[3], shared, w1)
+    for k in lanes(l.size):
+        l0[k] = l[k] + dl[k]
+        last[k] = l0[k]
+    return GO_ON
+
+
+@source
+def add_work(e, matrices, rule, s, w, state):
+    """Add what damping takes in the middle of the step, at its mean velocity.
+
+    In the conserving scheme that is the work of its force. In others velocities at the ends of
+    steps may be those of vibrations that the steps do not resolve: the mean force of both ends may
+    have a negative work.
+    """
+    u, u0, d, middle = w.x.u, w.y[0], w.x.damping, w.x.middle
+    damping_velocity = w.x.damping_velocity
+    for i in lanes(u.size):
+        damping_velocity[i] = (u[i] - u0[i]) / s.dt
+        middle[i] = 0.5 * (u[i] + u0[i])
+    t = s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt
+    damping_force(e, matrices.dampers, matrices.M, t, middle, damping_velocity, d, w.x.scratch)
+    state.dissipated[0] += s.dt * dot(d, damping_velocity)
+
+
+@source
+def settle(forces, rule, s, w, taken):
+    """Anchors follow at the end of the step; what that has taken."""
+    if rule.conserving > 0:
+        settle_contact(forces, s.acting, s.dt, w.y[0], w.x.u, taken)
+    else:
+        settle_contact(forces, s.acting, 0.0, w.x.u, w.x.u, taken)
+
+
+@source
+def finish(free, M, s, w, state):
+    """The end of the step becomes the begin of the next."""
+    u, v, a1, w1, given = w.x.u, w.x.v, w.x.acceleration, w.x.du, s.supports[2]
+    u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
+    copy(u, u0)
+    copy(v, v0)
+    copy(a1, a0)
+    for i in lanes(u.size):
+        w0[i] = w1[i] * free[i] + given[i]
+    state.last_dt[0], state.mixed_steps[0] = s.dt, max(0, state.mixed_steps[0] - 1)
+    state.energy[0] = max(state.energy[0], kinetic_energy(M, v, w.x.scratch))
