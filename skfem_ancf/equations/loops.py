@@ -6,8 +6,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..actions.forces.contact_texts import ContactTables, Question, of_contacts
-from ..actions.forces.texts import Kinds, of_kinds
+from ..actions.contact.kernels import of_contacts
+from ..actions.contact.tables import ContactTables, Question
+from ..actions.forces.kernels import Kinds, of_kinds
 from ..beam.kernels.law import point_of
 from ..beam.kernels.strain import evaluate
 from ..beam.kernels.tables import StrainTables

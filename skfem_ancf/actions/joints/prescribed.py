@@ -98,9 +98,6 @@ class PrescribedAngle(Joint):
         _, self.d = section(layout, self.beam, self.at)
         self.start = np.arctan2(*self.d.start[::-1])
         self._angles = partial(sample, self.angle, name="angle", shape=())
-        n = self.d.dofs.shape[1]
-        of = self._of_normal = np.zeros((2, 1 + 2 * n))  # offset and slope, see driven
-        of[:, 0], (of[0, 1:1 + n], of[1, 1 + n:]) = self.d.start, self.d.weights
 
     def _angle(self, t: float) -> float:
         return ask_number("angle(t={:g})", self.angle, t)
@@ -113,17 +110,16 @@ class PrescribedAngle(Joint):
         a = self.start + self._angle(t)
         return gradients([(self.d, (-np.sin(a), np.cos(a)))])
 
-    def driven(self, times: Array, N: int) -> Array:
+    def _normals(self, times: Array) -> Array:
         a = self.start + self._angles(times)
-        normals = np.empty((len(a), 2))
-        normals[:, 0], normals[:, 1] = -np.sin(a), np.cos(a)
-        return normals @ self._of_normal
+        return np.column_stack([-np.sin(a), np.cos(a)])
 
     def offset(self, times: Array, N: int) -> Array:
-        return self.driven(times, N)[:, :1]
+        return self._normals(times) @ self.d.start[:, None]
 
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
-        return self.d.dofs.ravel(), self.driven(times, N)[:, None, 1:]
+        values = self._normals(times)[:, :, None] * self.d.weights
+        return self.d.dofs.ravel(), values.reshape(len(times), 1, -1)
 
 
 class Turned:
