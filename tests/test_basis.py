@@ -7,12 +7,23 @@ import pytest
 from conftest import MESHES
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_matrix
-from skfem import (Basis, BilinearForm, ElementVector, FacetBasis, Functional, LinearForm, condense,
-                   enforce, mpc, penalize, solve)
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementVector,
+    FacetBasis,
+    Functional,
+    LinearForm,
+    condense,
+    enforce,
+    mpc,
+    penalize,
+    solve,
+)
 from skfem.helpers import ddot, div, dot, eye, sym_grad, trace
 from skfem.models.poisson import laplace
 
-from skfem_ancf import ElementBeamANCF, MeshBeam, MeshError
+from skfem_ancf import ElementBeamANCF
 
 
 @pytest.fixture
@@ -178,25 +189,3 @@ def test_traction_is_exact(name, order):
     strain = sigma / E * (np.outer(e1, e1) - nu * np.outer(e2, e2))
     symmetric = (g + np.swapaxes(g, 0, 1)) / 2
     assert_allclose(symmetric, strain[:, :, None, None] + 0 * g, atol=1e-13)
-
-
-# the scalar element along the axis
-
-
-def test_scikit_fem_draws_a_beam_or_says_what_does():
-    """Pictures by stock scikit-fem: of the mesh, and of a field on quads of the body."""
-    pyplot = pytest.importorskip("matplotlib.pyplot")
-    from skfem.visuals.matplotlib import draw, plot
-
-    mesh = MeshBeam.init_line(np.linspace(0, 1, 4), height=0.1)
-    basis = Basis(mesh, ElementBeamANCF(2))
-    y = basis.project(lambda x: x[0] + 2 * x[1])
-    assert len(draw(mesh).lines) == 1
-    for refused in (lambda: basis.refinterp(y, 2), lambda: plot(basis, y)):
-        with pytest.raises(MeshError, match="to_meshquad"):
-            refused()
-    quad = mesh.to_meshquad()
-    z = basis.probes(quad.p) @ y
-    assert np.allclose(z, quad.p[0] + 2 * quad.p[1], rtol=0, atol=1e-12)
-    assert plot(quad, z).collections
-    pyplot.close("all")

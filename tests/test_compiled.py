@@ -1,6 +1,5 @@
 """The texts compiled by Numba do what they do as plain NumPy, step by step, to round-off."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,6 +1,5 @@
 """Controllers: against SciPy on the rigid arm, free bodies, and the work that they do."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

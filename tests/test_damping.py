@@ -1,6 +1,5 @@
 """Damping: what it takes, where it leads, and that nothing is lost besides."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

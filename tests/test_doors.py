@@ -1,6 +1,5 @@
 """Doors: states of other meshes, objects that do not change, laws and loads of one's own."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,6 +1,5 @@
 """Temperature and stress-free strains: Timoshenko's strip, exact curls, buckling, free motion."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -13,8 +13,6 @@ from skfem_ancf.dynamics import checkpoint
 from skfem_ancf.io import PvdWriter
 from skfem_ancf.sweeps.members import Sweep
 
-posix = pytest.mark.skipif(os.name != "posix", reason="modes and links of files are those of POSIX")
-
 
 def scene():
     mesh = MeshBeam.init_line(np.linspace(0, 1, 3), 0.05)
@@ -51,23 +49,6 @@ def writer(request, tmp_path):
         pytest.importorskip("matplotlib")
     path = tmp_path / request.param
     return lambda: WRITERS[request.param](path), path
-
-
-@posix
-def test_links_beside_a_file_are_not_followed(writer, tmp_path):
-    """Under all names that could be known beforehand."""
-    write, path = writer
-    victim = tmp_path / "victim"
-    victim.write_text("mine")
-    names = {f"{path.name}.part", f"{path.name}.tmp", f".{path.stem}.{os.getpid()}{path.suffix}",
-             f".{path.stem}.{os.getpid()}.spare"}
-    for name in names:
-        (tmp_path / name).symlink_to(victim)
-    write()
-    assert victim.read_text() == "mine" and not victim.is_symlink()
-    assert path.stat().st_size > 0 and not path.is_symlink()
-    left = {p.name for p in tmp_path.iterdir()} - names - {"victim", path.name, "series_00000.vtu"}
-    assert not left
 
 
 def test_what_was_there_stays_where_writing_fails(writer, monkeypatch, tmp_path):

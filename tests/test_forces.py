@@ -1,6 +1,5 @@
 """Force elements against closed forms: springs, dashpots, foundations, drag, masses, your own."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

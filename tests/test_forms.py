@@ -10,8 +10,18 @@ from numpy.testing import assert_allclose
 from skfem import Basis, BilinearForm, LinearForm, asm
 from skfem.helpers import ddot, dot
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, ElementBeamPatelShabana, MeshBeam,
-                        NeoHookean, Scene, StVenantKirchhoff, forms, reference_coordinates)
+from skfem_ancf import (
+    Beam,
+    ElementBeamANCF,
+    ElementBeamCable,
+    ElementBeamPatelShabana,
+    MeshBeam,
+    NeoHookean,
+    Scene,
+    StVenantKirchhoff,
+    forms,
+    reference_coordinates,
+)
 from skfem_ancf.actions.loads import EndMoment, Pressure
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
@@ -292,29 +302,6 @@ def test_pressure_on_a_closed_surface(body, element):
     assert np.abs(beam.rigid_motions()[:, :2].T @ f).max() < 1e-14
     q, g = (beam.q0 + u).reshape(-1, 2), f.reshape(-1, 2)
     assert abs(np.sum(q[:, 0] * g[:, 1] - q[:, 1] * g[:, 0])) < 1e-13
-
-
-@pytest.mark.parametrize("end", ["left", "right"])
-@pytest.mark.parametrize("element", SHAPES)
-@pytest.mark.parametrize("body", BODIES)
-def test_end_moment(body, element, end):
-    beam, M = make(body, element), 1.3
-    load = EndMoment(end, M).bind(beam)
-    u = moved(beam, deformed(beam), 2.4, np.array([1.0, -2.0]))
-    f, h = load.force(u), 1e-6
-    gradient = np.array([(load.potential(u + h * e) - load.potential(u - h * e)) / (2 * h)
-                         for e in np.eye(beam.N)])
-    scale = np.abs(f).max()
-    assert np.abs(f + gradient).max() < 1e-8 * scale
-    # a pure couple: no resultant, and moment M whatever the state
-    assert np.abs(beam.rigid_motions()[:, :2].T @ f).max() == 0.0
-    q, g = (beam.q0 + u).reshape(-1, 2), f.reshape(-1, 2)
-    assert abs(np.sum(q[:, 0] * g[:, 1] - q[:, 1] * g[:, 0]) - M) < 1e-13 * max(1, scale)
-    K = np.zeros((beam.N, beam.N))
-    np.add.at(K, load.stiffness(u)[:2], load.stiffness(u)[2])
-    dK = np.imag([load.force(u + 1j * STEP * e) for e in np.eye(beam.N)]).T / STEP
-    assert np.abs(K - dK).max() < 1e-13 * np.abs(K).max()
-    assert np.abs(K - K.T).max() < 1e-15 * np.abs(K).max()
 
 
 def test_end_moment_counts_whole_turns():

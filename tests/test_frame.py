@@ -1,6 +1,5 @@
 """Frames whose lines are condensed to their nodes, against welded beams and closed forms."""
 
-
 import meshio
 import numpy as np
 import pytest

@@ -1,6 +1,5 @@
 """The laws against their energy, Hooke, the three-dimensional body, and each other."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,6 +1,5 @@
 """Meshes: construction, topology, names, refinement, parts, motion, files and bad input."""
 
-
 import numpy as np
 import pytest
 from conftest import MESHES, quarter_arc, s_curve

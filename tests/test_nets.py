@@ -1,6 +1,5 @@
 """What frames are made of: lines and names of mesh files, and points that nearly meet."""
 
-
 import meshio
 import numpy as np
 import pytest

@@ -1,6 +1,5 @@
 """Contact of beams with obstacles."""
 
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp

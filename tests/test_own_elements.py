@@ -1,6 +1,5 @@
 """A family of elements from outside: one class, and the default formulation fits it."""
 
-
 import exact
 import numpy as np
 import pytest

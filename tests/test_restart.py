@@ -62,18 +62,6 @@ def test_two_halves_are_the_whole(scheme, build, compiled):
     assert np.abs(whole.u[-1] - half.u[-1]).max() > 0.01
 
 
-def test_the_start_has_the_last_word_about_the_velocity():
-    scene = swinging()
-    half = scene.integrate(0.1, 2.5e-3)
-    assert np.array_equal(scene.integrate(0.2, 2.5e-3, start=half.state(-1)).v[0], half.v[-1])
-    # a static state has none: that of the scene is taken
-    still = Scene(scene.beams[0]).clamp("left").gravity((0, -0.2)).solve_static()
-    assert not np.any(still.v) and not np.any(still.acceleration) and still.t is None
-    begun = scene.integrate(0.01, 2.5e-3, start=still)
-    assert begun.t[0] == 0.0
-    assert_allclose(begun.velocity((1, 0))[0], [0.0, 2.0], rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_what_a_sensor_ends_goes_on_in_its_steps(error):
     """The step whose end it did not read is not stored."""

@@ -6,13 +6,34 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
-from skfem import (Basis, BilinearForm, ElementQuad2, ElementVector, FacetBasis, LinearForm,
-                   MeshQuad, asm, condense, solve)
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementQuad2,
+    ElementVector,
+    FacetBasis,
+    LinearForm,
+    MeshQuad,
+    asm,
+    condense,
+    solve,
+)
 from skfem.helpers import sym_grad
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, ModelWarning, NameUnknown, NeoHookean, Scene, Section,
-                        StVenantKirchhoff)
+from skfem_ancf import (
+    Beam,
+    ElementBeamANCF,
+    ElementBeamANCFCubic,
+    ElementBeamCable,
+    InputError,
+    MeshBeam,
+    ModelWarning,
+    NameUnknown,
+    NeoHookean,
+    Scene,
+    Section,
+    StVenantKirchhoff,
+)
 from skfem_ancf.beam.interpolation import locate
 from skfem_ancf.core.errors import CallError
 from skfem_ancf.core.quadrature import gauss
@@ -185,34 +206,6 @@ def test_extension_and_bending_of_a_T_are_coupled():
 
 SANDWICH = Section.layers((0.01, STEEL), (0.08, FOAM), (0.01, STEEL), width=0.02)
 BIMETAL = Section.layers((0.04, STEEL), (0.06, BRASS), width=0.02)
-
-
-def composite(section, h=H):
-    """EA, ES, EI about the axis, layer by layer."""
-    y, out = -0.5 * h, np.zeros(3)
-    for thickness, law, b in section.parts:
-        z = y + thickness
-        out += law.E * b * np.array([z - y, (z**2 - y**2) / 2, (z**3 - y**3) / 3])
-        y = z
-    return out
-
-
-@every
-@pytest.mark.parametrize("section", [SANDWICH, BIMETAL], ids=["sandwich", "bimetal"])
-def test_slender_layers_are_composite_beams(element, section):
-    laws = [(t, law.replace(nu=0.0), b) for t, law, b in section.parts]
-    section = Section.layers(*laws)
-    EA, ES, EI = composite(section)
-    for ratio in (1e2, 1e4):
-        L = H * ratio
-        mesh = line(32, L=L)
-        M = 1e-3 * EI / L
-        state = cantilever(Beam(mesh, element, section=section), moment=M)
-        kappa = M / (EI - ES**2 / EA)
-        assert_allclose(state.displacement((L, 0.0))[1], kappa * L**2 / 2,
-                        rtol=2e-5 + 0.05 / ratio)
-        assert_allclose(state.displacement((L, 0.0))[0], ES / EA * kappa * L,
-                        atol=1e-3 * H * 1e-3 + (kappa * L) ** 2 * L)
 
 
 @pytest.mark.parametrize("element, n, error", [

@@ -1,6 +1,5 @@
 """Sensors: what they read is what the states of every step say."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

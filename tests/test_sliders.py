@@ -1,6 +1,5 @@
 """Sliders on beams and bodies; welds and hinges at points between the ends of beams."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

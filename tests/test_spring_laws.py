@@ -1,6 +1,5 @@
 """Springs and dashpots by functions of the caller's: against linear ones, SciPy and energy."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

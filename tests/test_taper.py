@@ -1,6 +1,5 @@
 """Heights and widths that vary: against integrals of beam theory and the wedge of elasticity."""
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -36,8 +36,8 @@ EVERY = "**/*"
 NOT_CHANGED = ("core/jit.py", "core/loops.py", "equations/loops.py", "beam/kernels/loops.py",
                "io/", "visuals/", "core/progress.py")
 # what starts processes of its own, needs Numba, draws, or repeats the others at random
-LEFT_OUT = ["test_bench.py", "test_compiled.py", "test_demos.py", "test_fuzz.py",
-            "test_visuals.py"]
+LEFT_OUT = ["test_bench.py", "test_compiled.py", "test_demos.py", "test_docstrings.py",
+            "test_fuzz.py", "test_package.py", "test_readme.py", "test_visuals.py"]
 KILLED, SURVIVED, TIME, BROKEN = "killed", "survived", "killed (time)", "broken"
 EXPLAINED = "explained"
 
