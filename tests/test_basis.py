@@ -7,19 +7,8 @@ import pytest
 from conftest import MESHES
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_matrix
-from skfem import (
-    Basis,
-    BilinearForm,
-    ElementVector,
-    FacetBasis,
-    Functional,
-    LinearForm,
-    condense,
-    enforce,
-    mpc,
-    penalize,
-    solve,
-)
+from skfem import (Basis, BilinearForm, ElementVector, FacetBasis, Functional, LinearForm, condense,
+                   enforce, mpc, penalize, solve)
 from skfem.helpers import ddot, div, dot, eye, sym_grad, trace
 from skfem.models.poisson import laplace
 

@@ -218,17 +218,6 @@ def test_points_off_the_axis_are_found_in_their_element(mesh):
             assert_allclose(where, X, rtol=0, atol=1e-9)
 
 
-def test_round_off_has_units():
-    """Its squares are energies: in another unit of length, u, with E / u^2, they are u times."""
-    def noise(unit):
-        beam = Beam(line(4, 0.1 * unit, L=unit), ElementBeamANCF(2),
-                    StVenantKirchhoff(1e6 / unit**2, 0.3), 0.1 * unit)
-        s = Scene(beam).clamp("left").system
-        return np.array([s.scales.work_noise, s.scales.strain_noise])
-
-    assert_allclose(noise(1e3)**2, 1e3 * noise(1.0)**2, rtol=1e-12)
-
-
 # rigid motions, supports and joints
 
 

@@ -112,18 +112,6 @@ def test_the_path_of_a_heated_beam_between_walls(element, n, tol):
     assert rise == pytest.approx(arched(3 * first, alpha, EA), rel=tol)
 
 
-def test_stress_of_a_held_beam_and_of_each_layer():
-    """Between walls S = -E alpha T in each layer, and N is their sum."""
-    for element in (ElementBeamANCFCubic(2), ElementBeamCable(5)):
-        beam = strip(element, L=0.02)
-        state = Scene(beam).clamp("left").clamp("right").temperature(10.0).solve_static()
-        for y, law in ((-0.0005, STEEL), (0.0005, BRASS)):
-            S = state.stress((0.01, y), recover=False)
-            assert S[0] == pytest.approx(-law.E * law.thermal_expansion * 10.0, rel=1e-3)
-        N = -10.0 * 1e-5 * (STEEL.E * 12e-6 + BRASS.E * 19e-6)
-        assert state.resultants((0.01, 0.0), recover=False).N == pytest.approx(N, rel=1e-3)
-
-
 @pytest.mark.parametrize("element, error", [
     (ElementBeamCable(5), 1e-9), (ElementBeamANCFCubic(2), 2e-3), (ElementBeamANCF(2), 2e-3)])
 def test_a_muscle_layer_bends_a_finger_as_its_moment_does(element, error):

@@ -156,18 +156,3 @@ def test_euler_bernoulli_frequencies():
     close(x, [4.730040744862704, 7.853204624095838], 1e-13)  # tables
     x = np.sqrt(exact.euler_bernoulli_frequencies(**unit, n=400, ends="fixed-free"))
     close(x[-1], 399.5 * np.pi, 1e-11)
-
-
-# Rigid motion
-
-
-def test_rigid_pendulum():
-    t = np.linspace(0.0, 1.0, 2001)
-    theta = exact.rigid_pendulum(t, 2.0, theta0=2.5)
-    rate = np.gradient(theta, t, edge_order=2)
-    energy = rate**2 / 2 - 1.5 * 9.81 / 2.0 * np.cos(theta)  # constant: released from rest
-    close(energy, -1.5 * 9.81 / 2.0 * np.cos(2.5), 1e-4)
-    period = exact.rigid_pendulum_period(2.0, 2.5)
-    close(exact.rigid_pendulum([0.0, period / 2, period], 2.0, 2.5), [2.5, -2.5, 2.5], 1e-12)
-    small = 2 * np.pi / np.sqrt(1.5 * 9.81 / 2.0)
-    assert exact.rigid_pendulum_period(2.0, 1e-3) == pytest.approx(small, rel=1e-7)

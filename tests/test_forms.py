@@ -10,18 +10,8 @@ from numpy.testing import assert_allclose
 from skfem import Basis, BilinearForm, LinearForm, asm
 from skfem.helpers import ddot, dot
 
-from skfem_ancf import (
-    Beam,
-    ElementBeamANCF,
-    ElementBeamCable,
-    ElementBeamPatelShabana,
-    MeshBeam,
-    NeoHookean,
-    Scene,
-    StVenantKirchhoff,
-    forms,
-    reference_coordinates,
-)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, ElementBeamPatelShabana, MeshBeam,
+                        NeoHookean, Scene, StVenantKirchhoff, forms, reference_coordinates)
 from skfem_ancf.actions.loads import EndMoment, Pressure
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS

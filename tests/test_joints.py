@@ -175,22 +175,6 @@ def test_two_welded_beams_are_one(angle):
     assert np.allclose(f1, f2, rtol=0.02)
 
 
-def test_hinge_reactions_of_a_three_hinged_arch():
-    """Two bars that meet at the top: the thrust of a load there is P / (2 tan a)."""
-    P, a = 0.1, 0.6
-    top = np.array([np.cos(a), np.sin(a)])
-    left = between((0, 0), top, 1, E=1e8, name="left")
-    right = between((2 * top[0], 0), top, 1, E=1e8, name="right")
-    scene = Scene(left, right).pin("left", beam="left").pin("left", beam="right")
-    hinge = scene.joint("hinge", beams=(left, right), at=top)
-    scene.point_force((0, -P), top, beam=left)
-    state = scene.solve_static()
-    thrust = P / (2 * np.tan(a))
-    assert np.allclose(state.joint_force(hinge), [-thrust, P / 2], rtol=1e-4)
-    assert np.allclose(state.reactions("left", beam="left").force, [thrust, P / 2], rtol=1e-4)
-    assert np.allclose(state.reactions("left", beam="right").force, [-thrust, P / 2], rtol=1e-4)
-
-
 @pytest.mark.parametrize("tilt", [0.0, 0.4])
 def test_roller(tilt):
     """A beam under its weight on a pin and a roller: half the weight each, if the roller is flat.

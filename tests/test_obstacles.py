@@ -452,14 +452,6 @@ def test_distance_functions_that_are_none_say_so(f, message):
         Scene(beam()).obstacle(SignedDistance(f))
 
 
-def test_what_knows_no_obstacles_says_so():
-    scene = Scene(beam()).clamp("left").gravity((0, -9.81))
-    with pytest.raises(InputError, match="no obstacle"):
-        scene.solve_static().contact()
-    with pytest.raises(InputError, match="continuation"):
-        scene.obstacle(Line((0, -0.1)), friction=0.1).continuation(steps=2)
-
-
 def test_linear_solutions_that_enter_an_obstacle_are_refused():
     """Far from it they are what they are without it."""
     hanging = Scene(beam()).clamp("left").gravity((0, -0.1))

@@ -6,34 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
-from skfem import (
-    Basis,
-    BilinearForm,
-    ElementQuad2,
-    ElementVector,
-    FacetBasis,
-    LinearForm,
-    MeshQuad,
-    asm,
-    condense,
-    solve,
-)
+from skfem import (Basis, BilinearForm, ElementQuad2, ElementVector, FacetBasis, LinearForm,
+                   MeshQuad, asm, condense, solve)
 from skfem.helpers import sym_grad
 
-from skfem_ancf import (
-    Beam,
-    ElementBeamANCF,
-    ElementBeamANCFCubic,
-    ElementBeamCable,
-    InputError,
-    MeshBeam,
-    ModelWarning,
-    NameUnknown,
-    NeoHookean,
-    Scene,
-    Section,
-    StVenantKirchhoff,
-)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, ModelWarning, NameUnknown, NeoHookean, Scene, Section,
+                        StVenantKirchhoff)
 from skfem_ancf.beam.interpolation import locate
 from skfem_ancf.core.errors import CallError
 from skfem_ancf.core.quadrature import gauss

@@ -5,16 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp, trapezoid
 from scipy.optimize import brentq, root
 
-from skfem_ancf import (
-    Beam,
-    ElementBeamANCF,
-    ElementBeamCable,
-    Frame,
-    MeshBeam,
-    Scene,
-    StVenantKirchhoff,
-    SupportError,
-)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
+                        StVenantKirchhoff, SupportError)
 from skfem_ancf.actions.obstacles import Circle, Line
 
 GRAVITY = (0.0, -9.81)

@@ -51,17 +51,6 @@ def test_loads_of_the_size_of_a_mesh():
         scene.load(np.ones(20))
 
 
-def test_welds_to_a_body_name_its_point():
-    body = RigidBody(mass=1, inertia=1, position=(1.5, 0), name="plate")
-    beam = cantilever().beams[0]
-    with pytest.raises(InputError, match=r"centre of mass that is meant.*\(body, \(x, y\)\)"):
-        Scene(beam, body).weld((beam, "right"), body)
-    with pytest.raises(InputError) as caught:
-        Scene(beam, body).weld((beam, "right"), (body, (1.2, 0)))
-    assert "centre" not in str(caught.value)
-    Scene(beam, body).weld((beam, "right"), (body, (1, 0)))
-
-
 def test_springs_without_stiffness_are_mentioned():
     body = RigidBody(mass=1, inertia=1, position=(0, 0), name="plate")
     scene = Scene(body).fix(None, ["r^1", "d^2"], beam=body)

@@ -118,17 +118,6 @@ def test_verdicts_of_beams_of_any_size(L):
         assert tuple(system.solver.inertia()) == (negative, False)
 
 
-@pytest.mark.parametrize("L", [1.0, *LENGTHS])
-def test_joints_that_are_open_at_the_start_are_told(L):
-    from skfem_ancf.core.errors import SupportError
-
-    beam = between((0, 0), (1, 0.3), 2, L, ElementBeamCable(5), 0.05)
-    scene = Scene(beam).pin("left")
-    scene.joint("angle", at="right", angle=lambda t: 1e-6 + t)
-    with pytest.raises(SupportError, match="open by"):
-        scene.integrate(t_end=0.1, dt=0.01)
-
-
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 def test_becks_column_flutters_in_any_unit(unit):
     """Loads without a potential are seen where coordinates have units of 1e-12 to 1e12."""
