@@ -603,7 +603,7 @@ def test_energy_of_bodies_on_springs():
 def test_corrections_far_against_the_way_of_a_step(part, far):
     system = Scene(Beam(line(2), ElementBeamANCF(2), STEEL, 0.1)).system
     v, dt = np.random.default_rng(4).standard_normal(system.N), 0.2
-    x = SimpleNamespace(du=part * steps.FAR * dt * v, room=np.zeros(system.N))
+    x = SimpleNamespace(du=part * steps.FAR * dt * v, scratch=np.zeros(system.N))
     w = SimpleNamespace(x=x, y=np.array([0.0 * v, v]))
     assert steps._far(system.mass.band, SimpleNamespace(dt=dt), w) == far
 
