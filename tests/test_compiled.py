@@ -1,4 +1,4 @@
-"""The texts compiled by Numba do what they do as plain NumPy, step by step, to round-off."""
+"""The kernels compiled by Numba do what they do as plain NumPy, step by step, to round-off."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def at_once(monkeypatch):
 
 def ways(scene):
     """Which way statics and time steps of a scene run."""
-    return [scene.system.machine.choose(name).way for name in ("equilibrium", "steps")]
+    return [scene.system.backend.choose(name).way for name in ("equilibrium", "steps")]
 
 MESHES = {
     "equal": lambda: MeshBeam.init_line(np.linspace(0, 1, 5), 0.1),

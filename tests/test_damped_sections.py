@@ -89,7 +89,7 @@ def test_drag_is_that_of_the_width(body):
             scene = Scene(beam_of(body, element)).drag(10.0, 1.2)
             rise = scene.beams[0].rigid_motions()[:, 1]
             force = scene.system.forces.part_forces(
-                scene.system.machine.tables.plain.forces, 0.0 * rise, 3.0 * rise)
+                scene.system.backend.tables.plain.forces, 0.0 * rise, 3.0 * rise)
             assert abs(force.sum()) == pytest.approx(0.5 * 10.0 * 1.2 * BODIES[body][3] * 9.0)
 
 
@@ -100,7 +100,7 @@ def test_drag_is_that_of_the_widest_layer(thickness, h):
     mesh = MeshBeam.init_line(np.linspace(0, 1, 5), h)
     scene = Scene(Beam(mesh, ElementBeamCable(5), section=layers)).drag(10.0, 1.2)
     rise = scene.beams[0].rigid_motions()[:, 1]
-    force = scene.system.forces.part_forces(scene.system.machine.tables.plain.forces,
+    force = scene.system.forces.part_forces(scene.system.backend.tables.plain.forces,
                                             0.0 * rise, 3.0 * rise)
     assert abs(force.sum()) == pytest.approx(0.5 * 10.0 * 1.2 * 0.0225 * 9.0)
 

@@ -74,7 +74,7 @@ SCENES = {
 def test_derivatives_are_those_of_the_force(element, name):
     system = SCENES[name](weighing(element)).system
     rng = np.random.default_rng(0)
-    forces, tables = system.forces, system.machine.tables.plain.forces
+    forces, tables = system.forces, system.backend.tables.plain.forces
     u, v = 1e-3 * rng.standard_normal(system.N), rng.standard_normal(system.N)
 
     def matrix(factor, w):

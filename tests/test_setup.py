@@ -46,7 +46,7 @@ def test_scenes_go_when_nobody_asks_for_them(element):
         gone = [ref(scene), ref(scene.system), ref(state)]
         changed = scene.replace(material=scene.beams[0].material.replace(E=3e9))
         del scene, state
-        assert changed.solve_static().system.machine.tables.system is changed.system
+        assert changed.solve_static().system.backend.tables.system is changed.system
         assert [x() for x in gone] == 3 * [None]
     finally:
         gc.enable()

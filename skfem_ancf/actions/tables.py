@@ -1,4 +1,4 @@
-"""Joints and loads of a scene as tables, and what they do, as texts.
+"""Joints and loads of a scene as tables, and what they do.
 
 Joints are ``Phi = c + g . u + u . H u / 2``; c and g may depend on time.
 """
@@ -12,7 +12,7 @@ from ..beam.strain_energy import FlatBody, evaluate_body
 from ..beam.kernels.strain import PUSH, PUSH_MEAN, PUSH_TANGENT
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import own_force, own_joints, own_load_stiffness, own_mean_force
-from ..core.source import F1, F2, I1, lanes, primitive, source
+from ..core.source import F1, F2, I1, indices, primitive, source
 
 
 class JointTables(NamedTuple):
@@ -120,7 +120,7 @@ def constraint(joints, c, g, t, u, phi):
         return
     clear(phi)
     add_triples(phi, joints.hk, joints.hv, u, joints.hi, u, joints.hj)
-    for k in lanes(phi.size):
+    for k in indices(phi.size):
         phi[k] = c[k] + 0.5 * phi[k]
     add_products(phi, joints.gk, g, u, joints.gi)
 
@@ -172,7 +172,7 @@ def _dead_force(loads, factors, out):
     clear(out)
     for k in range(loads.vectors.shape[0]):
         c, vector = factors[k], loads.vectors[k]
-        for i in lanes(out.size):
+        for i in indices(out.size):
             out[i] += c * vector[i]
 
 
@@ -208,10 +208,10 @@ def push(loads, what, factors, u, v, out, flat, ld):
     first = factors.size - loads.pushes.shape[0]
     for k in range(loads.pushes.shape[0]):
         c, one = factors[first + k], loads.pushes[k]
-        for i in lanes(given.size):
+        for i in indices(given.size):
             given[i] -= c * one[i]
     evaluate_body(loads.pushed, what, u, v, f, given, given[:0], flat, ld)
-    for i in lanes(out.size):
+    for i in indices(out.size):
         out[i] -= f[i]
 
 
@@ -238,7 +238,7 @@ def mean_external_force(loads, factors, t, u0, u1, out):
     add_mean_moments(loads.moments, _of_moments(loads, factors), u0, u1, out)
     if loads.rows.size > 0:
         middle = np.empty(out.size)
-        for i in lanes(out.size):
+        for i in indices(out.size):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
     if loads.pushes.shape[0] > 0:

@@ -216,15 +216,15 @@ def body_carry(body, u, du, stresses, carried):
 
 
 @source
-def add_viscous_stress(viscous, body, copies, k, u, v, rooms, out):
+def add_viscous_stress(viscous, body, copies, k, u, v, scratch, out):
     """Add the stresses in proportion to the rates of the strains, to those of copy k.
 
-    ``rooms``, shape (2, s), is room, of which the first row is zero.
+    ``scratch``, shape (2, s), is scratch, of which the first row is zero.
     """
-    clear(rooms[1])
-    body_carry(viscous, u, v, rooms[0], rooms[1])
+    clear(scratch[1])
+    body_carry(viscous, u, v, scratch[0], scratch[1])
     for j in range(body.table.shape[0]):
-        one, all_of_them = _stress(body, j, rooms[1]), _stress(copies, j, out)
+        one, all_of_them = _stress(body, j, scratch[1]), _stress(copies, j, out)
         add_multiple(1.0, one, all_of_them[k * one.size:(k + 1) * one.size])
 
 

@@ -1,4 +1,4 @@
-"""Band matrices as texts and LAPACK see them.
+"""Band matrices as kernels and LAPACK see them.
 
 Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, and :data:`SPARE` zeros behind each
 column; its factors L D L^T take its place.
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import blas, lapack
 
-from .source import F1, I1, lanes, primitive, shaped, source
+from .source import F1, I1, indices, primitive, shaped, source
 
 if TYPE_CHECKING:
     from .types import Array
@@ -284,14 +284,14 @@ def _complex(A):
 @source
 def clear(x):
     """x = 0."""
-    for i in lanes(x.size):
+    for i in indices(x.size):
         x[i] = 0.0
 
 
 @source
 def copy(a, b):
     """b = a."""
-    for i in lanes(a.size):
+    for i in indices(a.size):
         b[i] = a[i]
 
 
@@ -302,7 +302,7 @@ def mirror(A):
         rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
         for k in range(1, A.width + 1):
             later = rows[k:]
-            for j in lanes(later.shape[0]):
+            for j in indices(later.shape[0]):
                 later[j, A.top - k] = rows[j, A.top + k]
 
 
@@ -314,13 +314,13 @@ def add_halves(A, factor, U):
     if top > 0:
         for k in range(min(m, n)):
             later = rows[k:]
-            for j in lanes(n - k):
+            for j in indices(n - k):
                 both[j, 0, k] = rows[j, top + k] + factor * both[j, 0, k]
                 both[j, 1, k] = later[j, top - k] + factor * both[j, 1, k]
         return
     for i in range(2):
-        for j in lanes(n):
-            for k in lanes(m):
+        for j in indices(n):
+            for k in indices(m):
                 both[j, i, k] = rows[j, k] + factor * both[j, i, k]
 
 
@@ -336,16 +336,16 @@ def fix_stored(flat, ld, width, top, fixed):
     n, step = flat.size // ld, max(1, ld - 1)
     for i in fixed:
         at = i * ld + max(top, 0)
-        for k in lanes(i * ld, (i + 1) * ld):
+        for k in indices(i * ld, (i + 1) * ld):
             flat[k] = 0.0
-        for k in lanes(at - step * min(width, i), at, step):
+        for k in indices(at - step * min(width, i), at, step):
             flat[k] = 0.0
         if top > 0:
-            for k in lanes(at + step, at + step * min(width, n - 1 - i) + 1, step):
+            for k in indices(at + step, at + step * min(width, n - 1 - i) + 1, step):
                 flat[k] = 0.0
         if top < 0:
             back = at + ld // 2
-            for k in lanes(back - step * min(width, i), back, step):
+            for k in indices(back - step * min(width, i), back, step):
                 flat[k] = 0.0
         flat[at] = 1.0
 
@@ -354,7 +354,7 @@ def fix_stored(flat, ld, width, top, fixed):
 def diagonal(A, d):
     """The diagonal into d."""
     rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
-    for j in lanes(d.size):
+    for j in indices(d.size):
         d[j] = rows[j, A.top]
 
 

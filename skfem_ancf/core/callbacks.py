@@ -1,4 +1,4 @@
-"""What texts ask of Python objects: loads, joints and laws of one's own, joints, descents.
+"""What kernels ask of Python objects: loads, joints and laws of one's own, joints, descents.
 
 An object is known by a handle, a positive number: compiled code can hold one, and calls back.
 """
@@ -14,7 +14,7 @@ _objects: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
 
 
 def handle_of(thing: Any) -> int:
-    """A number by which texts call an object as long as it lives."""
+    """A number by which kernels call an object as long as it lives."""
     number = next(_numbers)
     _objects[number] = thing
     return number

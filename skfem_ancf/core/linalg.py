@@ -98,11 +98,11 @@ class BandMatrix:
 
     def __init__(self, n: int, bandwidth: int, symmetric: bool = True) -> None:
         self.n, self.bandwidth, self.symmetric = n, bandwidth, symmetric
-        # gbtrf wants room for the pivots, the lower half zeros that vectors may reach to
+        # gbtrf wants space for the pivots, the lower half zeros that vectors may reach to
         self._ld = bandwidth + 1 + SPARE if symmetric else 3 * bandwidth + 1
         self._diagonal = 0 if symmetric else 2 * bandwidth
         self._flat = np.zeros(n * self._ld)
-        #: What texts take: a view of the entries, and room for their factors.
+        #: What kernels take: a view of the entries, and space for their factors.
         self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
         ab = self._flat.reshape(n, self._ld).T
         #: LAPACK's band storage, a view of shape (rows, n).

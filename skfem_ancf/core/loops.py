@@ -11,7 +11,7 @@ from . import callbacks
 from .band import LOST, REPEATED, SPARE
 from .source import source
 
-lanes = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
+indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
 
 
 def column(x):

@@ -2,21 +2,21 @@
 
 A function marked by :func:`source` is plain Python on arrays, and :mod:`skfem_ancf.core.jit`
 compiles it, with all that it calls. What is a loop for a compiler is an array operation for NumPy:
-an index of :func:`lanes` is a number in the one and a slice in the other::
+an index of :func:`indices` is a number in the one and a slice in the other::
 
     @source
     def normal_force(EA, strain, N):
         for p in range(strain.shape[0]):
-            for e in lanes(strain.shape[1]):
+            for e in indices(strain.shape[1]):
                 N[p, e] = EA * strain[p, e]
 
-Rules of such a function, where ``e`` is an index of lanes:
+Rules of such a function, where ``e`` is an index of indices:
 
 * statements on ``[..., e]`` only: no ``if`` on values, sums into ``s[e]`` and not into a number,
   ``np.sqrt`` and not ``math.sqrt``; ``e`` takes no part in arithmetic, an array of numbers
   indexed by it does: ``left[e] * nd + k``,
-* lanes may be nested where the arrays broadcast: ``for s in lanes(n): for e in lanes(m):`` with
-  ``column(c[s]) * x[s, e]``,
+* they may be nested where the arrays broadcast: ``for s in indices(n): for e in indices(m):``
+  with ``column(c[s]) * x[s, e]``,
 * ``out[at[e]] += x[e]`` needs ``at`` without repetitions.
 """
 
@@ -61,15 +61,15 @@ def primitive(module: str) -> Callable[[_Function], _Function]:
 
 
 @primitive("skfem_ancf.core.loops")
-def lanes(*ends):
+def indices(*ends):
     """Indices from ``ends`` as of ``range``: all at once, as one slice; compiled, one by one.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from skfem_ancf.core.source import lanes
+    >>> from skfem_ancf.core.source import indices
     >>> x, y = np.arange(3.0), np.empty(3)
-    >>> for i in lanes(3):
+    >>> for i in indices(3):
     ...     y[i] = 2.0 * x[i]
     >>> y.tolist()
     [0.0, 2.0, 4.0]
@@ -81,12 +81,6 @@ def lanes(*ends):
 def column(x):
     """A number for each row, beside the elements: ``x[:, None]``; compiled, the number."""
     return x[:, None]
-
-
-@source
-def room(shape, like):
-    """An array without values, of the kind of ``like``."""
-    return np.empty(shape, like.dtype)
 
 
 @source

@@ -1,4 +1,4 @@
-"""Whether compiled texts may be used."""
+"""Whether compiled kernels may be used."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ class Collocation(Scheme):
         return f"<{type(self).__name__}, {len(self.points)} points>"
 
     def require(self, system: System) -> None:
-        if system.constraints.m and not (self.joined or system.machine.tables.linear_joints):
+        if system.constraints.m and not (self.joined or system.backend.tables.linear_joints):
             raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
                              "rigid bodies: take 'radau', or 'energy-momentum', which conserves "
                              "energy with them")
@@ -135,7 +135,7 @@ class Collocation(Scheme):
 
     def near(self, system: System) -> float:
         """As of :class:`Scheme`: only rates of what is driven are differences."""
-        return NEAR if system.constraints.moves or system.machine.tables.motion_varies else 0.0
+        return NEAR if system.constraints.moves or system.backend.tables.motion_varies else 0.0
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:
         return integrator.damped(du, time) if integrator.system.damped else du

@@ -99,7 +99,7 @@ class Course:
         return self._block[1].rows(slice(steps[0] - first, steps[1] - first))
 
     def _sampled(self, start, dt, first, last, limit):
-        s, tables, n = self._system, self._system.machine.tables, last - first
+        s, tables, n = self._system, self._system.backend.tables, last - first
         begin = np.arange(first, last)[:, None]
 
         def at(parts):

@@ -1,4 +1,4 @@
-"""What resists velocities, as texts: of materials, of the mass, and of modes."""
+"""What resists velocities, as kernels: of materials, of the mass, and of modes."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..beam.strain_energy import add_viscous_force, body_tangent
 from ..actions.forces.kernels import add_resisting_force
-from ..core.source import F2, lanes, source
+from ..core.source import F2, indices, source
 
 
 class Rows(NamedTuple):
@@ -55,19 +55,19 @@ def inverse_rows(A, J, free, Y):
     """Y[k] = A^-1 J[k] at free coordinates, with the factors of A."""
     for k in range(J.shape[0]):
         row, out = J[k], Y[k]
-        for i in lanes(free.size):
+        for i in indices(free.size):
             out[i] = row[i] * free[i]
         solve(A, out)
 
 
 @source
-def damping_force(e, dampers, M, t, u, v, out, room):
+def damping_force(e, dampers, M, t, u, v, out, scratch):
     """The force at u that resists the velocity v, of the equations e."""
-    damping_beside(e, dampers, M, t, u, v, 0.0, out, room)
+    damping_beside(e, dampers, M, t, u, v, 0.0, out, scratch)
 
 
 @source
-def damping_beside(e, dampers, M, t, u, v, carried, out, room):
+def damping_beside(e, dampers, M, t, u, v, carried, out, scratch):
     """The same without what is of materials, if the stresses of these are carried."""
     clear(out)
     if dampers.viscous > 0 and carried == 0.0:
@@ -75,29 +75,29 @@ def damping_beside(e, dampers, M, t, u, v, carried, out, room):
     if dampers.elements > 0:
         add_resisting_force(e.forces, t, u, v, out)
     if dampers.mass > 0.0:
-        multiply(M, v, room)
-        for i in lanes(out.size):
-            out[i] += dampers.mass * room[i]
+        multiply(M, v, scratch)
+        for i in indices(out.size):
+            out[i] += dampers.mass * scratch[i]
     for k in range(dampers.modes.shape[0]):
         row = dampers.modes[k]
         size = dot(row, v)
-        for i in lanes(out.size):
+        for i in indices(out.size):
             out[i] += size * row[i]
 
 
 @source
-def add_damping(viscous, dampers, M, factor, u, stresses, room, A):
+def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
     """Add the derivative of :func:`damping_force` by v, times a factor, to a symmetric band.
 
-    That of the modes is left out. ``stresses`` (3, n) is room, of which the first row is zero.
+    That of the modes is left out. ``stresses`` (3, n) is scratch, of which the first row is zero.
     """
     if dampers.viscous > 0:
         yes = dampers.viscous > 0
-        body_tangent(viscous, u, room, stresses[0], yes, stresses[2], dampers.D)
-        for i in lanes(A.flat.size):
+        body_tangent(viscous, u, scratch, stresses[0], yes, stresses[2], dampers.D)
+        for i in indices(A.flat.size):
             A.flat[i] += factor * dampers.D.flat[i]
     if dampers.mass > 0.0:
-        for i in lanes(A.flat.size):
+        for i in indices(A.flat.size):
             A.flat[i] += factor * dampers.mass * M.flat[i]
 
 

@@ -3,7 +3,7 @@
 from ..core.band import copy, dot, solve_joined, subtract_rows
 from ..actions.forces.kernels import settle_contact
 from ..core.callbacks import own_solve
-from ..core.source import lanes, source
+from ..core.source import indices, source
 from ..actions.tables import add_constraint_rate
 from .convergence import DEPENDENT, EXACTLY, FAILED, GO_ON
 from .dampers import damping_force
@@ -41,14 +41,14 @@ def _eliminated(joints, rule, s, w, at, b, x, state, exact):
     """
     change, rate = w.x.damping_velocity, w.m.phi
     add_constraint_rate(joints, s.joints.g[0], s.t, w.x.u, x, b)
-    for k in lanes(b.size):
+    for k in indices(b.size):
         rate[k] = -b[k]
     copy(at, change)
     known = w.m.l if exact > 0 else w.m.l[:0]  # none: roughly
     if not own_solve(rule.mass_solver, s.t, w.x.u, known, x, rate, change, b):
         state.failure[0] = DEPENDENT
         return FAILED
-    for i in lanes(x.size):
+    for i in indices(x.size):
         x[i] += change[i]
     return GO_ON
 
@@ -62,16 +62,16 @@ def accelerations(free, rule, s, w, state):
     if rule.conserving > 0:
         # what acts in the middle of a step, extrapolated to its end from the last two
         ahead = s.dt / (s.dt + state.last_dt[0])
-        for i in lanes(u.size):
+        for i in indices(u.size):
             w1[i] = (v[i] - v0[i]) / s.dt
             a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * free[i] + given[i]
-        for k in lanes(l.size):
+        for k in indices(l.size):
             l[k] += impulse[k] / s.dt
             l0[k] = l[k] + ahead * (l[k] - last[k])
             last[k] = l[k]
     else:
         c = 1.0 / (rule.beta * s.dt * s.dt)
-        for i in lanes(u.size):
+        for i in indices(u.size):
             w1[i] = c * (u[i] - base[i])
             a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + given[i]
 
@@ -86,16 +86,16 @@ def close_acceleration(joints, free, mass, rule, s, w, state):
     if rule.mass_solver > 0:
         if _eliminated(joints, rule, s, w, w.x.u, dl, a1, state, EXACTLY) == FAILED:
             return FAILED
-        for i in lanes(w1.size):
+        for i in indices(w1.size):
             w1[i] += share * w.x.damping_velocity[i]
     else:
         if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[3], w.S, dl, a1):
             state.failure[0] = DEPENDENT
             return FAILED
-        for k in lanes(l.size):
+        for k in indices(l.size):
             shared[k] = share * dl[k]
         subtract_rows(w.J[3], shared, w1)
-    for k in lanes(l.size):
+    for k in indices(l.size):
         l0[k] = l[k] + dl[k]
         last[k] = l0[k]
     return GO_ON
@@ -111,7 +111,7 @@ def add_work(e, matrices, rule, s, w, state):
     """
     u, u0, d, middle = w.x.u, w.y[0], w.x.damping, w.x.middle
     damping_velocity = w.x.damping_velocity
-    for i in lanes(u.size):
+    for i in indices(u.size):
         damping_velocity[i] = (u[i] - u0[i]) / s.dt
         middle[i] = 0.5 * (u[i] + u0[i])
     t = s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt
@@ -136,7 +136,7 @@ def finish(free, M, s, w, state):
     copy(u, u0)
     copy(v, v0)
     copy(a1, a0)
-    for i in lanes(u.size):
+    for i in indices(u.size):
         w0[i] = w1[i] * free[i] + given[i]
     state.last_dt[0], state.mixed_steps[0] = s.dt, max(0, state.mixed_steps[0] - 1)
     state.energy[0] = max(state.energy[0], kinetic_energy(M, v, w.x.scratch))

@@ -166,10 +166,10 @@ class Integrator:
         joined, rate = None, y.multipliers
         if m:
             joints = JointMotion(given.c[0, 0], np.vstack([given.g[0, 0, :1], given.g[0, 0]]),
-                                 int(s.machine.tables.motion_varies))
+                                 int(s.backend.tables.motion_varies))
             joined = Joined(s, joints, y.u, (t, dt, ahead, self.limit))
             gap = np.abs(joined.gap())
-            if np.any(gap > 1e-8 * s.machine.tables.plain.joints.sizes):
+            if np.any(gap > 1e-8 * s.backend.tables.plain.joints.sizes):
                 raise SupportError(f"the joints are open by {gap.max():.3g} at the start: begin "
                                    "with beams that fit, or from a static solution (start=)")
         solve = s.mass_solver(y.u, t, None if joined is None else joined.J)
@@ -222,7 +222,7 @@ class Integrator:
     def _work(self):
         """Work arrays."""
         s = self.system
-        return new_work(s.N, self.m, s.machine.tables.stresses.size,
+        return new_work(s.N, self.m, s.backend.tables.stresses.size,
                               0 if self._nodes else self.m)
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
@@ -258,7 +258,7 @@ class Integrator:
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
         try:
             with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
-                done = self._machine.of(function)(self._matrices, *args)
+                done = self._backend.of(function)(self._matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._load_state(before)
             self.forget()
@@ -274,9 +274,9 @@ class Integrator:
         return done
 
     @property
-    def _machine(self):
+    def _backend(self):
         """What runs functions of the equations, compiled or not."""
-        return self.system.machine
+        return self.system.backend
 
     def take(self, y: Motion, dt: float) -> Motion:
         """One step of dt from the Motion ``y``; raises StepFailed."""
@@ -407,7 +407,7 @@ def _step_data(given: Given, dt: float, system: System) -> StepData:
     """Functions of time as steps take them: where the equation of motion holds, and at the end."""
     g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
     joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
-                          int(system.machine.tables.motion_varies))
+                          int(system.backend.tables.motion_varies))
     return StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
                       given.supports[:, -1].copy(), joints)
 

@@ -22,7 +22,7 @@ class Joined:
     def __init__(self, system: System, motion: JointMotion, u: Array,
                  instant: tuple[float, float, bool, float]) -> None:
         self._system, self._u, self._instant = system, u, instant
-        self._tables = system.machine.tables.plain.joints
+        self._tables = system.backend.tables.plain.joints
         if self._tables.own and motion.drives:
             c = rates(lambda times: np.array([system.constraints.constraint(u, t)
                                               for t in times]), *instant)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.callbacks import own_joints
-from ..core.source import F2, F3, lanes, source
+from ..core.source import F2, F3, indices, source
 from ..actions.tables import add_products, add_triples
 
 #: Intervals into which a step is divided.
@@ -46,7 +46,7 @@ class JointMotions(NamedTuple):
 def drive_rate(joints, motion, t, dt, u, out):
     """The rate of Phi at rest, at the end t of a step of dt: c' + g' . u."""
     c = motion.c[1]
-    for k in lanes(out.size):
+    for k in indices(out.size):
         out[k] = c[k]
     if joints.own == 0:
         add_products(out, joints.gk, motion.g[2], u, joints.gi)
@@ -58,7 +58,7 @@ def drive_rate(joints, motion, t, dt, u, out):
 def acceleration_of_joints(joints, motion, t, dt, u, v, out):
     """The second rate of Phi without accelerations: c'' + v . H v + g'' . u + 2 g' . v."""
     c, g = motion.c[2], motion.g[2]
-    for k in lanes(out.size):
+    for k in indices(out.size):
         out[k] = c[k]
     if joints.own == 0:
         add_triples(out, joints.hk, joints.hv, v, joints.hi, v, joints.hj)
@@ -80,8 +80,8 @@ def _add_differences(joints, t, dt, u, v, first, second, along, out):
         for k in range(2):
             c = first * _FIRST[part] + second * _SECOND[part] if k == 0 else along * _FIRST[part]
             if c != 0.0:
-                for i in lanes(out.size):
+                for i in indices(out.size):
                     values[i] = 0.0
                 own_joints(joints.own, k, time, u, v, values)
-                for i in lanes(out.size):
+                for i in indices(out.size):
                     out[i] += c * values[i]

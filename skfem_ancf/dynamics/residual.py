@@ -6,7 +6,7 @@ from ..core.band import clear, copy, dot, multiply, subtract_rows
 from ..beam.strain_energy import add_force_of, body_carry, body_force, body_mean, body_mixed
 from ..actions.forces.kernels import add_elastic_force
 from ..core.callbacks import own_joints
-from ..core.source import lanes, source
+from ..core.source import indices, source
 from ..actions.tables import (add_curvature_force, add_joint_force, joint_directions,
                               mean_external_force)
 from .dampers import damping_beside
@@ -24,7 +24,7 @@ def to_middle(rule, w):
     """Where the tangent and the joints' directions are taken, of the iterate."""
     u, u0, middle = w.x.u, w.y[0], w.x.middle
     a = 0.5 if rule.conserving > 0 else 0.0
-    for i in lanes(u.size):
+    for i in indices(u.size):
         middle[i] = u[i] + a * (u0[i] - u[i])
 
 
@@ -33,7 +33,7 @@ def free_velocity(free, rule, s, w):
     """v_1 of the iterate, without the joints' part."""
     u, v, base, speed = w.x.u, w.x.v, w.x.base, w.x.speed
     c = rule.gamma / (rule.beta * s.dt)
-    for i in lanes(u.size):
+    for i in indices(u.size):
         v[i] = (speed[i] + c * (u[i] - base[i])) * free[i] + s.supports[1, i]
 
 
@@ -42,7 +42,7 @@ def to_damping_velocity(free, rule, s, w):
     """The velocity that damping resists, of the iterate."""
     u, u0, v, damping_velocity = w.x.u, w.y[0], w.x.v, w.x.damping_velocity
     free_velocity(free, rule, s, w)
-    for i in lanes(u.size):
+    for i in indices(u.size):
         damping_velocity[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
 
 
@@ -61,12 +61,12 @@ def internal_force(e, dampers, rule, w, state):
     missing, carried, own, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state.mixed_steps[0] > 0:
         body_mixed(e.body, rule.conserving > 0, u0, u, f, carried, own)
-        for i in lanes(missing.size):
+        for i in indices(missing.size):
             missing[i] = own[i] - carried[i]
         if dampers.viscous > 0:
             body_carry(e.viscous, w.x.middle, w.x.damping_velocity, S[0], rates)
             add_force_of(e.body, w.x.middle, slow, f)
-            for i in lanes(missing.size):
+            for i in indices(missing.size):
                 missing[i] += rates[i] - slow[i]
         add_force_of(e.body, w.x.origin, missing, f)
     elif rule.conserving > 0:
@@ -91,7 +91,7 @@ def add_damping_force(e, matrices, s, w, state):
     d, f = w.x.damping, w.x.force
     damping_beside(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.damping_velocity,
                    state.mixed_steps[0], d, w.x.scratch)
-    for i in lanes(f.size):
+    for i in indices(f.size):
         f[i] += d[i]
 
 
@@ -115,16 +115,16 @@ def residual(loads, joints, free, M, rule, s, w):
     """R = Q - f - M a - J^T lambda."""
     u, base, rest, constrained = w.x.u, w.x.base, w.x.rest, w.x.constrained
     a, R, f, scratch = w.x.acceleration, w.x.residual, w.x.force, w.x.scratch
-    for i in lanes(u.size):
+    for i in indices(u.size):
         a[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + constrained[i]
     multiply(M, a, scratch)
     mean_external_force(loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
-    for i in lanes(u.size):
+    for i in indices(u.size):
         R[i] = R[i] - f[i] - scratch[i]
     if rule.solver > 0:
         clear(scratch)
         add_joint_force(joints, s.joints.g[1], s.acting, w.x.middle, w.m.l, scratch)
-        for i in lanes(u.size):
+        for i in indices(u.size):
             R[i] -= scratch[i]
     else:
         subtract_rows(w.J[0], w.m.l, R)
@@ -143,8 +143,8 @@ def add_impulses(joints, s, w):
         copy(impulse, ends[3 * n:])
         own_joints(joints.own, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
         return
-    for i in lanes(v.size):
+    for i in indices(v.size):
         scratch[i] = v0[i] + v[i]
-    for k in lanes(share.size):
+    for k in indices(share.size):
         share[k] = -0.25 * impulse[k]
     add_curvature_force(joints, share, scratch, w.x.residual)

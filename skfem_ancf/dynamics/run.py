@@ -192,7 +192,7 @@ class Run:
         """Ask controls whose law is asked now and then, if it is their time."""
         s = self.system
         if s.forces.sampled:
-            s.forces.sample(s.machine.tables.plain.forces, u, v, t, first)
+            s.forces.sample(s.backend.tables.plain.forces, u, v, t, first)
 
     def _start(self, u, v, contacts):
         """The Motion where a segment begins."""

@@ -35,9 +35,9 @@ class StageIntegrator(Integrator):
     scheme: Collocation
 
     @cached_property
-    def _machine(self):
-        machine = self.system.machine
-        return machine.with_tables(machine.tables.copied(len(self.scheme.points)))
+    def _backend(self):
+        backend = self.system.backend
+        return backend.with_tables(backend.tables.copied(len(self.scheme.points)))
 
     @cached_property
     def _course(self):
@@ -45,7 +45,7 @@ class StageIntegrator(Integrator):
 
     @cached_property
     def _work(self):
-        s, tables = self.system, self.system.machine.tables
+        s, tables = self.system, self.system.backend.tables
         M = s.mass.band
         return new_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
                                tables.stresses.size, gradients_size(tables.plain.body),
@@ -67,7 +67,7 @@ class StageIntegrator(Integrator):
             float(dt), int("stages" in memory), ahead, given.times.ravel(),
             _flat(given.factors), _flat(given.supports),
             JointMotions(_flat(given.c), _flat(given.g[:, :, [0, 0, 1, 2]]),
-                         int(s.machine.tables.motion_varies)))
+                         int(s.backend.tables.motion_varies)))
         rows, stages = np.empty((n + 1, 3, s.N)), np.empty((n, len(w.U), s.N))
         rows[0, 0], rows[0, 1] = y.u, y.v
         forces = np.empty((n, len(w.U) + 1, self.m))

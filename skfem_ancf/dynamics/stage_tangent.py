@@ -7,7 +7,7 @@ from ..core.band import (SPARE, add_multiple, copy, factorize, factorize_complex
 from ..beam.strain_energy import body_mean_stress, body_stress, body_tangent, body_tangent_by
 from ..actions.forces.kernels import (add_element_damping, add_element_tangent, element_damping,
                                       element_stiffness, put_between)
-from ..core.source import lanes, shaped, source
+from ..core.source import indices, shaped, source
 from ..actions.tables import add_load_stiffness, joint_directions
 from .dampers import add_damping
 from .records import row_of
@@ -24,7 +24,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     """Factors of the iteration matrices at the mean of the points; False if there are none."""
     origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
     at = step * (method.points.size + 1)
-    for i in lanes(origin.size):
+    for i in indices(origin.size):
         origin[i] = 0.0
     for k in range(method.points.size):
         add_multiple(method.weights[k], w.U[k], origin)
@@ -37,7 +37,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     add_load_stiffness(e.loads, row_of(s.factors, at), s.times[at], 1.0, origin, e.K)
     add_element_tangent(e.forces, s.times[at], origin, e.K)
     D = w.D.flat
-    for i in lanes(D.size):
+    for i in indices(D.size):
         D[i] = 0.0
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
@@ -61,7 +61,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
         for j in range(w.J.shape[0]):
             x, y = w.Y[2 * k, j], w.Y[2 * k + 1, j]
             copy(w.J[j], x)
-            for i in lanes(y.size):
+            for i in indices(y.size):
                 y[i] = 0.0
             solve_for(w, k, x, y)
         _between(w, s.h, k)
@@ -97,7 +97,7 @@ def _rows(e, matrices, s, w, at):
         copy(matrices.rows.P[a], w.J[m + a])
     for a in range(w.J.shape[0]):
         J = w.J[a]
-        for i in lanes(J.size):
+        for i in indices(J.size):
             J[i] *= e.free[i]
     modes, D = matrices.dampers.modes.shape[0], np.empty(forces.size)
     if w.S.shape[1] > modes:
@@ -160,7 +160,7 @@ def join(method, s, w, k, r, q, x, y):
         return False
     for a in range(b):
         re, im, f, g = w.Y[2 * k, a], w.Y[2 * k + 1, a], r[a], r[b + a]
-        for i in lanes(x.size):
+        for i in indices(x.size):
             x[i] -= f * re[i] - g * im[i]
             y[i] -= f * im[i] + g * re[i]
     return True
@@ -178,12 +178,12 @@ def _combine(K, M, D, fixed, c, m, d, out):
     if top > 0:
         k, l, r = shaped(x, (n, K.ld)), shaped(y, (n, K.ld)), shaped(z, (n, K.ld))
         for h in range(min(K.width + 1, n)):
-            for j in lanes(n):
+            for j in indices(n):
                 columns[j, h] = c * k[j, top + h] + m * l[j, top + h] + d * r[j, top + h]
             later = k[h:]
-            for j in lanes(n - h):
+            for j in indices(n - h):
                 columns[j, h] += 0.5 * c * (later[j, top - h] - k[j, top + h])
     else:
-        for i in lanes(out.size):
+        for i in indices(out.size):
             out[i] = c * x[i] + m * y[i] + d * z[i]
     fix_stored(out, ld, K.width, 0, fixed)

@@ -1,4 +1,4 @@
-"""Steps of collocation, as a text.
+"""Steps of collocation.
 
 With ``A^-1 = T diag(mu) T^-1`` the points of a step fall into systems ``K + mu D / h + mu^2 M /
 h^2`` for each eigenvalue, one for each pair: complex and symmetric, with a positive real part but
@@ -11,7 +11,7 @@ from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
 from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, body_gradients,
                                   body_mixed, body_stress, carry_by)
 from ..actions.forces.kernels import add_elastic_force, pace_contact, settle_contact
-from ..core.source import lanes, source
+from ..core.source import indices, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, constraint, external_force,
                               joint_directions)
 from .convergence import (DEPENDENT, DONE, FAILED, GO_ON, ITERATIONS, NOT_CONVERGED, RESTART,
@@ -123,7 +123,7 @@ def _ahead(method, ahead, h, before, w):
     n, u0, v0, u, v = method.points.size, w.y[0], w.y[1], w.before[0], w.before[1]
     for k in range(n):
         guess, c = w.guess[k], h * method.points[k]
-        for i in lanes(u.size):
+        for i in indices(u.size):
             guess[i] = u[i] + (before + c) * v[i] - u0[i] - c * v0[i]
         for j in range(n):
             p = ahead[k, j]
@@ -153,7 +153,7 @@ def _end(e, matrices, method, s, w, state, step):
         copy(w.W[n - 1], a)
     constrained, motion = row_of(s.constrained, first + n), motion_at(s.joints, first + n)
     joined = w.shares.size > 0
-    for i in lanes(u.size):
+    for i in indices(u.size):
         u[i] = u[i] * e.free[i] + constrained[0, i]
         v[i] = v[i] * e.free[i] + constrained[1, i]
     if joined and not _close(e, matrices, s, w, motion, t, step):
@@ -185,11 +185,11 @@ def _balance(e, matrices, s, w, at):
     body_force(e.body, u, f)
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     external_force(e.loads, row_of(s.factors, at), t, 1.0, u, Q)
-    for i in lanes(a.size):
+    for i in indices(a.size):
         a[i] += (Q[i] - f[i] - scratch[i]) * e.free[i]
     if matrices.dampers.active > 0:
         damping_force(e, matrices.dampers, matrices.M, t, u, v, f, scratch)
-        for i in lanes(a.size):
+        for i in indices(a.size):
             a[i] -= f[i] * e.free[i]
     solve(matrices.mass, a)
 
@@ -203,11 +203,11 @@ def _close(e, matrices, s, w, motion, t, step):
     for k in range(CLOSINGS):
         joint_directions(e.joints, g, t, u, w.end[0])
         constraint(e.joints, motion.c[0], g, t, u, w.shares)
-        for i in lanes(x.size):
+        for i in indices(x.size):
             x[i] = 0.0
         if not _meet(matrices.mass, e.free, w, x, bends or (turns and k == 0)):
             return False
-        for i in lanes(x.size):
+        for i in indices(x.size):
             u[i] += x[i]
     joint_directions(e.joints, g, t, u, w.end[0])
     drive_rate(e.joints, motion, t, s.h, u, w.shares)
@@ -241,7 +241,7 @@ def _start(e, matrices, method, s, w, state, step):
             v0, v = w.y[1], w.before[1]
             for k in range(w.Z.shape[0]):
                 Z, c = w.Z[k], 0.5 * (s.h * method.points[k])**2 / state.last_dt[0]
-                for i in lanes(v.size):
+                for i in indices(v.size):
                     Z[i] = c * (v0[i] - v[i])
 
 
@@ -259,18 +259,18 @@ def _states(free, method, s, w, step, rates):
     for k in range(n):
         U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
         constrained = row_of(s.constrained, step * (n + 1) + k)
-        for i in lanes(N):
+        for i in indices(N):
             U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + constrained[0, i]
             W[i] = 0.0
         for j in range(n):
             add_multiple(method.second[k, j] / (s.h * s.h), w.Z[j], W)
-        for i in lanes(N):
+        for i in indices(N):
             W[i] = W[i] * free[i] + constrained[2, i]
         if rates:
             copy(v0, V)
             for j in range(n):
                 add_multiple(method.first[k, j] / s.h, w.Z[j], V)
-            for i in lanes(N):
+            for i in indices(N):
                 V[i] = V[i] * free[i] + constrained[1, i]
 
 
@@ -289,7 +289,7 @@ def _internal(e, matrices, w, state):
         if matrices.dampers.viscous > 0:
             for k in range(w.U.shape[0]):
                 add_viscous_stress(e.viscous, e.body, e.copies, k, w.U[k], w.V[k], w.stresses, own)
-        for i in lanes(missing.size):
+        for i in indices(missing.size):
             missing[i] = own[i] - carried[i]
         add_force_by(e.body, e.copies, w.B, missing, f)
     else:
@@ -319,11 +319,11 @@ def _residual(e, matrices, method, s, w, state, step, k):
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     if matrices.dampers.active > 0:
         damping_beside(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)
-        for i in lanes(f.size):
+        for i in indices(f.size):
             f[i] += d[i]
     external_force(e.loads, row_of(s.factors, at), t, 1.0, u, Q)
     multiply(matrices.M, w.W[k], scratch)
-    for i in lanes(f.size):
+    for i in indices(f.size):
         f[i] += scratch[i]
     if w.gaps.shape[1] > 0:
         gap, l, motion = w.gaps[k], w.l[k], motion_at(s.joints, at)
@@ -331,7 +331,7 @@ def _residual(e, matrices, method, s, w, state, step, k):
         add_joint_force(e.joints, g[0], t, u, l, f)
         drive_rate(e.joints, motion, t, s.h * method.points[k], u, gap)
         add_constraint_rate(e.joints, g[0], t, u, v, gap)
-    for i in lanes(f.size):
+    for i in indices(f.size):
         f[i] = (Q[i] - f[i]) * e.free[i]
 
 
@@ -347,7 +347,7 @@ def _correct(free, method, s, w, state):
     clear(flat_points(D))
     clear(flat_points(dl))
     for k in range(method.values.shape[1]):
-        for i in lanes(N):
+        for i in indices(N):
             x[i] = 0.0
             y[i] = 0.0
         for j in range(n):
@@ -368,7 +368,7 @@ def _correct(free, method, s, w, state):
         for a in range(m):  # what closes them needs no residual
             closing += abs(np.dot(w.J[a], d) * share[a])
             l[a] += share[a]
-        for i in lanes(N):
+        for i in indices(N):
             Z[i] += d[i]
             R[i] = d[i]
     state.last_correction[0] = state.correction[0]

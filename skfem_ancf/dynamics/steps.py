@@ -1,4 +1,4 @@
-"""Time steps of every scheme, as a text.
+"""Time steps of every scheme.
 
 A step of size h leads from 0 to 1, with eq. (7)-(9) of Arnold and Bruls (2007)::
 
@@ -20,7 +20,7 @@ from ..beam.strain_energy import body_carry, body_stress, quadratic
 from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import augment_contact, pace_contact
 from ..core.callbacks import own_solve
-from ..core.source import lanes, source
+from ..core.source import indices, source
 from ..actions.tables import constraint
 from .convergence import (AUGMENTED, CARRIED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON,
                           ITERATIONS, LASTING, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
@@ -139,7 +139,7 @@ def _predict(free, M, rule, s, w, state):
     b, c = h * h * (0.5 - rule.beta), h * (1.0 - rule.gamma)
     p, q = rule.alpha_m / (1.0 - rule.alpha_f), rule.alpha_f / (1.0 - rule.alpha_f)
     d, a = rule.beta * h * h, a0 if rule.conserving > 0 else w0
-    for i in lanes(u.size):
+    for i in indices(u.size):
         base[i] = u0[i] + h * v0[i] + b * w0[i]
         speed[i] = v0[i] + c * w0[i]
         rest[i] = p * w0[i] - q * a0[i]
@@ -148,7 +148,7 @@ def _predict(free, M, rule, s, w, state):
         straight[i] = (u0[i] + h * v0[i]) * free[i] + s.supports[0, i]
         u[i] = guess[i]
     if rule.conserving > 0:  # what the velocity changes by
-        for i in lanes(u.size):
+        for i in indices(u.size):
             constrained[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
     state.fresh[0], state.correction[0] = 0, -max(1.0, state.fresh[0])  # of the last step
     free_velocity(free, rule, s, w)
@@ -174,7 +174,7 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
     u, R, du, scratch = w.x.u, w.x.residual, w.x.du, w.x.scratch
     l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, factors(matrices, state), matrices.rows
     state.iterations[0] += 1
-    for i in lanes(u.size):
+    for i in indices(u.size):
         R[i] *= free[i]
         du[i] = R[i]
     if rule.solver == 0:
@@ -182,14 +182,14 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
     work = abs(dot(R, du))
     if l.size > 0:
         constraint(joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
-        for k in lanes(l.size):
+        for k in indices(l.size):
             dl[k] = phi[k]
             phi[k] = -phi[k]
         if anew and rows.P.shape[0] > 0:
             anew = False
             for k in range(l.size):
                 row, out = w.J[0, k], w.J[2, k]
-                for i in lanes(u.size):
+                for i in indices(u.size):
                     out[i] = row[i] * free[i]
                 solve_rows(A, rows, out)
         if rule.solver > 0:
@@ -199,14 +199,14 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
         if not good:
             state.failure[0] = DEPENDENT
             return FAILED
-        for i in lanes(u.size):
+        for i in indices(u.size):
             scratch[i] = np.abs(R[i] * du[i])
         work = dot(scratch, free)
-        for k in lanes(l.size):
+        for k in indices(l.size):
             l[k] += dl[k]
             phi[k] = np.abs(phi[k] * dl[k])
         work += total(phi)
-    for i in lanes(u.size):
+    for i in indices(u.size):
         u[i] += du[i]
     state.last_correction[0], state.correction[0] = state.correction[0], np.sqrt(work)
     return GO_ON
@@ -222,11 +222,11 @@ def _judged(e, matrices, s, w, state, wanted, rough):
     """
     du, scratch = w.x.du, w.x.scratch
     if state.mixed_steps[0] > 0:
-        for i in lanes(du.size):
+        for i in indices(du.size):
             scratch[i] = s.stiffness_factor * du[i]
         body_carry(e.body, w.x.ahead, scratch, w.stresses[4], w.stresses[3])
         if matrices.dampers.viscous > 0:
-            for i in lanes(du.size):
+            for i in indices(du.size):
                 scratch[i] = s.damping_factor * du[i]
             body_carry(e.viscous, w.x.origin, scratch, w.stresses[6], w.stresses[5])
         size, before = state.correction[0], SLOW * state.last_correction[0]

@@ -7,7 +7,7 @@ from ..beam.strain_energy import add_turned, body_carry, body_stress, body_tange
 from ..actions.forces.kernels import (add_contact_tangent, add_rubbing_tangent, element_stiffness,
                                       put_between)
 from ..core.callbacks import own_solve
-from ..core.source import lanes, source
+from ..core.source import indices, source
 from ..actions.tables import add_load_stiffness, add_products
 from .convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, TURNED
 from .dampers import add_damping, factorize_rows
@@ -43,7 +43,7 @@ def tangent(e, matrices, rule, s, w, state):
     _add_elements(e.forces, matrices, s, w)
     if e.forces.contacts.number > 0:
         _add_obstacles(e, matrices, rule, s, w)
-    for i in lanes(A.size):
+    for i in indices(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
 
 
@@ -93,7 +93,7 @@ def factorize_tangent(e, matrices, rule, s, w, state):
     state.factors[0] = SYMMETRIC
     if rule.solver > 0:  # asked without a right-hand side: with what multipliers do at u
         l, dl, none = w.m.l, w.m.dl, w.x.du[:0]
-        for k in lanes(l.size):
+        for k in indices(l.size):
             dl[k] = s.stiffness_factor * l[k]
         good = own_solve(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:

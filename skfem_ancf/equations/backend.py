@@ -1,4 +1,4 @@
-"""Where texts run: in plain NumPy, or compiled where that pays."""
+"""Where kernels run: in plain NumPy, or compiled where that pays."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SERVES = 5
 
 
 class Choice(NamedTuple):
-    """Which way a text runs, "plain", "loaded" or "compiled", and why."""
+    """Which way a kernel runs, "plain", "loaded" or "compiled", and why."""
 
     way: str
     reason: str
@@ -52,8 +52,8 @@ class Choice(NamedTuple):
 _IS_LOADED = Choice("loaded", "compiled code is loaded")
 
 
-class Machine:
-    """Runs the texts of a system.
+class Backend:
+    """Runs the kernels of a system.
 
     The size of the task decides, which is known before it starts: the iterations that are expected,
     see :func:`~skfem_ancf.core.switch.expecting`, and the number of elements. What is compiled
@@ -75,7 +75,7 @@ class Machine:
     def __init__(self, system: Any) -> None:
         self.tables = Tables(system)
         self._plain: str | None = None
-        self._rooms: dict[str, Any] = {}
+        self._workspaces: dict[str, Any] = {}
         self._flat: tuple[Any, list[Any]] | None = None
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
@@ -93,14 +93,14 @@ class Machine:
         return PROBLEMS[0] if PROBLEMS else compiled_off()
 
     @cached_property
-    def linearised(self) -> Machine | None:
-        """What runs the texts for :attr:`Tables.linearised`; None if the laws are linear."""
+    def linearised(self) -> Backend | None:
+        """What runs the kernels for :attr:`Tables.linearised`; None if the laws are linear."""
         tables = self.tables.linearised
         if tables is None:
             return None
         return self.with_tables(tables)
 
-    def with_tables(self, tables: Tables) -> Machine:
+    def with_tables(self, tables: Tables) -> Backend:
         """The same for other tables of the system, with its work arrays.
 
         Parameters
@@ -108,13 +108,13 @@ class Machine:
         tables
             In place of its own.
         """
-        machine = copy(self)
-        machine.tables, machine._flat = tables, None
-        vars(machine).pop("linearised", None)
-        return machine
+        backend = copy(self)
+        backend.tables, backend._flat = tables, None
+        vars(backend).pop("linearised", None)
+        return backend
 
     def choose(self, name: str) -> Choice:
-        """The way of a text for the next call.
+        """The way of a kernel for the next call.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class Machine:
                       "skfem_ancf.equations.compile does it beforehand")
 
     def _missing(self, name):
-        """What of a text and of what it calls this process has not loaded."""
+        """What of a kernel and of what it calls this process has not loaded."""
         missing = [part for part in self.tables.parts if part not in LOADED]
         return missing if name in LOADED else [*missing, name]
 
@@ -166,8 +166,8 @@ class Machine:
         beams = self.tables.system.beams
         return iterations * (ITERATION + ELEMENT * sum(beam.mesh.nelements for beam in beams))
 
-    def room(self, make: Callable, *sizes: int) -> Any:
-        """Work arrays of a text, made once.
+    def workspace(self, make: Callable, *sizes: int) -> Any:
+        """Work arrays of a kernel, made once.
 
         Parameters
         ----------
@@ -176,50 +176,50 @@ class Machine:
         *sizes
             Numbers that the arrays depend on.
         """
-        if make.__name__ not in self._rooms:
-            self._rooms[make.__name__] = make(self.tables.plain, *sizes)
-        return self._rooms[make.__name__]
+        if make.__name__ not in self._workspaces:
+            self._workspaces[make.__name__] = make(self.tables.plain, *sizes)
+        return self._workspaces[make.__name__]
 
-    def of(self, text: Callable) -> Callable:
-        """The function of a text for its equations, plain or compiled: it takes all but these.
+    def of(self, kernel: Callable) -> Callable:
+        """The function of a kernel for its equations, plain or compiled: it takes all but these.
 
         Parameters
         ----------
-        text
+        kernel
             Its first argument takes the equations.
         """
-        if self.choose(text.__name__).way == "plain":
-            return self._in_numpy(text)
+        if self.choose(kernel.__name__).way == "plain":
+            return self._in_numpy(kernel)
 
         def run(*args):
             try:
-                function, equations = self._load(text, args)
+                function, equations = self._load(kernel, args)
             except Exception as error:  # of a user's function, or of a Numba that is not as known
-                self._give_up(text, error)
-                return self._in_numpy(text)(*args)
+                self._give_up(kernel, error)
+                return self._in_numpy(kernel)(*args)
             return function(equations, *args)
 
         return run
 
-    def _give_up(self, text, error):
+    def _give_up(self, kernel, error):
         if isinstance(error, code_cache.NotCompiled):
             self._plain = str(error)
             logger.info(self._plain)
             return
         PROBLEMS.append(f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
-                        f"{text.__name__} cannot be compiled: {error!r}")
+                        f"{kernel.__name__} cannot be compiled: {error!r}")
         logger.warning("%s; it runs in NumPy", PROBLEMS[-1])
 
-    def _in_numpy(self, text):
+    def _in_numpy(self, kernel):
         def run(*args):
             with np.errstate(all="ignore"):  # what overflows is seen in the residual
-                return text(self.tables.plain, *args)
+                return kernel(self.tables.plain, *args)
 
         return run
 
-    def _load(self, text, args):
+    def _load(self, kernel, args):
         """The compiled function and the equations that it takes; says so where that takes long."""
-        name = text.__name__
+        name = kernel.__name__
         if self._flat is None or name not in LOADED:
             from ..core.jit import entry
             from . import loops
@@ -230,7 +230,7 @@ class Machine:
                 if self._flat is None:
                     self._flat = loops.flat(self.tables.plain)
                 if name not in LOADED:
-                    LOADED[name] = entry(text, (self._flat[0], *args))
+                    LOADED[name] = entry(kernel, (self._flat[0], *args))
                     code_cache.note(name)
                     update(name)
         return LOADED[name], self._flat[0]
@@ -258,7 +258,7 @@ def compiling(names: Iterable[str]) -> float:
     Parameters
     ----------
     names
-        Keys of :data:`SECONDS`: texts and what they call.
+        Keys of :data:`SECONDS`: kernels and what they call.
     """
     return sum(SECONDS[name] for name in names)
 

@@ -80,7 +80,7 @@ class LinearSolver:
         if not len(i):
             return i, j, w
         u, t = self._at
-        D = s.forces.stiffness(s.machine.tables.plain.forces, t, u, 0.0 * u, 0.0)
+        D = s.forces.stiffness(s.backend.tables.plain.forces, t, u, 0.0 * u, 0.0)
         free = s.constraints.free
         return i, j, w * D[place] * (free[i] & free[j])
 

@@ -79,7 +79,7 @@ class StrainTangent:
     def _elements(self):
         """The derivative of the force elements, at free coordinates."""
         u, system = self._at[0], self.system
-        i, j, v = system.forces.entries(system.machine.tables.plain.forces, self._at[3], u, 0.0 * u,
+        i, j, v = system.forces.entries(system.backend.tables.plain.forces, self._at[3], u, 0.0 * u,
                                         0.0)
         K = sparse.csr_matrix((v, (i, j)), shape=(system.N, system.N))
         return K[self.free][:, self.free]
@@ -87,7 +87,7 @@ class StrainTangent:
     def _element_force(self):
         system, force = self.system, np.zeros(self.system.N)
         u = np.array(self._at[0], dtype=float)
-        add_elastic_force(system.machine.tables.plain.forces, self._at[3], 0.0, u, u, force)
+        add_elastic_force(system.backend.tables.plain.forces, self._at[3], 0.0, u, u, force)
         return force[self.free]
 
     def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:

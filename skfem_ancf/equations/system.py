@@ -18,7 +18,7 @@ from ..core.errors import InputError
 from ..core.linalg import BandMatrix
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
-from .backend import Machine
+from .backend import Backend
 from .constraints import Constraints
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .linear_solver import LinearSolver
@@ -139,9 +139,9 @@ class System:
         return Points(self.beams, self.slices, self.bodies, None if frame is None else frame.lines)
 
     @cached_property
-    def machine(self) -> Machine:
+    def backend(self) -> Backend:
         """What runs kernels on the tables of this system, in NumPy or compiled."""
-        return Machine(self)
+        return Backend(self)
 
     @cached_property
     def scales(self) -> Scales:
@@ -219,7 +219,7 @@ class System:
         """The force elements' part of :meth:`strain_energy`."""
         if not self.forces.elements:
             return 0.0
-        return self.forces.potential(self.machine.tables.plain.forces, u, t)
+        return self.forces.potential(self.backend.tables.plain.forces, u, t)
 
     def inverted(self, u: Array) -> bool:
         """True if a body is turned inside out somewhere."""
@@ -233,7 +233,7 @@ class System:
     def stiffness_at_rest(self) -> sparse.csr_array:
         """The stiffness of force elements in the reference configuration, shape (N, N)."""
         zero = np.zeros(self.N)
-        i, j, v = self.forces.entries(self.machine.tables.plain.forces, 0.0, zero, zero, 0.0)
+        i, j, v = self.forces.entries(self.backend.tables.plain.forces, 0.0, zero, zero, 0.0)
         return sparse.csr_array((v, (i, j)), shape=(self.N, self.N))
 
     # damping
@@ -263,7 +263,7 @@ class System:
         """The force that resists the velocity v at u, shape (N,)."""
         force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
         if self.forces.resists:
-            add_resisting_force(self.machine.tables.plain.forces, 0.0 if t is None else t, u, v,
+            add_resisting_force(self.backend.tables.plain.forces, 0.0 if t is None else t, u, v,
                                 force)
         if self.damping.mass:
             force += self.damping.mass * self.mass.multiply(v)
@@ -326,7 +326,7 @@ class System:
         self._require_displacement(u)
         self.K.clear()
         self.solver.assembled_at(u, load if t is None else t)
-        stresses = self.machine.tables.stresses
+        stresses = self.backend.tables.stresses
         if not geometric:
             carried = np.zeros_like(stresses)
         force = self._evaluate(TANGENT, u, None, load, t, (stresses, carried), geometric)
@@ -340,7 +340,7 @@ class System:
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=(None, None), geometric=True):
         """Run :func:`~skfem_ancf.equations.evaluation.evaluate`; returns the force."""
-        tables = self.machine.tables
+        tables = self.backend.tables
         u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
         first = what == TANGENT and t is None and not geometric
         factors = tables.linear_factors(load) if first else tables.static_factors(load)
@@ -350,7 +350,7 @@ class System:
         none = tables.stresses if stresses[1] is None else None
         of, carried = (none if x is None else x for x in stresses)
         force = np.zeros(self.N)
-        self.machine.of(evaluate)(what, u, v, factors, time, float(load),
+        self.backend.of(evaluate)(what, u, v, factors, time, float(load),
                                   stresses[1] is not None, of, carried, force)
         return force
 

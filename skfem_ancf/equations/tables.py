@@ -1,4 +1,4 @@
-"""The equations of a scene as tables that texts take."""
+"""The equations of a scene as tables that kernels take."""
 
 from copy import copy
 from functools import cached_property, partial
@@ -33,7 +33,7 @@ _NO_PUSHES = np.zeros((0, 0))
 
 
 class Equations(NamedTuple):
-    """A scene for texts.
+    """A scene for kernels.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Tables:
 
     @property
     def asks(self) -> bool:
-        """True if texts ask the system in Python, by its handle."""
+        """True if kernels ask the system in Python, by its handle."""
         plain = self.plain
         return bool(plain.loads.own or plain.joints.own or plain.forces.own)
 
@@ -136,7 +136,7 @@ class Tables:
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
 
     def copied(self, n: int) -> "Tables":
-        """The same with ``n`` copies of all coordinates, whose forces a text finds together."""
+        """The same with ``n`` copies of all coordinates, whose forces a kernel finds together."""
         return self.with_equations(self.plain._replace(
             copies=copies_of(self.plain.body, n, self.system.N)))
 

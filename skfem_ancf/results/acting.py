@@ -50,7 +50,7 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
     elements = [e for e in system.forces.elements if e.distributed]
     if not elements:
         return sampled, places
-    tables = system.machine.tables.plain.forces
+    tables = system.backend.tables.plain.forces
     force = -(system.forces.part_forces(tables, state.u, state.v) if state.base is None else unit
               * system.forces.small_part_forces(tables, state.load, state.base.u,
                                                 state.u - state.base.u))

@@ -122,7 +122,7 @@ def _solution(s, kind):
         yield "compiled loop", "skipped", "one solve"
     else:
         with expecting(STEPS * OF_STEP if dynamic else OF_STATICS):
-            way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
+            way, reason = s.backend.choose("steps" if dynamic else "equilibrium")
         yield "compiled loop", "skipped" if way == "plain" else "computed", (
             f"whole {f'time steps, in blocks, of {STEPS}' if dynamic else 'iterations'}: {reason}")
     if dynamic:

@@ -360,7 +360,7 @@ def _require_same_springs(system, u):
         return
     kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.constraints.mask
     kick *= system.constraints.coordinate_sizes
-    rest, here, up, down = (system.forces.firmnesses(system.machine.tables.plain.forces, x)
+    rest, here, up, down = (system.forces.firmnesses(system.backend.tables.plain.forces, x)
                             for x in (np.zeros(system.N), u, u + kick, u - kick))
     if np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)):
         raise InputError(

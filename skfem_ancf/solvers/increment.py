@@ -12,7 +12,7 @@ from ..core.errors import ConvergenceError
 from ..equations import stability
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
-                        Target, Unknowns, equilibrium, room_for_iterations)
+                        Target, Unknowns, equilibrium, workspace_for_iterations)
 from .outcome import (Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed,
                       Unstable)
 from .touching import found_touching
@@ -160,8 +160,8 @@ class Increment:
         A correction that turns the beam far strains it for once, more than a law may bear that
         others than Hooke's are; the equilibrium that Hooke's finds is close to theirs.
         """
-        machine = None if self.start.diverging else self.system.machine.linearised
-        if machine is None:
+        backend = None if self.start.diverging else self.system.backend.linearised
+        if backend is None:
             return self.iterate(options=options)
         try:
             return self.iterate(options=options, wary=True)
@@ -169,7 +169,7 @@ class Increment:
             failure = failed
         try:
             close = self.iterate(options=options._replace(tol=max(options.tol, NEAR)),
-                                 machine=machine)
+                                 backend=backend)
             return self.iterate(close, options)
         except StepFailed:
             self.start.diverging = True
@@ -178,7 +178,7 @@ class Increment:
         raise failure
 
     def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
-                machine: Any = None, wary: bool = False) -> Equilibrium:
+                backend: Any = None, wary: bool = False) -> Equilibrium:
         """Iterate to equilibrium; raises StepFailed.
 
         Parameters
@@ -189,19 +189,19 @@ class Increment:
             In place of those of the increment.
         solver
             What solves the linear systems, as a :class:`~skfem_ancf.solvers.descent.Descent`.
-        machine
+        backend
             That of other laws.
         wary
             End where the third correction is not smaller than the first.
         """
         system, options = self.system, options or self.options
         u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
-        machine = machine or system.machine
-        tables, given, own = machine.tables, solver is not None, system.solver
+        backend = backend or system.backend
+        tables, given, own = backend.tables, solver is not None, system.solver
         target = self._target(tables, u)
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not given else 0)
-        room = machine.room(room_for_iterations, system.constraints.m)
+        scratch = backend.workspace(workspace_for_iterations, system.constraints.m)
         if solver is None and own.coupled:
             solver = own
         while True:
@@ -210,7 +210,7 @@ class Increment:
             x = Unknowns(u.copy(), multipliers.copy(), np.empty(system.N), tables.stresses,
                          tables.stresses)
             residuals = np.zeros((options.most + 1, 2))
-            status, n = machine.of(equilibrium)(target, rules, x, room, residuals)
+            status, n = backend.of(equilibrium)(target, rules, x, scratch, residuals)
             if status != SINGULAR or solver is not None:
                 break
             solver = own  # factors with exchanges of rows

@@ -1,4 +1,4 @@
-"""The iteration to equilibrium: Newton's method, mixed or not, as a text."""
+"""The iteration to equilibrium: Newton's method, mixed or not."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..beam.strain_energy import body_carry, body_force, body_tangent
 from ..actions.forces.kernels import (add_elastic_force, add_element_tangent, contact_along,
                                     contact_work)
 from ..core.callbacks import own_solve
-from ..core.source import F1, lanes, source
+from ..core.source import F1, indices, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                               external_force)
 
@@ -115,7 +115,7 @@ class Work(NamedTuple):
     dm: F1
 
 
-def room_for_iterations(e: Equations, m: int) -> Work:
+def workspace_for_iterations(e: Equations, m: int) -> Work:
     """The :class:`Work` of a scene.
 
     Parameters
@@ -186,9 +186,9 @@ def equilibrium(e, target, rules, x, w, record):
             _hold_back(e, target.at, x, w)
         moving = False
         copy(x.u, w.before)
-        for i in lanes(N):
+        for i in indices(N):
             x.u[i] += w.du[i]
-        for i in lanes(m):
+        for i in indices(m):
             x.multipliers[i] += w.dm[i]
         reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
@@ -236,10 +236,10 @@ def _tangent(e, target, rules, x, w, k):
     add_load_stiffness(e.loads, factors, t, target.scale, x.u, e.K)
     add_element_tangent(e.forces, target.at, x.u, e.K)
     diagonal(e.K, w.scale)
-    for i in lanes(x.u.size):
+    for i in indices(x.u.size):
         w.scale[i] = np.abs(w.scale[i])
     least = SMALLEST * mean_stiffness(w.scale, e.sizes)
-    for i in lanes(x.u.size):
+    for i in indices(x.u.size):
         w.scale[i] = 1.0 / (w.scale[i] + least / (e.sizes[i] * e.sizes[i]))
 
 
@@ -252,10 +252,10 @@ def _residual(e, target, x, w):
     if w.phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
         add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
-        for k in lanes(w.phi.size):
+        for k in indices(w.phi.size):
             w.dm[k] = w.phi[k] / e.joints.sizes[k]
         opening = largest(w.dm)
-    for i in lanes(x.u.size):
+    for i in indices(x.u.size):
         w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
     return opening
 
@@ -266,20 +266,20 @@ def _correction(e, target, rules, x, w, moving):
     N, m = x.u.size, w.phi.size
     clear(w.push)
     if moving:  # R = R - K du of the fixed coordinates
-        for k in lanes(e.fixed.size):
+        for k in indices(e.fixed.size):
             w.push[e.fixed[k]] = target.prescribed[k]
         multiply(e.K, w.push, w.du)
-        for i in lanes(N):
+        for i in indices(N):
             w.R[i] = (w.R[i] - w.du[i]) * e.free[i]
         if m > 0:
             add_constraint_rate(e.joints, target.g, target.at, x.u, w.push, w.phi)
-    for k in lanes(m):
+    for k in indices(m):
         w.phi[k] = -w.phi[k]
     fix(e.K, e.fixed)
     if not _solved(e, target, rules, x, w):
         return -1.0
     work = np.sqrt(abs(dot(w.R, w.du)) + abs(dot(w.phi, w.dm)))
-    for i in lanes(N):
+    for i in indices(N):
         w.du[i] += w.push[i]
     return work
 
@@ -297,16 +297,16 @@ def _hold_back(e, t, x, w):
     correction has to be small, see Crisfield (1991), 9.2: without that points come and go.
     """
     N, work, two = x.u.size, dot(w.R, w.du), np.empty(2)
-    there, room = np.empty(N), np.zeros(N)
+    there, scratch = np.empty(N), np.zeros(N)
     contact_along(e.forces, t, x.u, w.du, two)
     if not work > 0.0:
         return
     parts = int(min(max(np.ceil(two[1]), 1.0), PARTS))
-    before, low, high = contact_work(e.forces, t, x.u, w.du, room), 0.0, 1.0
+    before, low, high = contact_work(e.forces, t, x.u, w.du, scratch), 0.0, 1.0
     left, left_low = work, work
     for k in range(parts):
         high = (k + 1.0) / parts
-        left = _left(e, t, x, w, high, work, two[0], before, there, room)
+        left = _left(e, t, x, w, high, work, two[0], before, there, scratch)
         if left < -LEFT * work:
             break
         low, left_low = high, left
@@ -316,25 +316,25 @@ def _hold_back(e, t, x, w):
     for k in range(TRIES):
         s = 0.5 * (low + high) if left_low <= 0.0 or k > 2 else max(
             low + 0.1 * (high - low), low + (high - low) * left_low / (left_low - left))
-        now = _left(e, t, x, w, s, work, two[0], before, there, room)
+        now = _left(e, t, x, w, s, work, two[0], before, there, scratch)
         if abs(now) <= LEFT * work:
             break
         if now > 0.0:
             low, left_low = s, now
         else:
             high, left = s, now
-    for i in lanes(N):
+    for i in indices(N):
         w.du[i] *= s
-    for k in lanes(w.dm.size):
+    for k in indices(w.dm.size):
         w.dm[k] *= s
 
 
 @source
-def _left(e, t, x, w, s, work, along, before, there, room):
+def _left(e, t, x, w, s, work, along, before, there, scratch):
     """What is left along the correction at a part s of it."""
-    for i in lanes(there.size):
+    for i in indices(there.size):
         there[i] = x.u[i] + s * w.du[i]
-    now = contact_work(e.forces, t, there, w.du, room)
+    now = contact_work(e.forces, t, there, w.du, scratch)
     return (1.0 - s) * work - (now - before - s * along)
 
 

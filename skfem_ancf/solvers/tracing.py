@@ -201,7 +201,7 @@ class Tracer:
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.jacobian(u, load)
-            closed = np.all(np.abs(phi) <= CLOSED * system.machine.tables.plain.joints.sizes)
+            closed = np.all(np.abs(phi) <= CLOSED * system.backend.tables.plain.joints.sizes)
             reference = max(reference_work(force, load * external, u),
                             np.sqrt(abs(external @ step * dl)))
             if closed and settled(work, reference, rules):

@@ -8,7 +8,7 @@ and the end of a step is the begin of the next.
 import numpy as np
 
 from ...core.band import clear, copy, differs
-from ...core.source import lanes, shaped, source
+from ...core.source import indices, shaped, source
 from .gap import distances, middles, places, surface
 from .tables import (ELEMENTS, FRICTION, GAP, KNOWN, LARGEST, LOWEST, MULTIPLIER, POSE, PROJECTED,
                      RADIUS, RATE, SETTLE, SLOTS, SPAN, hardening)
@@ -41,7 +41,7 @@ def projection(pair, which, u):
     middles(pair, u, 1.0, x, radius)
     distances(pair, which, False, x, found)
     gap = row[span + POSE:span + POSE + n]
-    for e in lanes(n):
+    for e in indices(n):
         gap[e] = found[0, e] - radius[e]
     clear(projected(pair, slot)[KNOWN])
     pair.counts[0] += n
@@ -73,7 +73,7 @@ def near_points(pair, what, begin, end):
     m, flags = pair.first.size // n, np.empty(pair.first.size)
     for p in range(m):
         flag = flags[p::m]
-        for e in lanes(n):
+        for e in indices(n):
             flag[e] = 1.0 * (np.minimum(a[e], b[e]) <= reach)
     return np.nonzero(flags)[0]
 
@@ -83,7 +83,7 @@ def project(pair, which, slot, u, at):
     """Project those of some points that were not yet."""
     known = projected(pair, slot)
     flags = np.empty(at.size)
-    for i in lanes(at.size):
+    for i in indices(at.size):
         flags[i] = 1.0 - known[KNOWN, at[i]]
     new = chosen(at, flags)
     if new.size == 0:
@@ -94,9 +94,9 @@ def project(pair, which, slot, u, at):
     surface(pair, new, z, x)
     distances(pair, which, False, x, rows[GAP:])
     for c in range(KNOWN):
-        for i in lanes(new.size):
+        for i in indices(new.size):
             known[c, new[i]] = rows[c, i]
-    for i in lanes(new.size):
+    for i in indices(new.size):
         known[KNOWN, new[i]] = 1.0
     pair.counts[1] += new.size
 
@@ -107,7 +107,7 @@ def touching(pair, begin, end, at):
     part, flags = 1.0 / hardening(pair), np.empty(at.size)
     a, b, multiplier = projected(pair, begin)[GAP], projected(pair, end)[GAP], pair.memory[
         MULTIPLIER]
-    for i in lanes(at.size):
+    for i in indices(at.size):
         flags[i] = 1.0 * (np.minimum(a[at[i]], b[at[i]]) < part * multiplier[at[i]])
     return chosen(at, flags)
 

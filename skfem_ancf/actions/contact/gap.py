@@ -8,7 +8,7 @@ the obstacle; its gradient is the normal at the closest point of the outline.
 import numpy as np
 
 from ...core.callbacks import own_distance
-from ...core.source import lanes, source
+from ...core.source import indices, source
 from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE, START
 
 TINY = 1e-200
@@ -21,7 +21,7 @@ def _interpolate(weights, first, u, at, p, q):
     """Add both components of what u adds to vectors at some points."""
     for k in range(weights.shape[0]):
         row = weights[k]
-        for i in lanes(at.size):
+        for i in indices(at.size):
             dof, w = first[at[i]] + 2 * k, row[at[i]]
             p[i] += w * u[dof]
             q[i] += w * u[dof + 1]
@@ -32,7 +32,7 @@ def places(pair, u, factor, at, z):
     """Places and slopes (4, n) of points, those without displacement times a factor."""
     for c in range(4):
         row = pair.points[START + c]
-        for i in lanes(at.size):
+        for i in indices(at.size):
             z[c, i] = factor * row[at[i]]
     _interpolate(pair.weights, pair.first, u, at, z[0], z[1])
     _interpolate(pair.slopes, pair.first, u, at, z[2], z[3])
@@ -47,11 +47,11 @@ def middles(pair, u, factor, x, radius):
     n, half, largest = x.shape[1], pair.header[PAIRS] // 2, pair.numbers[RADIUS]
     m = pair.first.size // n
     first, p, q = pair.first[::m], pair.middles[0], pair.middles[1]
-    for e in lanes(n):
+    for e in indices(n):
         x[0, e], x[1, e], radius[e] = factor * p[e], factor * q[e], largest
     for k in range(pair.header[PAIRS]):
         p, q, same = pair.middles[2 + 2 * k], pair.middles[3 + 2 * k], 1.0 * (k == half)
-        for e in lanes(n):
+        for e in indices(n):
             a, b = u[first[e] + 2 * k], u[first[e] + (2 * k + 1)]
             x[0, e] += p[e] * a
             x[1, e] += p[e] * b
@@ -64,7 +64,7 @@ def middles(pair, u, factor, x, radius):
 def surface(pair, at, z, x):
     """The points of the surface (2, n), of places and slopes."""
     offset = pair.points[OFFSET]
-    for i in lanes(at.size):
+    for i in indices(at.size):
         s, t = z[2, i], z[3, i]
         c = offset[at[i]] / np.sqrt(np.maximum(s * s + t * t, SHORT))
         x[0, i], x[1, i] = z[0, i] - c * t, z[1, i] + c * s
@@ -74,7 +74,7 @@ def surface(pair, at, z, x):
 def levers(pair, at, z, lever):
     """The derivative of the surface by the slope: xs, xt, ys, yt."""
     offset = pair.points[OFFSET]
-    for i in lanes(at.size):
+    for i in indices(at.size):
         s, t = z[2, i], z[3, i]
         square = np.maximum(s * s + t * t, SHORT)
         c = offset[at[i]] / square / np.sqrt(square)
@@ -98,18 +98,18 @@ def distances(pair, which, whole, x, out):
     """
     pose, y, side = pair.poses[which], np.empty(x.shape), pair.numbers[SIDE]
     cos, sin = pose[2], pose[3]
-    for i in lanes(x.shape[1]):
+    for i in indices(x.shape[1]):
         a, b = x[0, i] - pose[0] - pose[4], x[1, i] - pose[1] - pose[5]
         y[0, i], y[1, i] = cos * a + sin * b + pose[4], cos * b - sin * a + pose[5]
     if pair.header[KIND] == CUSTOM:
         own_distance(pair.own, pair.header[OBSTACLE], pose[9], y, out)
     else:
         outline(pair.numbers[NUMBERS:], whole, y, out)
-    for i in lanes(x.shape[1]):
+    for i in indices(x.shape[1]):
         out[0, i] *= side
     if not whole:
         return
-    for i in lanes(x.shape[1]):
+    for i in indices(x.shape[1]):
         a, b = side * out[1, i], side * out[2, i]
         p, q, r = side * out[3, i], side * out[4, i], side * out[5, i]
         out[1, i], out[2, i] = cos * a - sin * b, sin * a + cos * b
@@ -129,10 +129,10 @@ def outline(shape, whole, y, out):
     """
     radius, low, high = shape[0], shape[1], shape[2]
     n, best = (shape.size - 3) // 5, np.empty(y.shape[1])
-    for i in lanes(y.shape[1]):
+    for i in indices(y.shape[1]):
         best[i] = 1e300
     for c in range(6 if whole else 1):
-        for i in lanes(y.shape[1]):
+        for i in indices(y.shape[1]):
             out[c, i] = 0.0
     for k in range(n):
         p, after = shape[3 + 5 * k:8 + 5 * k], shape[7 + 5 * ((k + 1) % n)]
@@ -140,7 +140,7 @@ def outline(shape, whole, y, out):
         ex, ey = p[2], p[3]
         square = np.maximum(ex * ex + ey * ey, TINY)
         nx, ny = ey / np.sqrt(square), -ex / np.sqrt(square)
-        for i in lanes(y.shape[1]):
+        for i in indices(y.shape[1]):
             a, b = y[0, i] - px, y[1, i] - py
             s = np.minimum(np.maximum((a * ex + b * ey) / square, low), high)
             c, d = a - s * ex, b - s * ey

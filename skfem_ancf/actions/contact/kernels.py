@@ -12,7 +12,7 @@ in a step: it is grown by ``INERTIA`` over the square of the step.
 
 import numpy as np
 
-from ...core.source import lanes, primitive, source
+from ...core.source import indices, primitive, source
 from ..tables import add_each
 from .active_set import near_points, project, projected, projection, stride, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface
@@ -104,10 +104,10 @@ def states(pair, begin, end, at, w):
     a, b, multiplier = projected(pair, begin), projected(pair, end), pair.memory[MULTIPLIER]
     part = 1.0 / hardening(pair)
     for c in range(4):
-        for i in lanes(at.size):
+        for i in indices(at.size):
             w[RATES + c, i] = b[c, at[i]] - a[c, at[i]]
             w[MIDDLE + c, i] = a[c, at[i]]
-    for i in lanes(at.size):
+    for i in indices(at.size):
         more = part * multiplier[at[i]]
         w[DEPTH, i], w[DEPTH + 1, i] = more - a[GAP, at[i]], more - b[GAP, at[i]]
         w[LAST, i], w[LAST + 1, i] = b[4, at[i]], b[5, at[i]]
@@ -115,7 +115,7 @@ def states(pair, begin, end, at, w):
         _carry(pair, a, at, w)
     if begin != end:
         for c in range(4):
-            for i in lanes(at.size):
+            for i in indices(at.size):
                 w[MIDDLE + c, i] += 0.5 * w[RATES + c, i]
     surface(pair, at, w[MIDDLE:RATES], w[PLACE:FOUND])
     levers(pair, at, w[MIDDLE:RATES], w[LEVER:PUSH])
@@ -126,7 +126,7 @@ def states(pair, begin, end, at, w):
 @source
 def _carry(pair, a, at, w):
     """Move points with the obstacle, from where it was or will be to where it is."""
-    for i in lanes(at.size):
+    for i in indices(at.size):
         x, y = carried(pair.poses[NOW], pair.poses[BEGIN], a[4, at[i]], a[5, at[i]])
         p, q = x - a[4, at[i]], y - a[5, at[i]]
         x, y = carried(pair.poses[NOW], pair.poses[END], w[LAST, i], w[LAST + 1, i])
@@ -141,7 +141,7 @@ def _carry(pair, a, at, w):
 def way(w):
     """How points of the surface move, of the rates of their places and slopes."""
     for k in range(2):
-        for i in lanes(w.shape[1]):
+        for i in indices(w.shape[1]):
             w[WAY + k, i] = (w[RATES + k, i] + w[LEVER + 2 * k, i] * w[RATES + 2, i]
                              + w[LEVER + 2 * k + 1, i] * w[RATES + 3, i])
 
@@ -155,7 +155,7 @@ def push(pair, at, w):
     area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], pair.numbers[WIDTH]
     part = hardening(pair)
     stiffness, holds = pair.numbers[STIFFNESS] * part, pair.common[BILATERAL] / part
-    for i in lanes(at.size):
+    for i in indices(at.size):
         a, b, scale, pulls = w[DEPTH, i], w[DEPTH + 1, i], stiffness * area[at[i]], holds * (
             multiplier[at[i]])
         mean = mean_pressure(a, b, width) - pulls
@@ -172,7 +172,7 @@ def push(pair, at, w):
 def _keep_work(pair, w):
     """By how much of their way forces miss that their work is what the potential changes by."""
     close = (CLOSE * pair.numbers[RADIUS]) ** 2
-    for i in lanes(w.shape[1]):
+    for i in indices(w.shape[1]):
         square = (w[RATES, i] * w[RATES, i] + w[RATES + 1, i] * w[RATES + 1, i]
                   + w[RATES + 2, i] * w[RATES + 2, i] + w[RATES + 3, i] * w[RATES + 3, i])
         missing = (w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
@@ -197,7 +197,7 @@ def rub(pair, same, at, w):
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     # what vibrates on the springs comes to rest: in a mean by itself
     calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
-    for i in lanes(at.size):
+    for i in indices(at.size):
         nx, ny = w[NX, i], w[NY, i]
         slip = slip_of(pose, nx, ny, w[LAST, i], w[LAST + 1, i], memory[ANCHOR_X, at[i]],
                        memory[ANCHOR_Y, at[i]])
@@ -219,7 +219,7 @@ def resist(pair, factor, at, w):
     """The force of damping in proportion to the pressure, and its derivative."""
     area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
     stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), pair.numbers[WIDTH]
-    for i in lanes(at.size):
+    for i in indices(at.size):
         k, a, nx, ny = stiffness * area[at[i]], w[DEPTH, i], w[NX, i], w[NY, i]
         loss = damping_loss(pose, damping, nx, ny, w[PLACE, i], w[PLACE + 1, i], w[WAY, i],
                             w[WAY + 1, i])
@@ -239,7 +239,7 @@ def _settle(pair, same, at, w, out):
     friction, sticking = _tangential(pair)
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     augmented, lost, where = pair.numbers[TOLERANCE] > 0.0, np.empty(at.size), 0 * at
-    for i in lanes(at.size):
+    for i in indices(at.size):
         nx, ny, x, y = w[NX, i], w[NY, i], w[LAST, i], w[LAST + 1, i]
         slip = slip_of(pose, nx, ny, x, y, memory[ANCHOR_X, at[i]], memory[ANCHOR_Y, at[i]])
         k, limit, gone = sticking * area[at[i]], friction * w[PRESSURE, i], w[WAY + 1, i] * nx - (
@@ -267,7 +267,7 @@ def _augment(pair, at, w, out):
         return
     where, far, square = 0 * at, np.empty(at.size), np.empty(at.size)
     k = hardening(pair)
-    for i in lanes(at.size):
+    for i in indices(at.size):
         before = multiplier[at[i]] / k
         change = np.maximum(w[DEPTH, i], 0.0) - before
         far[i] = 1.0 * (np.abs(change) > tolerance)
@@ -289,16 +289,16 @@ def _add_force(pair, at, w, out):
     """Add the forces on points of the surface to those on degrees of freedom."""
     value, turn, where = np.empty(at.size), np.empty(at.size), pair.first[at]
     for c in range(2):
-        for i in lanes(at.size):
+        for i in indices(at.size):
             turn[i] = (w[LEVER + c, i] * w[PUSH, i] + w[LEVER + 2 + c, i] * w[PUSH + 1, i]
                        + w[MISSING, i] * w[RATES + 2 + c, i])
         for a in range(pair.weights.shape[0]):
             row = pair.weights[a]
-            for i in lanes(at.size):
+            for i in indices(at.size):
                 value[i] = row[at[i]] * (w[PUSH + c, i] + w[MISSING, i] * w[RATES + c, i])
             if pair.slopes.shape[0] > 0:
                 row = pair.slopes[a]
-                for i in lanes(at.size):
+                for i in indices(at.size):
                     value[i] += row[at[i]] * turn[i]
             add_each(out[2 * a + c:], where, value)
 
@@ -309,13 +309,13 @@ def _stiffness(pair, at, w, S):
     offset = pair.points[OFFSET]
     for c in range(2):
         for d in range(2):
-            for i in lanes(at.size):
+            for i in indices(at.size):
                 S[4 * c + d, i] = w[K + 2 * c + d, i]
     if pair.slopes.shape[0] == 0:
         return
     for c in range(2):
         for d in range(2):
-            for i in lanes(at.size):
+            for i in indices(at.size):
                 # K L and L^T K
                 S[4 * c + 2 + d, i] = (w[K + 2 * c, i] * w[LEVER + d, i]
                                        + w[K + 2 * c + 1, i] * w[LEVER + 2 + d, i])
@@ -323,10 +323,10 @@ def _stiffness(pair, at, w, S):
                                          + w[LEVER + 2 + d, i] * w[K + 2 + c, i])
     for c in range(2):
         for d in range(2):
-            for i in lanes(at.size):
+            for i in indices(at.size):
                 S[4 * (2 + c) + 2 + d, i] = (w[LEVER + c, i] * S[2 + d, i]
                                              + w[LEVER + 2 + c, i] * S[6 + d, i])
-    for i in lanes(at.size):  # and the second derivative of the surface by the slope
+    for i in indices(at.size):  # and the second derivative of the surface by the slope
         s, t, p, q = w[MIDDLE + 2, i], w[MIDDLE + 3, i], w[PUSH, i], w[PUSH + 1, i]
         square = np.maximum(s * s + t * t, SHORT)
         c = offset[at[i]] / square / square / np.sqrt(square)
@@ -344,7 +344,7 @@ def _add_along(w, S, out):
     value, where = np.empty(w.shape[1]), np.zeros(w.shape[1], np.int64)
     for a in range(4):
         for b in range(4):
-            for i in lanes(value.size):
+            for i in indices(value.size):
                 value[i] = S[4 * a + b, i] * w[RATES + a, i] * w[RATES + b, i]
             add_each(out, where, value)
 
@@ -358,11 +358,11 @@ def _add_stiffness(pair, asked, at, S, flat):
         p, c = pair.weights[a // 2], 4 * (a % 2)
         for b in range(n if asked.top > 0 else a + 1):
             q, d = pair.weights[b // 2], b % 2
-            for i in lanes(at.size):
+            for i in indices(at.size):
                 value[i] = p[at[i]] * q[at[i]] * S[c + d, i]
             if pair.slopes.shape[0] > 0:
                 g, h = pair.slopes[a // 2], pair.slopes[b // 2]
-                for i in lanes(at.size):
+                for i in indices(at.size):
                     value[i] += (p[at[i]] * h[at[i]] * S[c + 2 + d, i]
                                  + g[at[i]] * (q[at[i]] * S[8 + c + d, i]
                                                + h[at[i]] * S[10 + c + d, i]))

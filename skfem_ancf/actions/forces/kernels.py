@@ -13,7 +13,7 @@ import numpy as np
 from ...core.band import clear, dot
 from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import own_elements, own_poses
-from ...core.source import F1, I1, lanes, primitive, shaped, source
+from ...core.source import F1, I1, indices, primitive, shaped, source
 from ..tables import add_products
 from ..contact.kernels import run_contacts
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
@@ -90,7 +90,7 @@ class ForceTables(NamedTuple):
 @source
 def vectors_of(tables, u, factor, out):
     """factor times the vectors in the stress-free state, and what u adds to them."""
-    for k in lanes(out.size):
+    for k in indices(out.size):
         out[k] = factor * tables.start[k]
     add_products(out, tables.at, tables.weight, u, tables.of)
 
@@ -115,7 +115,7 @@ ELASTIC, RESISTING, DERIVATIVES = range(3)
 
 @primitive("skfem_ancf.equations.loops")
 def run_kinds(tables, what, y, w, factor, out):
-    """As :func:`of_kinds`; compiled once, and not anew in each text that calls it."""
+    """As :func:`of_kinds`; compiled once, and not anew in each kernel that calls it."""
     of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)
 
 
@@ -188,7 +188,7 @@ def add_rubbing_tangent(tables, t, factor, u, v, A):
 
 @source
 def contact_work(tables, t, u, du, f):
-    """The product of the force at u and du; f is room, which is left at zero."""
+    """The product of the force at u and du; f is scratch, which is left at zero."""
     add_contact(tables.contacts, _at(FORCE, t), u, u, f)
     work = dot(f, du)
     clear(f)
@@ -258,7 +258,7 @@ def element_damping(tables, t, u, v, D):
     elastic = np.empty(tables.size)
     element_stiffness(tables, t, u, v, 1.0, D)
     element_stiffness(tables, t, u, v, 0.0, elastic)
-    for i in lanes(D.size):
+    for i in indices(D.size):
         D[i] -= elastic[i]
 
 
@@ -291,7 +291,7 @@ def of_kinds(kinds, what, y, w, factor, out):
 def elastic(kinds, y0, y1, F):
     """The forces of the kinds, means between two states; both may be the same."""
     p, a, b, f = _of(kinds, SPRING, y0, y1, VECTORS, F)
-    for e in lanes(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
+    for e in indices(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
         length = (np.sqrt(a[0, e] * a[0, e] + a[1, e] * a[1, e])
                   + np.sqrt(b[0, e] * b[0, e] + b[1, e] * b[1, e]))
         c = 0.5 * p[0, e] * (1.0 - 2.0 * p[1, e] / np.maximum(length, TINY))
@@ -299,7 +299,7 @@ def elastic(kinds, y0, y1, F):
     p, a, b, f = _of(kinds, TORSION, y0, y1, VECTORS, F)
     mean_moments(p, a, b, f)
     p, a, b, f = _of(kinds, FOUNDATION, y0, y1, VECTORS, F)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         s0 = pressed(p[2, e], p[3, e], a[0, e], a[1, e])
         s1 = pressed(p[2, e], p[3, e], b[0, e], b[1, e])
         p0 = s0 * (1.0 - p[4, e] * (s0 < 0.0))
@@ -318,8 +318,8 @@ def mean_moments(p, a, b, f):
     turned(p, a, turn[0])
     turned(p, b, turn[1])
     mean_turning(a, b, f)
-    for i in lanes(4):
-        for e in lanes(p.shape[1]):
+    for i in indices(4):
+        for e in indices(p.shape[1]):
             f[i, e] *= 0.5 * p[0, e] * (turn[0, e] + turn[1, e])
 
 
@@ -332,7 +332,7 @@ def pressed(nx, ny, x, y):
 @source
 def turned(p, y, out):
     """The angle from e to d, less that without a moment, in (-pi, pi]."""
-    for e in lanes(out.size):
+    for e in indices(out.size):
         cross = y[2, e] * y[1, e] - y[3, e] * y[0, e]
         dot = y[0, e] * y[2, e] + y[1, e] * y[3, e]
         out[e] = np.arctan2(p[2, e] * cross - p[3, e] * dot, p[2, e] * dot + p[3, e] * cross)
@@ -341,7 +341,7 @@ def turned(p, y, out):
 @source
 def turning(y, g):
     """The derivative of the angle from e to d by both."""
-    for e in lanes(g.shape[1]):
+    for e in indices(g.shape[1]):
         d, s = y[0, e] ** 2 + y[1, e] ** 2, y[2, e] ** 2 + y[3, e] ** 2
         g[0, e], g[1, e] = -y[1, e] / d, y[0, e] / d
         g[2, e], g[3, e] = y[3, e] / s, -y[2, e] / s
@@ -351,23 +351,23 @@ def turning(y, g):
 def resisting(kinds, y, w, G):
     """The forces of the kinds that resist velocities w."""
     p, d, v, f = _of(kinds, SPRING, y, w, VECTORS, G)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         square = d[0, e] * d[0, e] + d[1, e] * d[1, e]
         c = p[2, e] * (d[0, e] * v[0, e] + d[1, e] * v[1, e]) / np.maximum(square, TINY)
         f[0, e], f[1, e] = c * d[0, e], c * d[1, e]
     p, d, v, f = _of(kinds, TORSION, y, w, VECTORS, G)
     turning(d, f)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         c = p[1, e] * (f[0, e] * v[0, e] + f[1, e] * v[1, e] + f[2, e] * v[2, e]
                        + f[3, e] * v[3, e])
         f[0, e], f[1, e], f[2, e], f[3, e] = c * f[0, e], c * f[1, e], c * f[2, e], c * f[3, e]
     p, d, v, f = _of(kinds, FOUNDATION, y, w, VECTORS, G)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
         c = p[1, e] * (1.0 - p[4, e] * apart) * pressed(p[2, e], p[3, e], v[0, e], v[1, e])
         f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
     p, d, v, f = _of(kinds, DRAG, y, w, VECTORS, G)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
         along, across = v[0, e] * x + v[1, e] * z, v[1, e] * x - v[0, e] * z
@@ -379,7 +379,7 @@ def resisting(kinds, y, w, G):
 def derivatives(kinds, y, w, factor, D):
     """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j of zeros."""
     p, d, v, s = _of(kinds, SPRING, y, w, BLOCK, D)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         square = np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY)
         k = p[0, e] * p[1, e] / np.sqrt(square)
         c = (k + factor * p[2, e]) / square
@@ -390,13 +390,13 @@ def derivatives(kinds, y, w, factor, D):
     p, d, v, s = _of(kinds, TORSION, y, w, BLOCK, D)
     moment_derivatives(p, d, factor, s)
     p, d, v, s = _of(kinds, FOUNDATION, y, w, BLOCK, D)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
         c = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * apart)
         s[0, e], s[5, e] = c * p[2, e] * p[2, e], c * p[3, e] * p[3, e]
         s[1, e], s[4, e] = c * p[2, e] * p[3, e], c * p[2, e] * p[3, e]
     p, d, v, s = _of(kinds, DRAG, y, w, BLOCK, D)
-    for e in lanes(p.shape[1]):
+    for e in indices(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
         q = 2.0 * factor * p[1, e] * np.abs(v[0, e] * x + v[1, e] * z)
@@ -413,10 +413,10 @@ def moment_derivatives(p, d, factor, s):
     turned(p, d, turn)
     for i in range(4):
         for j in range(4):
-            for e in lanes(p.shape[1]):
+            for e in indices(p.shape[1]):
                 s[4 * i + j, e] = (p[0, e] + factor * p[1, e]) * g[i, e] * g[j, e]
     for k in range(2):  # the second derivative of the angle of d, and minus that of e
-        for e in lanes(p.shape[1]):
+        for e in indices(p.shape[1]):
             x, z = d[2 * k, e], d[2 * k + 1, e]
             c = (1.0 - 2.0 * k) * p[0, e] * turn[e] / (x * x + z * z) ** 2
             s[10 * k, e] += 2.0 * c * x * z

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..places import Vector
     from .base import ForceElement
 
-#: Kinds that the texts know.
+#: Kinds that the kernels know.
 KINDS = 4
 
 
@@ -103,7 +103,7 @@ class Forces:
         return tuple(np.concatenate(column) for column in zip(*found))
 
     def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
-        """What texts take."""
+        """What kernels take."""
         if not self.elements:
             return NO_FORCES
         at, of, weight, start = [], [], [], np.zeros(self.rows)

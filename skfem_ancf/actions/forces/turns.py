@@ -22,7 +22,7 @@ class Turns:
         self._system = system
         self._loads = [cast("EndMoment", load) for load in system.loads if load.turning]
         self.moments, self.number = len(self._loads), len(self._loads) + len(system.bodies)
-        pack = system.machine.tables.plain.loads.moments
+        pack = system.backend.tables.plain.loads.moments
         first = np.array([system.of(body).start for body in system.bodies], dtype=int)
         directions = np.array([body.q0[2:] for body in system.bodies]).reshape(-1, 2)
         self._groups = [(pack.dofs, pack.c, pack.start), (

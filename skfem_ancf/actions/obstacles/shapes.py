@@ -41,7 +41,7 @@ class Shape(Immutable):
     kind
         Its number in :mod:`skfem_ancf.actions.contact.tables`.
     numbers
-        What the texts take, shape (n,).
+        What the kernels take, shape (n,).
     pivot
         The point about which it turns, where its angle depends on time; shape (2,).
     hollow

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
-from ...core.source import F1, F2, lanes, primitive, room, source
+from ...core.source import F1, F2, indices, primitive, source
 
 #: Kinds of laws: constant moduli, a function of the strain at a point, and any other.
 LINEAR, POINTWISE, OWN = 0, 1, 2
@@ -77,11 +77,11 @@ def law_evaluate(law, strain, out):
         energy (1, ...).
     """
     n, size = strain.shape[1], strain.shape[2]
-    x = room(strain.shape, strain)
+    x = np.empty(strain.shape, strain.dtype)
     for c in range(3):  # the strain of the law: with its shear corrected
         y = law.scale[c]
-        for p in lanes(n):
-            for e in lanes(size):
+        for p in indices(n):
+            for e in indices(size):
                 x[c, p, e] = y * strain[c, p, e]
     if law.kind == POINTWISE:
         evaluate_points(law, x, out)
@@ -90,8 +90,8 @@ def law_evaluate(law, strain, out):
     for k in range(len(out)):
         y = 1.0 if len(out) == 1 else law.scale[k // (len(out) // 3)]
         y *= law.scale[k % 3] if len(out) == 9 else 1.0
-        for p in lanes(n):
-            for e in lanes(size):
+        for p in indices(n):
+            for e in indices(size):
                 out[k, p, e] *= y
 
 
@@ -111,16 +111,16 @@ def conserve(law, middle, change, S):
         The stress of the mean; changed.
     """
     n, size = S.shape[1], S.shape[2]
-    x, W = room((3, 2 * n, size), S), room((1, 2 * n, size), S)
+    x, W = np.empty((3, 2 * n, size), S.dtype), np.empty((1, 2 * n, size), S.dtype)
     before, after, old, new = x[:, :n], x[:, n:], W[0, :n], W[0, n:]
     for c in range(3):
-        for p in lanes(n):
-            for e in lanes(size):
+        for p in indices(n):
+            for e in indices(size):
                 before[c, p, e] = middle[c, p, e] - 0.5 * change[c, p, e]
                 after[c, p, e] = middle[c, p, e] + 0.5 * change[c, p, e]
     law_evaluate(law, x, W)
-    for p in lanes(n):
-        for e in lanes(size):
+    for p in indices(n):
+        for e in indices(size):
             a, b, c = change[0, p, e], change[1, p, e], change[2, p, e]
             square = a * a + b * b + c * c
             missing = (new[p, e] - old[p, e]

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.source import F1, F2, I1, I3, lanes, source
+from ...core.source import F1, F2, I1, I3, indices, source
 
 TINY = 1e-200
 
@@ -63,7 +63,7 @@ def mean_turning(a, b, g):
     step, has no moment on d and e together, as both are bilinear and do not change where d and e
     turn alike.
     """
-    for e in lanes(a.shape[1]):
+    for e in indices(a.shape[1]):
         c0, s0 = a[2, e] * a[0, e] + a[3, e] * a[1, e], a[2, e] * a[1, e] - a[3, e] * a[0, e]
         c1, s1 = b[2, e] * b[0, e] + b[3, e] * b[1, e], b[2, e] * b[1, e] - b[3, e] * b[0, e]
         dx, dy = 0.5 * (a[0, e] + b[0, e]), 0.5 * (a[1, e] + b[1, e])

@@ -60,7 +60,7 @@ def auto(needs_compiled, monkeypatch):
 
     monkeypatch.delenv(VARIABLE, raising=False)
     compiled, s = [], scene()
-    plain = s.system.machine.tables.plain
+    plain = s.system.backend.tables.plain
 
     def entry(function, args):
         compiled.append(function.__name__)
@@ -118,7 +118,7 @@ def test_members_and_steps_count(auto, monkeypatch):
         s.solve_static()
     assert loads == ["equilibrium"]
     small = scene()
-    assert not small.system.machine._missing("equilibrium")  # and so it is used at once
+    assert not small.system.backend._missing("equilibrium")  # and so it is used at once
     assert small.plan()["compiled loop"].reason.endswith("compiled code is loaded")
 
 
@@ -132,7 +132,7 @@ def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_pat
         with pytest.warns(CompilationWarning, match="each process compiles anew.*NUMBA_CACHE_DIR"):
             s.integrate(**STEPS, t_eval=[1.0])
         assert not loads  # it would not pay
-        assert backend.Machine(s.system).choose("steps").way == "plain"
+        assert backend.Backend(s.system).choose("steps").way == "plain"
     finally:
         for function in code_cache.folder, code_cache.can_keep, code_cache._warn_of:
             function.cache_clear()
@@ -181,8 +181,8 @@ entry(double, (np.ones(3), y))(np.ones(3), y)
 print(y.tolist())
 """
     (tmp_path / "small.py").write_text(
-        "from skfem_ancf.core.source import lanes, source\n\n\n@source\ndef double(x, y):\n"
-        "    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
+        "from skfem_ancf.core.source import indices, source\n\n\n@source\ndef double(x, y):\n"
+        "    for i in indices(x.size):\n        y[i] = 2.0 * x[i]\n")
     folder = tmp_path / "numba"
     if damage == "a file in the way":
         folder.write_text("")
