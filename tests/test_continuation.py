@@ -254,3 +254,34 @@ def test_supports_are_required():
     beam = Beam(mesh, ElementBeamANCF(1), StVenantKirchhoff(1.0, 0.3), 1.0, formulation="assumed")
     with pytest.raises(SupportError, match="rotation"):
         Scene(beam).pin("left").point_force((0, 1), at=(2, 0)).continuation()
+
+
+def past_the_maximum():
+    """Stop below 97 % of the largest load."""
+    been = [0.0]
+
+    def until(point):
+        been.append(point.load)
+        return point.load < 0.97 * max(been)
+
+    return until
+
+
+def arch(element, n, h=1e-3, angle=215.0):
+    """Clamped at the left, hinged at the right; the load factor is in EI / R^2."""
+    a = np.deg2rad(angle) / 2
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.sin(s), np.cos(s)]),
+                               np.linspace(-a, a, n + 1), h)
+    beam = Beam(mesh, element, StVenantKirchhoff(12 / (h**3 * 0.01), 0.3), 0.01,
+                formulation="assumed")
+    scene = Scene(beam).clamp("left", thickness="free").pin("right")
+    return scene.point_force((0, -1), at=(0, 1))
+
+
+@pytest.mark.parametrize("element, n, tol", [
+    (ElementBeamCable(5), 32, 1e-5), (ElementBeamANCFCubic(2), 48, 5e-3),
+    (ElementBeamANCF(2), 64, 0.2)])
+def test_limit_of_the_deep_arch(element, n, tol):
+    limits = arch(element, n).continuation(until=past_the_maximum()).limit_points()
+    assert len(limits) == 1
+    assert abs(limits[0] - exact.clamped_hinged_arch_limit()) < tol

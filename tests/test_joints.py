@@ -393,3 +393,47 @@ def test_points_inside_elements_are_held_in_any_unit(element):
     assert one[0] == pytest.approx(-0.02 * 0.7**2 * (0.3 / 4 + 0.7 / 3) / stiffness, rel=0.05)
     for L in (1e-8, 1e-3, 1e6):
         assert np.allclose(tips(L) / one, 1.0, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, 2.0, -0.8])
+def test_frame_against_slope_deflection(angle):
+    """A column with a rigid corner and a beam off it, loaded across the beam's end.
+
+    Small deflections: the beam's tip moves across by P L^3 / (3 EI) + (corner rotation) L, the
+    corner turns by P L H / (EI) plus the column's own share.
+    """
+    H, L, h, P = 1.0, 0.8, 0.02, 1e-5
+    EI = E * h**3 * 0.1 / 12
+    # at the corner the column ends in the direction (0, 1); the beam leaves at `angle` to it
+    d = np.array([-np.sin(angle), np.cos(angle)])
+    n = np.array([-d[1], d[0]])
+    corner = np.array([0.0, H])
+    a = between((0, 0), corner, 4, h=h, nu=0.0)
+    b = between(corner, corner + L * d, 4, h=h, nu=0.0)
+    scene = Scene(a, b).clamp("left", beam=a).point_force(P * n, corner + L * d, beam=b)
+    scene.joint("weld", beams=(a, b), at=("right", "left"))
+    state = scene.solve_static()
+    # column under an end force across it, Q = P n . (-1, 0), and an end moment P L
+    Q, M = -P * n[0], P * L
+    turn = Q * H**2 / (2 * EI) + M * H / EI
+    sway = Q * H**3 / (3 * EI) + M * H**2 / (2 * EI)
+    tip = np.array([-sway, 0.0]) + n * (turn * L + P * L**3 / (3 * EI))
+    found = state.displacement(corner + L * d, beam=b)
+    assert np.abs(found - tip).max() < 0.01 * np.hypot(*tip)
+    assert np.hypot(*tip) < 0.01
+
+
+def test_hinge_reactions_of_a_three_hinged_arch():
+    """Two bars that meet at the top: the thrust of a load there is P / (2 tan a)."""
+    P, a = 0.1, 0.6
+    top = np.array([np.cos(a), np.sin(a)])
+    left = between((0, 0), top, 1, E=1e8, name="left")
+    right = between((2 * top[0], 0), top, 1, E=1e8, name="right")
+    scene = Scene(left, right).pin("left", beam="left").pin("left", beam="right")
+    hinge = scene.joint("hinge", beams=(left, right), at=top)
+    scene.point_force((0, -P), top, beam=left)
+    state = scene.solve_static()
+    thrust = P / (2 * np.tan(a))
+    assert np.allclose(state.joint_force(hinge), [-thrust, P / 2], rtol=1e-4)
+    assert np.allclose(state.reactions("left", beam="left").force, [thrust, P / 2], rtol=1e-4)
+    assert np.allclose(state.reactions("left", beam="right").force, [-thrust, P / 2], rtol=1e-4)

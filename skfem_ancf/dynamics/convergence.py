@@ -29,14 +29,14 @@ AUGMENTED = 300
 #: Growth of a correction, with new factors, beyond which the step is given up.
 GROWTH = 2.0
 
-#: By the number in ``State.failure``.
+#: By the number in ``StepState.failure``.
 FAILURES = ("", "the iteration matrix is singular", "the residual is not finite",
             "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
             "the joints depend on each other",
             f"the pressures of method='augmented' do not settle in {AUGMENTED} iterations (a "
             "larger tolerance= of the obstacle, or method='penalty', helps)")
 SINGULAR, NOT_FINITE, DIVERGES, NOT_CONVERGED, DEPENDENT, UNSETTLED = range(1, 7)
-#: What ``State.factors`` is: no factors, those of the symmetric matrix, those of the other one.
+#: What ``StepState.factors`` is: no factors, those of the symmetric matrix, those of the other one.
 SYMMETRIC, TURNED = 1, 2
 #: How impulses of joints are found that are eliminated.
 ROUGHLY, EXACTLY = range(2)
@@ -44,7 +44,7 @@ ROUGHLY, EXACTLY = range(2)
 GO_ON, DONE, RESTART, FAILED = range(4)
 
 
-class State(NamedTuple):
+class StepState(NamedTuple):
     """What a run of steps keeps; arrays of one number, which the steps change.
 
     Attributes
@@ -86,10 +86,10 @@ class State(NamedTuple):
     mixed_steps: I1
 
 
-def new_state() -> State:
-    """The State before the first step."""
-    return State._make(np.zeros(1, int if hint is I1 else float)
-                       for hint in get_type_hints(State, include_extras=True).values())
+def new_state() -> StepState:
+    """The StepState before the first step."""
+    return StepState._make(np.zeros(1, int if hint is I1 else float)
+                       for hint in get_type_hints(StepState, include_extras=True).values())
 
 
 @source

@@ -358,7 +358,7 @@ class Integrator:
         self._state.factors[0] = 0
 
     def _load_state(self, values):
-        """Take values (fields, 1) of the State."""
+        """Take values (fields, 1) of the StepState."""
         for array, value in zip(self._state, values):
             array[:] = value
 

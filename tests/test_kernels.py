@@ -1,0 +1,180 @@
+"""Kernels: every kind, law and mesh, plain and compiled, against derivatives of the energy."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.beam.kernels import CableKernel, SectionKernel, arrays, law, loops, strain
+from skfem_ancf.core.switch import compiled_off
+from skfem_ancf.equations.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
+from skfem_ancf.formulations import get_formulation
+from skfem_ancf.materials import Material
+from skfem_ancf.sections import Across, Rectangle
+
+STEP = 1e-30
+
+
+class Soft(Material):
+    """A law of one's own: S = D eps + c eps^3, by component."""
+
+    def energy(self, strain):
+        return StVenantKirchhoff(self.E, self.nu).energy(strain) + 0.25e3 * self.E * np.sum(
+            strain**4, axis=0)
+
+    def stress(self, strain):
+        return StVenantKirchhoff(self.E, self.nu).stress(strain) + 1e3 * self.E * strain**3
+
+
+LAWS = {"linear": StVenantKirchhoff, "neo-hookean": NeoHookean, "own": Soft}
+MESHES = {
+    "uniform": lambda: MeshBeam.init_line(np.linspace(0, 1, 41), height=0.05),
+    "one": lambda: MeshBeam.init_line([0, 1], height=0.05),
+    "graded": lambda: MeshBeam.init_line(np.linspace(0, 1, 8) ** 1.5, height=0.05),
+    "curved": lambda: MeshBeam.init_curve(lambda t: np.array([np.sin(t), 1 - np.cos(t)]),
+                                          np.linspace(0, 1.5, 36), height=0.05)}
+KINDS = {
+    **{f"section-{k}": (SectionKernel, lambda: ElementBeamANCF(2), formulation, name)
+       for k, (formulation, name) in {
+           "linear": ("assumed", "linear"), "neo": ("assumed", "neo-hookean"),
+           "own": ("continuum", "own"), "split": ("strain-split", "linear")}.items()},
+    "section-cubic": (SectionKernel, lambda: ElementBeamANCFCubic(2), "assumed", "linear"),
+    "section-corrected": (SectionKernel, lambda: ElementBeamANCF(1), "assumed", "neo-hookean"),
+    "section-shear": (SectionKernel, lambda: ElementBeamANCF(1), "continuum", "own"),
+    "cable-3": (CableKernel, lambda: ElementBeamCable(3), "assumed", "linear"),
+    "cable-5": (CableKernel, lambda: ElementBeamCable(5), "assumed", "linear")}
+
+
+def kernel(kind, mesh):
+    cls, element, formulation, name = KINDS[kind]
+    mesh, element = MESHES[mesh](), element()
+    mesh = mesh if mesh.is_straight else mesh.with_sections(element.sections)
+    across = Across(mesh, element, Rectangle(0.02), LAWS[name](2e5, 0.3))
+    return cls(across, get_formulation(formulation))
+
+
+def states(k, size=2e-3):
+    rng = np.random.default_rng(1)
+    u = size * rng.standard_normal(k.N)
+    return u, u + size * rng.standard_normal(k.N)
+
+
+def close(a, b, tol=1e-11):
+    size = np.max(np.abs(b))
+    assert np.max(np.abs(a - b)) <= tol * size, np.max(np.abs(a - b)) / size
+
+
+every = pytest.mark.parametrize("mesh", MESHES)
+kinds = pytest.mark.parametrize("kind", KINDS)
+
+
+def dense(k, tangents):
+    K = np.zeros((k.N, k.N))
+    for start, block in zip(k.t[0] * k.nd, tangents):
+        K[start:start + 2 * k.nd, start:start + 2 * k.nd] += block
+    return K
+
+
+def system_of(kind, mesh):
+    _, element, formulation, name = KINDS[kind]
+    return Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+
+
+@kinds
+@every
+def test_force_and_tangent_are_derivatives_of_the_energy(kind, mesh):
+    k = kernel(kind, mesh)
+    u, v = states(k)
+    d = v - u
+    if kind.startswith("cable"):
+        h = 1e-4
+        slope = (k.energy(u - 2 * h * d) - 8 * k.energy(u - h * d) + 8 * k.energy(u + h * d)
+                 - k.energy(u + 2 * h * d)) / (12 * h)
+        change = (k.force(u - 2 * h * d) - 8 * k.force(u - h * d) + 8 * k.force(u + h * d)
+                  - k.force(u + 2 * h * d)) / (12 * h)
+        tol = 1e-9
+    else:
+        slope = np.imag(k.energy(u + 1j * STEP * d)) / STEP
+        change = np.imag(k.force(u + 1j * STEP * d)) / STEP
+        tol = 1e-11
+    assert abs(k.force(u) @ d - slope) < tol * np.abs(k.force(u)) @ np.abs(d)
+    close(dense(k, k.tangents(u)) @ d, change, tol)
+    close(k.scatter(k.forces(u)), k.force(u))
+
+
+@kinds
+@every
+def test_work_of_the_mean_force_is_the_change_of_the_energy(kind, mesh):
+    k = kernel(kind, mesh)
+    u, v = states(k)
+    f = k.mean_force(u, v)
+    work, change = f @ (v - u), k.energy(v) - k.energy(u)
+    assert abs(work - change) < 1e-12 * (np.abs(f) @ np.abs(v - u)) + 1e-13 * k.energy(v)
+
+
+@kinds
+@every
+def test_a_translation_has_no_force_at_all(kind, mesh):
+    k = kernel(kind, mesh)
+    u = np.zeros((len(k.scatter(np.zeros((k.t.shape[1], k.nd, 2)))) // k.nd, k.nd))
+    u[:, 0], u[:, 1] = 1e3 / 3.0, -7e5 / 3.0
+    assert not k.force(u.ravel()).any()
+    f = k.force(1e-3 * np.random.default_rng(1).standard_normal(k.N)).reshape(-1, k.nd)
+    assert np.max(np.abs(f[:, :2].sum(axis=0))) <= 1e-12 * np.max(np.abs(f[:, :2]))
+
+
+@kinds
+@pytest.mark.parametrize("mesh", ["one", "graded", "curved"])
+def test_loops_are_arrays(kind, mesh, monkeypatch):
+    """The steps for Numba, run by Python, beside those for NumPy."""
+    k, found, none, ld = kernel(kind, mesh), [], np.zeros(0), 2 * kernel(kind, mesh).nd + 3
+    u, v = states(k)
+    for steps in (arrays, loops):
+        for name in vars(loops):
+            if hasattr(strain, name) and hasattr(arrays, name):
+                monkeypatch.setattr(strain, name, getattr(steps, name))
+        for what in range(12):
+            f, flat, written = np.zeros(k.N), np.zeros(2 * k.N * ld), []
+            for t in k.tables:
+                ns = len(t.start) * t.rows.shape[1]
+                given = np.sin(np.arange(1.0, ns + 1.0))
+                if what >= strain.PUSH and t.law.kind != law.LINEAR:
+                    given = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
+                elif what < strain.PUSH and what not in (strain.CARRY, strain.GIVEN):
+                    given = none
+                gradients = what == strain.GRADIENTS
+                written.append(np.zeros(4 * ns * k.nd if gradients else ns))
+                strain.evaluate(t, np.int64(what), u, v, f, given, written[-1],
+                                none if gradients else flat, 2 * ld)
+            found.append((f, flat, np.concatenate(written)))
+    sizes = [np.max(np.abs(x)) for x in found[strain.TANGENT]]  # others are what cancels
+    for one, other in zip(found[:12], found[12:]):
+        for a, b, size in zip(one, other, sizes):
+            assert np.max(np.abs(a - b)) <= 1e-13 * max(size, np.max(np.abs(a)))
+
+
+@pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind][3] != "own"])  # in NumPy
+@every
+def test_compiled_is_plain(kind, mesh):
+    """All that is asked of kernels, through the function that is compiled for scenes anyway."""
+    system = system_of(kind, mesh)
+    tables, n = system.machine.tables, len(system.machine.tables.stresses)
+    u, v = states(system)
+    before, rng = np.zeros((2, n)), np.random.default_rng(2)
+    for what in (FORCE, TANGENT, CARRY, STRESS, MEAN):
+        for use_carried in (False, True):
+            stresses, carried = before + rng.standard_normal((2, n))
+            found = []
+            for run in (partial(evaluate, tables.plain), system.machine.of(evaluate)):
+                tables.plain.K.flat[:] = 0.0
+                f, S, C = np.zeros(system.N), stresses.copy(), carried.copy()
+                args = (what, u, v, tables.static_factors(1.0), np.nan, 1.0, use_carried, S, C,
+                        f)
+                run(*args)
+                found.append((f, S, C, tables.plain.K.flat.copy()))
+            assert any(np.any(x) for x in found[0])
+            for a, b in zip(*found):
+                assert np.max(np.abs(a - b)) <= 2e-13 * np.max(np.abs(a))
