@@ -2,6 +2,7 @@
 
 from .actions.axial import FollowerForce, LineLoad
 from .actions.eigenstrain import EigenStrain, Temperature
+from .actions.energy import Energy
 from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
                              TorsionalSpring)
 from .actions.item import Item
@@ -40,7 +41,8 @@ __all__ = [
     "HHT", "AncfError", "Beam", "Buckling", "CallError", "CallbackError", "Circle", "Clamp",
     "Control", "ConvergenceError", "CriticalPoint", "DeadLoad", "Drag", "EigenStrain",
     "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamANCFHermite",
-    "ElementBeamCable", "ElementBeamPatelShabana", "EndMoment", "EnergyMomentum", "FileError",
+    "ElementBeamCable", "ElementBeamPatelShabana", "EndMoment", "Energy", "EnergyMomentum",
+    "FileError",
     "FollowerForce", "ForceElement", "FormLoad", "Formulation", "Foundation", "Frame", "Gauss",
     "GeneralizedAlpha", "Hinge", "History", "InputError", "Item", "Joint", "KelvinVoigt",
     "Line", "LineLoad", "Load", "Material", "MeshBeam", "MeshError", "MissingExtra",

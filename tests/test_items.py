@@ -35,6 +35,10 @@ def upwards(v, w):
     return 100.0 * v[1]
 
 
+def bedding(r, F, X, t):
+    return 500.0 * np.sum((r - X) ** 2, axis=0)
+
+
 #: Arguments of each item on the first of two beams that overlap from (0.5, 0) to (1, 0).
 ARGUMENTS = {
     "clamp": ("right", 0), "pin": ("right", 0), "fix": ("right", "r^2", 0.0, 0),
@@ -42,7 +46,8 @@ ARGUMENTS = {
     "point_force": ((0.0, 1.0), (1.0, 0.0), 0), "follower_force": ((0.0, 1.0), (1.0, 0.0), 0),
     "line_load": ((0.0, 1.0), 0), "traction": ("top", (0.0, 10.0), 0), "pressure": ("top", 10.0, 0),
     "temperature": (10.0, 0), "eigenstrain": (1e-4, None, None, 0), "moment": ("right", 0.1, 0),
-    "load": (upwards, None, 0), "spring": (50.0, ((0, (1.0, 0.0)), (1.0, 1.0)), 1.0),
+    "load": (upwards, None, 0), "energy": (bedding, None, None, "cells", 0),
+    "spring": (50.0, ((0, (1.0, 0.0)), (1.0, 1.0)), 1.0),
     "torsional_spring": (1.0, "right", 0.1, 0), "control": (law, (0, (1.0, 0.0)), "force", None,
                                                             {"tip": (0, (1.0, 0.0))}),
     "foundation": (1e3, "bottom", False, 1.0, 0), "drag": (1.0, 1.0, 0.1),

@@ -143,6 +143,11 @@ class Load(Item):
     pushes: Sequence[Array] = ()
     for_bodies = False
 
+    @property
+    def first_order(self) -> bool:
+        """Its stiffness counts in linear theory: of a load of the user's, as a spring's does."""
+        return not ours(self)
+
     def __init__(self, beam: WhichMember = None, amplitude: TimeFunction = None) -> None:
         self.beam, self.amplitude = beam, amplitude
 

@@ -4,6 +4,7 @@ from typing import Any
 
 from .axial import FollowerForce, LineLoad
 from .eigenstrain import EigenStrain, Temperature
+from .energy import Energy
 from .forces import Control, Drag, Foundation, PointMass, Spring, TorsionalSpring
 from .joints import JOINTS, Motor
 from .loads import EndMoment, FormLoad, PointForce, Pressure, Traction, Weight
@@ -26,6 +27,7 @@ ITEMS: dict[str, Any] = {
     "eigenstrain": EigenStrain,
     "moment": EndMoment,
     "load": FormLoad,
+    "energy": Energy,
     "spring": Spring,
     "torsional_spring": TorsionalSpring,
     "control": Control,

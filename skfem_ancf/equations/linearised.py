@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.origin import ours
 
 if TYPE_CHECKING:
     from ..core.types import Array
@@ -57,7 +56,7 @@ def linear_external_force(system: System, base: Array, d: Array) -> Array:
     """
     out, at_rest = np.array(system.external_force(base)), not base.any()
     for one in system.loads:
-        s, stiff = system.of(one), not one.constant and not (at_rest and ours(one))
+        s, stiff = system.of(one), not one.constant and not (at_rest and not one.first_order)
         if at_rest and one.pushes:  # of laws that are not linear
             pushed: Any = one
             out[s] += pushed.beam.kernel.scatter(pushed.small_forces(pushed.at_rest)) - (

@@ -14,7 +14,6 @@ from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.law import LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import linearised
-from ..core.origin import ours
 from ..core.callbacks import handle_of
 from ..core.sampling import sample
 from ..core.source import F1, I1
@@ -278,7 +277,7 @@ class Tables:
 
         That the package's loads follow the body is of second order there.
         """
-        own = [load is not None and not ours(load) for load in self._columns]
+        own = [load is not None and load.first_order for load in self._columns]
         return np.where(own, self.static_factors(scale), 0.0)
 
     @cached_property

@@ -11,7 +11,6 @@ from weakref import proxy
 import numpy as np
 
 from ..core.linalg import dense
-from ..core.origin import ours
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,7 +73,7 @@ class UserDefined:
         """
         system = self._system
         for load in self._loads:
-            if np.isinf(t) and ours(load):
+            if np.isinf(t) and not load.first_order:
                 continue
             first, (factor, acting) = system.of(load).start, load.acting(
                 t if np.isfinite(t) else None)

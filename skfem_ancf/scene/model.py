@@ -16,6 +16,7 @@ from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass
 from ..actions.item import Item
 from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
 from ..actions.joints.sliders import slider
+from ..actions.energy import Energy
 from ..actions.loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight
 from ..actions.obstacles import Obstacle
 from ..actions.places import joined
@@ -434,6 +435,16 @@ class Model:
              amplitude: TimeFunction = None) -> Self:
         """Any scikit-fem ``LinearForm`` as a dead load: a :class:`~skfem_ancf.FormLoad`."""
         return self.add(FormLoad(form, boundary, beam, amplitude))
+
+    @parameters_of(Energy)
+    def energy(self, psi: Callable[..., Any], gradient: Callable[..., Any] | None = None,
+               hessian: Callable[..., Any] | None = None, over: Place = "cells",
+               beam: WhichBeam = None, amplitude: TimeFunction = None) -> Self:
+        """An energy density of position, deformation gradient, point and time: an Energy.
+
+        See :class:`~skfem_ancf.Energy`.
+        """
+        return self.add(Energy(psi, gradient, hessian, over, beam, amplitude))
 
     # force elements
 

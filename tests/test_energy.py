@@ -1,0 +1,163 @@
+"""Energies of one's own, against closed forms and differential equations solved by SciPy."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_bvp
+from scipy.optimize import minimize_scalar
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Energy,
+                        InputError, MeshBeam, Scene, StVenantKirchhoff)
+
+MATERIAL = StVenantKirchhoff(2e8, 0.0, 1000.0)
+
+
+def cantilever(n=16, height=0.005, width=0.01, element=None, material=MATERIAL):
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, n + 1), height)
+    beam = Beam(mesh, element or ElementBeamANCFCubic(2), material, width)
+    return Scene(beam).clamp("left", thickness="free")
+
+
+def stiffness(height, width):
+    return MATERIAL.E * width * height**3 / 12
+
+
+# closed forms
+
+
+@pytest.mark.parametrize("over", ["axis", "cells", "bottom"])
+def test_a_long_beam_on_an_elastic_bedding(over):
+    """Hetenyi, "Beams on elastic foundation" (1946): a force at the end of a half-infinite beam."""
+    height, width, force = 0.001, 0.01, 1e-6
+    k = 4.0 * 10.0**4 * stiffness(height, width)
+    size = {"axis": k, "cells": k / (width * height), "bottom": k / width}[over]
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 41), height)
+    scene = Scene(Beam(mesh, ElementBeamANCFCubic(2), MATERIAL, width)).clamp("right")
+    scene.energy(lambda r, F, X, t: 0.5 * size * ((r - X)**2).sum(axis=0), over=over)
+    state = scene.point_force((0.0, force), at=(0.0, 0.0)).solve_static()
+    x = np.linspace(0.0, 0.5, 6)
+    found = state.displacement(np.array([x, 0.0 * x]))[1]
+    assert_allclose(found, 2.0 * force * 10.0 / k * np.exp(-10.0 * x) * np.cos(10.0 * x),
+                    rtol=0, atol=2e-3 * found[0])
+
+
+def test_a_gravity_potential_is_gravity():
+    def weight(r, F, X, t):
+        return 1000.0 * 9.81 * r[1]
+
+    one, two = cantilever().gravity((0.0, -9.81)), cantilever().energy(weight)
+    for solve in ("solve_linear", "solve_static"):
+        a, b = getattr(one, solve)(), getattr(two, solve)()
+        assert_allclose(b.u, a.u, rtol=0, atol=1e-10 * np.abs(a.u).max())
+    one, two = cantilever(4, 0.05).gravity((0.0, -9.81)), cantilever(4, 0.05).energy(weight)
+    a, b = (s.integrate(0.02, 1e-3) for s in (one, two))
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-8 * np.abs(a.u).max())
+    assert_allclose(b.total_energy - b.total_energy[0], 0.0, atol=1e-9 * b.kinetic_energy.max())
+
+
+def test_a_magnetic_rod_buckles_in_an_opposing_field():
+    """Magnetised along its axis, -B . F M is -A M B . (r(L) - r(0)): the column of Euler.
+
+    Zhao, Kim, Cheng, Zhao: "Mechanics of hard-magnetic soft materials", Journal of the Mechanics
+    and Physics of Solids 124 (2019).
+    """
+    height, width, M = 0.005, 0.01, 1e4
+    field = np.pi**2 / 4.0 * stiffness(height, width) / (width * height * M)
+    scene = cantilever(height=height, width=width)
+    scene.energy(lambda r, F, X, t: field * M * F[0, 0])
+    assert scene.buckling(1).factors[0] == pytest.approx(1.0, abs=1e-4)
+
+
+def pull_in():
+    """The largest load of w'''' = load / (1 - w)^2 of a cantilever, over the deflection of its end.
+    """
+    x = np.linspace(0.0, 1.0, 41)
+
+    def load(tip):
+        found = solve_bvp(lambda x, y, p: np.array([y[1], y[2], y[3], p[0] / (1.0 - y[0])**2]),
+                          lambda a, b, p: np.array([a[0], a[1], b[2], b[3], b[0] - tip]),
+                          x, tip * np.array([x**2, 2 * x, 2 + 0 * x, 0 * x]), [1.0], tol=1e-8)
+        return found.p[0]
+
+    best = minimize_scalar(lambda tip: -load(tip), bounds=(0.3, 0.6), method="bounded")
+    return -best.fun
+
+
+def test_an_electrode_pulls_a_beam_in():
+    """Parallel plates: the force per area is that of the gap; above a voltage there is no state."""
+    height, width, gap = 0.002, 0.01, 0.01
+    unit = stiffness(height, width) / width * gap**3  # of the force at rest per area times gap^2
+
+    def plates(r, F, X, t):
+        return -unit / (gap + r[1] - X[1])
+
+    load = pull_in()
+    scene = cantilever(8, height, width).energy(plates, over="bottom")
+    path = scene.continuation(max_load=1.5 * load, ds=0.2)
+    limit = next(p for p in path.critical_points if p.kind == "limit")
+    assert limit.load == pytest.approx(load, rel=1e-3)
+
+
+# derivatives, shapes of problems
+
+
+def soft(r, F, X, t):
+    J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+    return 50.0 * (((r - X)**2).sum(axis=0) + J**2 * r[1]) + 10.0 * F[0, 1]**2
+
+
+def soft_gradient(r, F, X, t):
+    J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+    d = 100.0 * (r - X)
+    d[1] += 50.0 * J**2
+    P = 100.0 * J * r[1] * np.array([[F[1, 1], -F[1, 0]], [-F[0, 1], F[0, 0]]])
+    P[0, 1] += 20.0 * F[0, 1]
+    return d, P
+
+
+def test_derivatives_given_and_found_agree():
+    a, b = (cantilever(4, 0.1, 0.1, ElementBeamANCF(2)).gravity((0.0, -9.81)).energy(
+        soft, gradient).solve_static() for gradient in (None, soft_gradient))
+    assert_allclose(a.u, b.u, rtol=0, atol=1e-10)
+    assert str(a.verdict).startswith("stable")
+
+
+@pytest.mark.parametrize("over", ["cells", "axis", "top", "right"])
+def test_the_total_energy_is_kept(over):
+    scene = cantilever(4, 0.05, 0.05, material=StVenantKirchhoff(2e6, 0.3, 1000.0))
+    scene.gravity((0.0, -9.81)).energy(
+        lambda r, F, X, t: 400.0 * ((r - X)**2).sum(axis=0)**2 + 20.0 * F[0, 1]**2, over=over)
+    history = scene.integrate(0.2, 5e-3, scheme="energy-momentum")
+    assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
+
+
+def test_recovered_forces_know_a_body_force():
+    one = cantilever().gravity((0.0, -9.81)).solve_static()
+    two = cantilever().energy(lambda r, F, X, t: 9810.0 * r[1]).solve_static()
+    for at in ((0.0, 0.0), (0.4, 0.0)):
+        a, b = one.resultants(at), two.resultants(at)
+        assert_allclose((b.M, b.Q), (a.M, a.Q), rtol=1e-6)
+
+
+def test_it_depends_on_time():
+    scene = cantilever(4, 0.05).energy(lambda r, F, X, t: -1e4 * t * r[1])
+    ramp = cantilever(4, 0.05).gravity((0.0, 10.0), amplitude=lambda t: t)
+    a, b = (s.integrate(0.02, 1e-3) for s in (scene, ramp))
+    assert_allclose(a.u, b.u, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("psi, gradient, words", [
+    (lambda r, F, X, t: r, None, "must return the shape"),
+    (lambda r, F, X, t: np.abs(r[1]), None, "complex"),
+    (lambda r, F, X, t: np.nan * r[1], None, "NaN"),
+    (lambda r, F, X, t: r[1], lambda r, F, X, t: (2.0 + 0.0 * r, 0.0 * F), "not the derivative"),
+    (lambda r, F, X, t: r[1], lambda r, F, X, t: r, "two arrays"),
+    (3, None, "must be a function")])
+def test_what_is_no_energy_is_said(psi, gradient, words):
+    with pytest.raises(InputError, match=words):
+        cantilever(2).energy(psi, gradient)
+
+
+def test_a_cable_has_none():
+    with pytest.raises(InputError, match="elements with sections"):
+        cantilever(2, element=ElementBeamCable(5)).add(Energy(soft))
