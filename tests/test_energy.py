@@ -55,6 +55,44 @@ def test_a_gravity_potential_is_gravity():
     assert_allclose(b.total_energy - b.total_energy[0], 0.0, atol=1e-9 * b.kinetic_energy.max())
 
 
+def arch(element):
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                               np.linspace(0.0, 2.0, 7), height=0.1)
+    beam = Beam(mesh, element, StVenantKirchhoff(2e8, 0.3, 1000.0), width=0.1)
+    return Scene(beam).clamp("left")
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCFCubic(3)])
+def test_a_gravity_potential_of_an_arch(element):
+    a = arch(element).gravity((0.0, -9.81)).solve_static()
+    b = arch(element).energy(lambda r, F, X, t: 9810.0 * r[1]).solve_static()
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-9 * np.abs(a.u).max())
+
+
+@pytest.mark.parametrize("over", ["cells", "axis", "top", "right"])
+def test_the_gradient_is_that_of_the_place(over):
+    """Of a bent arch r is the place of the state, and F the differences of that."""
+    seen = []
+
+    def look(r, F, X, t):
+        if not np.iscomplexobj(r):
+            seen.append((r, F, X))
+        return 0.0 * r[0]
+
+    scene = arch(ElementBeamANCF(2)).gravity((0.0, -9.81)).energy(look, over=over)
+    state = scene.solve_static()
+    item, = (one for one in scene.system.loads if hasattr(one, "psi"))
+    seen.clear()
+    item.potential(state.u)
+    r, F, X = seen[-1]
+    flat = X.reshape(2, -1)
+    assert_allclose(r.reshape(2, -1), state.position(flat), rtol=0, atol=1e-9)
+    if over == "cells":
+        step = 1e-5 * np.eye(2)[:, :, None]
+        slopes = [(state.position(flat + d) - state.position(flat - d)) / 2e-5 for d in step]
+        assert_allclose(F.reshape(2, 2, -1), np.stack(slopes, axis=1), rtol=0, atol=1e-5)
+
+
 def test_a_magnetic_rod_buckles_in_an_opposing_field():
     """Magnetised along its axis, -B . F M is -A M B . (r(L) - r(0)): the column of Euler.
 

@@ -325,8 +325,7 @@ def _parts_of(beam, over):
 def _points(beam, where, elements, X, weights, rule):
     mapping = beam.mesh.mapping()
     N, d_xi, d_eta = np.broadcast_arrays(*beam.element.of_mesh(mapping, X, elements))
-    rates, frame = mapping.in_frame(X, elements)
-    slopes = np.einsum("ckep,jkep->jcep", rates, frame)  # derivatives of xi and eta by X_j
-    G = [d_xi * slopes[j, 0] + d_eta * slopes[j, 1] for j in range(2)]
+    rates = mapping.invDF(X, elements)
+    G = [d_xi * rates[0, j] + d_eta * rates[1, j] for j in range(2)]
     functions = np.ascontiguousarray(np.stack([N, *G], axis=-1).swapaxes(0, 1))
     return _Points(where, elements, rule, np.asarray(mapping.F(X, elements)), weights, functions)
