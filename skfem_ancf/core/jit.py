@@ -13,9 +13,8 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any
 
-from numba import carray, cfunc, njit, types, typeof
-from numba.experimental import structref
-from numba.extending import intrinsic, overload
+from numba import cfunc, njit, types, typeof
+from numba.extending import intrinsic, lower_getattr_generic, models, overload, register_model
 
 from .code_cache import cannot_keep, can_keep, key, nothing_collected
 from .source import MARKED
@@ -53,14 +52,82 @@ def _register(function, found):
         return found if callable(found) else found[len(args)]
 
 
-@structref.register
-class Struct(types.StructRef):
-    """What a named tuple is in compiled code: passed as one pointer, where a tuple would be as
-    all numbers of all its arrays, which takes far longer to compile.
+class Record(types.NamedTuple):
+    """A named tuple by its address, that of its :class:`~skfem_ancf.core.words.Words`.
+
+    A field is read where it is used. Of tuples of a hundred arrays, by value, Numba counts all
+    references wherever they are passed on, and takes ten times as long to compile.
+
+    Parameters
+    ----------
+    kind
+        The class of named tuples.
     """
 
+    dtype = types.int64  # of the words
 
-structref.define_attributes(Struct)
+    def __init__(self, kind: Any) -> None:
+        super().__init__([type_of(hint) for hint in hints(kind)], kind)
+        sizes = [size_of(hint) for hint in hints(kind)]
+        self.name = f"Record({kind.__module__}.{kind.__qualname__})"
+        self.places = {name: (self.types[k], sum(sizes[:k])) for k, name in enumerate(self.fields)}
+
+
+register_model(Record)(models.PointerModel)
+
+
+@lower_getattr_generic(Record)
+def _read(context, builder, record, pointer, name):
+    """A field from its words."""
+    kind, at = record.places[name]
+
+    def place(k):
+        return builder.gep(pointer, [context.get_constant(types.intp, k)])
+
+    def load(place):
+        found = builder.load(place)
+        found.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return found
+
+    if isinstance(kind, Record):
+        return builder.bitcast(place(at), context.get_value_type(kind))
+    if not isinstance(kind, types.Array):
+        value = context.get_value_type(kind)
+        if kind == types.boolean:
+            return builder.trunc(load(place(at)), value)
+        return load(builder.bitcast(place(at), value.as_pointer()))
+    array = context.make_array(kind)(context, builder)
+    array.data = builder.inttoptr(load(place(at)), array.data.type)
+    shape = [load(place(at + 1 + k)) for k in range(kind.ndim)]
+    step, strides = context.get_constant(types.intp, 8), []
+    for n in reversed(shape):
+        strides.insert(0, step)
+        step = builder.mul(step, n)
+    size = context.get_constant(types.intp, 1)
+    for n in shape:
+        size = builder.mul(size, n)
+    numbers = types.UniTuple(types.intp, kind.ndim)
+    array.shape = context.make_tuple(builder, numbers, shape)
+    array.strides = context.make_tuple(builder, numbers, strides)
+    array.itemsize, array.nitems = context.get_constant(types.intp, 8), size
+    array.meminfo = context.get_constant_null(types.MemInfoPointer(kind.dtype))
+    array.parent = context.get_constant_null(types.pyobject)
+    return array._getvalue()
+
+
+@cache
+def reader(kind: Any) -> Any:
+    """A function of the address of :class:`~skfem_ancf.core.words.Words`: their Record."""
+    made = Record(kind)
+
+    @intrinsic
+    def of(typing, address):
+        def generate(context, builder, signature, args):
+            return builder.inttoptr(args[0], context.get_value_type(made))
+
+        return made(types.int64), generate
+
+    return of
 
 
 def type_of(hint: Any) -> Any:
@@ -72,7 +139,15 @@ def type_of(hint: Any) -> Any:
         return types.Array(_DTYPES[kind[0]], int(kind[1]), "C")
     if kind in SCALARS:
         return SCALARS[kind]
-    return Struct([(name, type_of(x)) for name, x in zip(kind._fields, hints(kind))])
+    return Record(kind)
+
+
+def size_of(hint: Any) -> int:
+    """How many words an annotation has."""
+    kind = getattr(hint, "__metadata__", [hint])[0]
+    if isinstance(kind, str):
+        return 1 + int(kind[1])
+    return 1 if kind in SCALARS else sum(map(size_of, hints(kind)))
 
 
 def compiled(function: Any) -> Any:
@@ -85,8 +160,7 @@ def compiled(function: Any) -> Any:
 def entry(function: Any, args: Any) -> Any:
     """The compiled function for Python, compiled or taken from disk.
 
-    Named tuples are given as their words: Numba takes longer to unpack a hundred arrays than a
-    small scene takes to solve.
+    Named tuples are given as their words, see :class:`Record`.
 
     Parameters
     ----------
@@ -197,49 +271,3 @@ def caller(*hints: Any) -> Any:
         return types.void(types.int64, types.Tuple(takes)), generate
 
     return call
-
-
-def _pointer(kind):
-    """What makes a pointer of an address."""
-    @intrinsic
-    def pointer(typing, address):
-        def generate(context, builder, signature, args):
-            return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
-
-        return types.CPointer(kind)(types.int64), generate
-
-    return pointer
-
-
-_POINTERS = {letter: _pointer(kind) for letter, kind in _DTYPES.items()}
-
-
-@cache
-def reader(kind: Any) -> Any:
-    """A function of the address of :class:`~skfem_ancf.core.words.Words`: their named tuple."""
-    names: dict[str, Any] = {"carray": carray, "new": structref.new, **_POINTERS}
-    lines: list[str] = []
-
-    def read(kind, at):
-        made = f"t{len(names)}"
-        names[f"{made}_type"] = type_of(kind)
-        lines.append(f"{made} = new({made}_type)")
-        for field, hint in zip(kind._fields, hints(kind)):
-            code = getattr(hint, "__metadata__", [hint])[0]
-            if isinstance(code, str):
-                shape = "".join(f"w[{at + 1 + k}], " for k in range(int(code[1])))
-                value = f"carray({code[0]}(w[{at}]), ({shape}))"
-                at += 1 + int(code[1])
-            elif code in SCALARS:
-                value, at = f"{'x' if code is float else 'w'}[{at}]", at + 1
-            else:
-                value, at = read(code, at)
-            lines.append(f"{made}.{field} = {value}")
-        return made, at
-
-    made, size = read(kind, 0)
-    code = "".join(f"    {line}\n" for line in (
-        f"w = carray(i(address), ({size},))", f"x = carray(f(address), ({size},))", *lines,
-        f"return {made}"))
-    exec(f"def read(address):\n{code}", names)  # noqa: S102
-    return njit(**OPTIONS)(names["read"])
