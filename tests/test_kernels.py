@@ -161,14 +161,14 @@ def test_loops_are_arrays(kind, mesh, monkeypatch):
 def test_compiled_is_plain(kind, mesh):
     """All that is asked of kernels, through the function that is compiled for scenes anyway."""
     system = system_of(kind, mesh)
-    tables, n = system.machine.tables, len(system.machine.tables.stresses)
+    tables, n = system.backend.tables, len(system.backend.tables.stresses)
     u, v = states(system)
     before, rng = np.zeros((2, n)), np.random.default_rng(2)
     for what in (FORCE, TANGENT, CARRY, STRESS, MEAN):
         for use_carried in (False, True):
             stresses, carried = before + rng.standard_normal((2, n))
             found = []
-            for run in (partial(evaluate, tables.plain), system.machine.of(evaluate)):
+            for run in (partial(evaluate, tables.plain), system.backend.of(evaluate)):
                 tables.plain.K.flat[:] = 0.0
                 f, S, C = np.zeros(system.N), stresses.copy(), carried.copy()
                 args = (what, u, v, tables.static_factors(1.0), np.nan, 1.0, use_carried, S, C,
