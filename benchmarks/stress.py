@@ -138,7 +138,7 @@ def slenderness(quick, out):
             u, iterations, steps = tip(cantilever(ELEMENTS[name], line(16, 1 / s), soft(1 / s)))
             yield Row(check, f"L/h = {s:g}, gravity, {name}", "error of the tip", u - thin_limit(),
                       LIMIT_ERROR[name], f"{iterations} iterations, {steps} load step(s)")
-            # at 1e6 the round-off of the tangent decides: 9 mostly, up to 19 of slendernesses beside
+            # at 1e6 the round-off of the tangent decides: 9 mostly, up to 19 beside it
             yield Row(check, f"L/h = {s:g}, gravity, {name}", "iterations", iterations,
                       40 if s > 1e5 else 12)
             w = scaled_eigenvalues(Beam(line(4, 1 / s), ELEMENTS[name], soft(1 / s), WIDTH,
