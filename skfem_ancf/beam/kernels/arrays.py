@@ -159,8 +159,8 @@ def from_points(t, first, S):
 @step
 def weighted(t, H, strain):
     """Moduli (nq, ne) times strains, (ns, ne)."""
-    (s, m), T = t.pairs, np.zeros((len(strain), H.shape[1]), np.result_type(H, strain))
-    np.add.at(T, s, H * strain[m])
+    s, m = t.pairs
+    T = np.add.reduceat(H * strain[m], np.searchsorted(s, np.arange(len(strain))))
     np.add.at(T, m[s != m], (H * strain[s])[s != m])
     return T
 
@@ -215,7 +215,7 @@ def add_material(t, H, X, Y, w):
     X, Y = X.reshape(-1, 2, X.shape[3]), Y.reshape(-1, 2, X.shape[3])
     half = np.where(a == b, 0.5, 1.0)[:, None] * H[q]
     x = half[:, None, None] * X[a][:, :, None] * Y[b][:, None]
-    np.add.at(w, product, x.reshape(len(a), 4, -1))
+    w += np.add.reduceat(x.reshape(len(a), 4, -1), np.searchsorted(product, np.arange(len(w))))
 
 
 @step

@@ -52,7 +52,7 @@ class StrainTables(NamedTuple):
         Rows g <= h of the products that tangents are made of, (2, np).
     terms
         Which product, which two rows a and b of samples, and which modulus make a coefficient, (4,
-        nt): rows g of the samples are the first ns, rows h the others.
+        nt), sorted by products: rows g of the samples are the first ns, rows h the others.
     of
         The product of g and h of each sample, (ns,).
     H
@@ -107,7 +107,7 @@ def _products(rows, pairs, size):
                 if s < t or a <= b:
                     terms.append([product(a, b), *sorted((a, b), key=lambda c: row[c]), q])
     return tuple(np.array(x, np.int64) for x in (
-        np.transpose(list(found)), np.transpose(terms), of))
+        np.transpose(list(found)), np.transpose(sorted(terms)), of))
 
 
 def products_of(rows: Any, pairs: Any) -> Any:
