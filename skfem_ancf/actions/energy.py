@@ -202,7 +202,7 @@ class Energy(Load):
         return out
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        rows, columns, values, nd = [], [], [], self.beam.nd
+        rows, columns, values = [], [], []
         for part in self._parts:
             n, nb, points, _ = part.functions.shape
             A = self._curvature(self._of_points(part, u), part.X) * part.weights
@@ -211,8 +211,7 @@ class Energy(Load):
             AT = A.reshape(n, points, 12, 3) @ T.transpose(0, 2, 3, 1)  # (n, np, (i, k, j), nb)
             AT = AT.reshape(n, points, 2, 3, 2, nb).transpose(0, 1, 3, 2, 5, 4)
             K = T.reshape(n, nb, -1) @ AT.reshape(n, 3 * points, -1)  # (n, nb, (i, b, j))
-            dofs = (self.beam.mesh.t[:, part.elements].T[:, :, None] * nd + np.arange(nd)).reshape(
-                n, -1)
+            dofs = self.beam.basis.element_dofs.T[part.elements]
             i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
             rows.append(i.ravel())
             columns.append(j.ravel())
@@ -324,8 +323,7 @@ def _parts_of(beam, over):
 
 def _points(beam, where, elements, X, weights, rule):
     mapping = beam.mesh.mapping()
-    N, d_xi, d_eta = np.broadcast_arrays(*beam.element.of_mesh(mapping, X, elements))
-    rates = mapping.invDF(X, elements)
-    G = [d_xi * rates[0, j] + d_eta * rates[1, j] for j in range(2)]
-    functions = np.ascontiguousarray(np.stack([N, *G], axis=-1).swapaxes(0, 1))
+    N, grad = beam.element.functions(mapping, X, elements)
+    both = np.stack(np.broadcast_arrays(N, grad[:, 0], grad[:, 1]), axis=-1)
+    functions = np.ascontiguousarray(both.swapaxes(0, 1))
     return _Points(where, elements, rule, np.asarray(mapping.F(X, elements)), weights, functions)

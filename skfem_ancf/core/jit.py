@@ -99,17 +99,15 @@ def _read(context, builder, record, pointer, name):
     array = context.make_array(kind)(context, builder)
     array.data = builder.inttoptr(load(place(at)), array.data.type)
     shape = [load(place(at + 1 + k)) for k in range(kind.ndim)]
-    step, strides = context.get_constant(types.intp, 8), []
+    bytes_each = context.get_constant(types.intp, 8)
+    size, strides = context.get_constant(types.intp, 1), []
     for n in reversed(shape):
-        strides.insert(0, step)
-        step = builder.mul(step, n)
-    size = context.get_constant(types.intp, 1)
-    for n in shape:
+        strides.insert(0, builder.mul(bytes_each, size))
         size = builder.mul(size, n)
     numbers = types.UniTuple(types.intp, kind.ndim)
     array.shape = context.make_tuple(builder, numbers, shape)
     array.strides = context.make_tuple(builder, numbers, strides)
-    array.itemsize, array.nitems = context.get_constant(types.intp, 8), size
+    array.itemsize, array.nitems = bytes_each, size
     array.meminfo = context.get_constant_null(types.MemInfoPointer(kind.dtype))
     array.parent = context.get_constant_null(types.pyobject)
     return array._getvalue()

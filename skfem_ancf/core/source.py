@@ -10,7 +10,7 @@ an index of :func:`indices` is a number in the one and a slice in the other::
             for e in indices(strain.shape[1]):
                 N[p, e] = EA * strain[p, e]
 
-Rules of such a function, where ``e`` is an index of indices:
+Rules of such a function, where ``e`` comes from :func:`indices`:
 
 * statements on ``[..., e]`` only: no ``if`` on values, sums into ``s[e]`` and not into a number,
   ``np.sqrt`` and not ``math.sqrt``; ``e`` takes no part in arithmetic, an array of numbers

@@ -89,7 +89,7 @@ class StepState(NamedTuple):
 def new_state() -> StepState:
     """The StepState before the first step."""
     return StepState._make(np.zeros(1, int if hint is I1 else float)
-                       for hint in get_type_hints(StepState, include_extras=True).values())
+                           for hint in get_type_hints(StepState, include_extras=True).values())
 
 
 @source

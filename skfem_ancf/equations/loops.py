@@ -1,7 +1,6 @@
 """Large parts of compiled code, each behind an address: kernels, force elements, contact, laws."""
 
 from functools import cache
-from types import FunctionType
 from typing import Annotated, Any
 
 import numpy as np
@@ -69,30 +68,29 @@ def part(name: str) -> int:
 @cache
 def law(function: Any) -> int:
     """The address of a material law; one of another package is compiled in each process."""
-    kernel = FunctionType(_of_points.__code__, {"point": compiled(function)}, "_of_points")
-    kernel.__module__ = __name__
-    return address(kernel, _LAW, f"_{function.__module__}_{function.__qualname__}", ours(function))
+    return address(_of_points(compiled(function)), _LAW,
+                   f"_{function.__module__}_{function.__qualname__}", ours(function))
 
 
-def _of_points(constants, strain, out):
-    """What ``point`` gives at all points: energies, stresses or moduli as ``out`` is long."""
-    for p in range(strain.shape[1]):
-        for e in range(strain.shape[2]):
-            W, S, D = point(constants, strain[0, p, e], strain[1, p, e], strain[2, p, e])
-            if len(out) == 1:
-                out[0, p, e] = W
-            elif len(out) == 3:
-                out[0, p, e], out[1, p, e], out[2, p, e] = S
-            else:
-                out[0, p, e], out[4, p, e], out[8, p, e] = D[0], D[3], D[5]
-                out[1, p, e] = out[3, p, e] = D[1]
-                out[2, p, e] = out[6, p, e] = D[2]
-                out[5, p, e] = out[7, p, e] = D[4]
+def _of_points(point):
+    """What a function of the strain gives at all points: energies, stresses or moduli, as long as
+    ``out`` is.
+    """
+    def of_points(constants, strain, out):
+        for p in range(strain.shape[1]):
+            for e in range(strain.shape[2]):
+                W, S, D = point(constants, strain[0, p, e], strain[1, p, e], strain[2, p, e])
+                if len(out) == 1:
+                    out[0, p, e] = W
+                elif len(out) == 3:
+                    out[0, p, e], out[1, p, e], out[2, p, e] = S
+                else:
+                    out[0, p, e], out[4, p, e], out[8, p, e] = D[0], D[3], D[5]
+                    out[1, p, e] = out[3, p, e] = D[1]
+                    out[2, p, e] = out[6, p, e] = D[2]
+                    out[5, p, e] = out[7, p, e] = D[4]
 
-
-def point(constants, xx, yy, xy):
-    """The function of the law, in the namespace of a copy of :func:`_of_points`."""
-    raise NotImplementedError
+    return of_points
 
 
 def flat(plain: Equations) -> tuple[Equations, list[Words]]:

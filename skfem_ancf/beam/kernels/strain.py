@@ -83,8 +83,9 @@ def add_forces_at(t, what, u, du, given, shift, out, f):
     for first in range(0, len(t.start), block()):
         last = min(first + block(), len(t.start))
         d = displaced(t, first, last, u)
-        dd = displaced(t, first, last, du) if du.size > 0 else np.zeros_like(d)
-        strain, X = sampled(t, first, d, dd if mean else np.zeros_like(d))
+        still = np.zeros_like(d)
+        dd = displaced(t, first, last, du) if du.size > 0 else still
+        strain, X = sampled(t, first, d, dd if mean else still)
         change = strain[:0]
         if rate or mean:
             change = changed(t, dd, X)
@@ -112,7 +113,10 @@ def add_tangent(t, u, given, material, shift, out, f, to):
         last = min(first + block(), len(t.start))
         d = displaced(t, first, last, u)
         strain, X = sampled(t, first, d, np.zeros_like(d))
-        T = _stress(t, first, strain, strain[:0], shift)
+        if f.size > 0 or out.size > 0 or given.size == 0:
+            T = _stress(t, first, strain, strain[:0], shift)
+        else:
+            T = stresses_at(given, first, last)
         w, K = np.zeros((t.products.shape[1], 4, last - first)), np.zeros((last - first, n, n))
         if f.size > 0:
             add_forces(t, first, X, T, f)
@@ -206,20 +210,20 @@ def evaluate(t, what, u, v, f, given, out, flat, ld):
         both = shaped(out, (2, ne, ns, 2 * t.G.shape[2] + 2))
         put_gradients(t, u, both[0], both[1])
     S = shaped(none if what == GRADIENTS else out, (-1, ns))
+    du = none
+    if what == MEAN or what == PUSH_MEAN or what == TURNED:
+        du = v - u
+    elif what == CARRY or what == VISCOUS:
+        du = v
     if what == TURNED:
-        add_turned(t, u, v - u, Destination(flat, ld))
+        add_turned(t, u, du, Destination(flat, ld))
     elif what == TANGENT or what == PUSH_TANGENT or what == GRADIENTS:
         if flat.size > 0:
             add_tangent(t, u, T, what != PUSH_TANGENT or shifted, shift, S, f,
                         Destination(flat, ld))
     else:
-        du = none
-        if what == MEAN or what == PUSH_MEAN:
-            du = v - u
-        elif what == CARRY or what == VISCOUS:
-            du = v
         add_forces_at(t, what, u, du, T, shift, S, f)
     if what == MEAN:
-        add_constant_force(t, u + 0.5 * (v - u), f)
+        add_constant_force(t, u + 0.5 * du, f)
     elif what == FORCE or what == TANGENT:
         add_constant_force(t, u, f)
