@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable, Sequence
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..beam.beam import Beam
+from ..beam.distribution import AXIS, Sampled, Spread
 from ..beam.interpolation import probe
-from ..core.errors import ask_field, require_finite
 from ..beam.kernels.section import beam_gradients
-from .item import Item
-from .loads import DeadLoad, Load, number_at
-from ..core.quadrature import gauss
+from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.points import Points
 from ..beam.rigid import RigidBody, on_body
-from ..beam.distribution import AXIS, Sampled, Spread
+from ..core.errors import ask_field, require_finite
+from ..core.quadrature import gauss
+from ..core.types import Array, TimeFunction
 from ..mesh.places import as_point
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..beam.beam import Beam
-    from ..core.types import Array, TimeFunction
-    from ..beam.layout import Layout, WhichBeam, WhichMember
+from .item import Item
+from .loads import DeadLoad, Load, number_at
 
 
 class FollowerForce(Load):

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
+from ..beam.layout import Layout
 from ..core.errors import AncfError, InputError, require_finite, shown
+from ..core.types import Array
 from .forces.base import ForceElement, Part, bind_force, derivative, try_force
 from .item import Item, beside, require_entries
 from .joints.base import Joint, bind_joint, require_derivatives
 from .loads import Load, bind_load
 from .places import Vector
 from .supports import Support
-
-if TYPE_CHECKING:
-    from ..beam.layout import Layout
-    from ..core.types import Array
 
 
 def bind_item(item: Item, layout: Layout) -> list[Item]:

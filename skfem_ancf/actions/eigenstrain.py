@@ -8,29 +8,26 @@ the points of integration, E0 sampled and interpolated there as the formulation 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from scipy import sparse
 
-from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
-from ..formulations import COMPONENTS
-from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
-from ..beam.strains import on_grid, strain_at, stretched
+from ..beam.beam import Beam
+from ..beam.distribution import Spread
 from ..beam.kernels.kernel import stresses_of
+from ..beam.layout import Layout, WhichBeam
+from ..beam.strains import on_grid, strain_at, stretched
+from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from ..core.linear import stress_of
+from ..core.types import Array, TimeFunction
+from ..formulations import COMPONENTS
+from ..sections import Layer
 from .item import Item, takes_time
 from .loads import Load
-from ..beam.distribution import Spread
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..beam.beam import Beam
-    from ..sections import Layer
-    from ..core.types import Array, TimeFunction
-    from ..beam.layout import Layout, WhichBeam
+from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
 
 #: Products of a function of place and one of time that a function of both may be.
 MOST = 8

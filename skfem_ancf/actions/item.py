@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..beam.layout import Layout
 from ..core.errors import InputError, require_finite
 from ..core.immutable import Immutable
+from ..core.types import Array
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
     from typing_extensions import Self
-
-    from ..beam.layout import Layout
-    from ..core.types import Array
 
 
 class Item(Immutable):

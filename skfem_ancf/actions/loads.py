@@ -9,42 +9,36 @@ from __future__ import annotations
 import copyreg
 import re
 import sys
-from functools import partial
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
 from importlib import import_module
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from skfem.assembly import FacetBasis, LinearForm, asm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam.kinematics import direction
-from ..mesh.places import node_of
-from ..beam.interpolation import locate, probe
 from ..beam.beam import Beam
+from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
+from ..beam.interpolation import locate, probe
+from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
+from ..beam.kinematics import direction
+from ..beam.layout import Layout, WhichBeam, WhichMember
+from ..beam.rigid import RigidBody, on_body
+from ..beam.surfaces import add_nodal, surfaces_of
 from ..core.errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_finite_scalar, require_function,
-                           require_slope, shown, warnings_as_errors, warn)
+                           require_slope, shown, warn, warnings_as_errors)
 from ..core.immutable import read_only
-from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
-from functools import cached_property
 from ..core.origin import ours
-from ..mesh.places import facets_of
-from ..beam.rigid import RigidBody, on_body
-from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
-from ..beam.surfaces import add_nodal, surfaces_of
+from ..core.types import Array, Place, TimeFunction
+from ..mesh.places import facets_of, node_of
 from .item import Item, beside, require_entries
 from .places import members_at, nearest_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array, Place, TimeFunction
-    from ..beam.layout import Layout, WhichBeam, WhichMember
 
 
 #: A traction on a cable is warned of where the moment by its lever across is more than this part

@@ -6,21 +6,18 @@ points of integration depends on the strain and, not in proportion, on the size 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..formulations import COMPONENTS
+from ..beam.beam import Beam
 from ..beam.kernels.arrays import at_points
 from ..beam.kernels.kernel import energy_at, strains, stresses_of
 from ..beam.kernels.law import LINEAR
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..beam.beam import Beam
-    from ..core.types import Array
+from ..core.types import Array
+from ..formulations import COMPONENTS
 
 
 #: Half of the points across a layer, and what is no part of a strain relative to the largest.

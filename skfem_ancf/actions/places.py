@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..core.errors import InputError, MeshError, require_finite, shown
-from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
 from ..beam.interpolation import locate, probe_reference
 from ..beam.kinematics import direction as direction_of, direction_weights
+from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..beam.layout import Layout, WhichMember
-    from ..core.types import Array
+from ..core.errors import InputError, MeshError, require_finite, shown
+from ..core.types import Array
+from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
 
 #: What a joint or a spring calls the ground in the place of a beam.
 GROUND = "ground"

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, SupportError, require_finite_scalar, require_option, shown
-from ..mesh.places import is_point, node_of
+from ..beam.layout import Layout, WhichBeam
 from ..beam.rigid import RigidBody, on_body
+from ..core.errors import InputError, SupportError, require_finite_scalar, require_option, shown
+from ..core.types import Place
+from ..mesh.places import is_point, node_of
 from .item import Item
 from .joints.hinge import Hinge
 from .joints.plane_section import PlaneSection
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..beam.layout import Layout, WhichBeam
-    from ..core.types import Place
 
 
 class Support(Item):

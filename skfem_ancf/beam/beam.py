@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
+from scipy.sparse import csr_matrix
 from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
                            require_label, require_like, require_names, require_unmasked, shown)
 from ..core.immutable import Immutable, read_only
+from ..core.types import Array, Place
 from ..elements import ElementBeam, choose_element
 from ..formulations import get_formulation
+from ..formulations.base import Formulation, Term
 from ..materials import Material
 from ..materials.damping import KelvinVoigt
 from ..mesh.location import Finder
@@ -22,19 +27,9 @@ from ..mesh.mesh_beam import MeshBeam, reach
 from ..mesh.places import facets_of
 from ..sections import Across, Rectangle, Section
 from . import kinematics
-from .masses import exact_rule, masses_of
 from .interpolation import probe
+from .masses import Masses, exact_rule, masses_of
 from .strains import BeamLayer, Interpolation, on_grid, strain_at, stress_at
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-    from scipy.sparse import csr_matrix
-
-    from ..formulations.base import Formulation, Term
-    from .masses import Masses
-    from ..core.types import Array, Place
 
 
 def reference_coordinates(basis: Basis) -> Array:

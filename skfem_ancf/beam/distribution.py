@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from ..core.quadrature import lagrange
+from ..core.types import Array
+from ..elements.base import ElementBeam
+from ..mesh.mesh_beam import MeshBeam
 from ..sections.jumps import jumps
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from .beam import Beam
-    from ..elements.base import ElementBeam
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array
+from .beam import Beam
 
 #: Places nearer than this part of an element to a node are at the node.
 SNAP = 1e-5

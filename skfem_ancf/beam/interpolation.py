@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.types import Array
 from ..mesh.places import as_point
+from .rigid import RigidBody
 from .strains import strain_at, stress_at
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .rigid import RigidBody
-    from ..core.types import Array
 
 #: How far from the middle of the section, relative to its height, the axis of a cable reaches.
 ON_AXIS = 1e-12

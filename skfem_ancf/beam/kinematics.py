@@ -6,19 +6,16 @@ normal to the axis, and get thinner so that S_yy = 0.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .kernels import CableKernel, SectionKernel
 from ..core.errors import InputError, ModelWarning, warn
 from ..core.linear import first_order
 from ..core.quadrature import gauss
+from ..core.types import Array
+from .kernels import CableKernel, SectionKernel
 from .strains import cable_axis, fibres
-
-if TYPE_CHECKING:
-
-    from ..core.types import Array
 
 #: Part of the deflection of a cantilever, by a force at its end, that is not left out silently.
 SHEARED = 1e-3

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.linalg import BandMatrix
-from ..mesh.mapping import cross
 from ..core.quadrature import gauss, product_rule, tensor
+from ..core.types import Array, Rule
 from ..formulations.ecm import AXIS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array, Rule
+from ..mesh.mapping import cross
 
 #: Points along an element more, where the height is a cubic or something varies.
 MORE = 4

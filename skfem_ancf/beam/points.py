@@ -6,24 +6,20 @@ array of two numbers; many are an array of shape (2, n), as in scikit-fem, or a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .layout import select_beam, select_member
 from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
-from .interpolation import BeamPoints, BodyPoints, Located
+from ..core.types import Array
+from ..mesh.mesh_beam import MeshBeam
 from ..mesh.places import as_point
+from .beam import Beam
+from .interpolation import BeamPoints, BodyPoints, Located
+from .layout import WhichMember, select_beam, select_member
 from .rigid import RigidBody
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .beam import Beam
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array
-    from .layout import WhichMember
 
 
 def is_many(points: Any) -> bool:

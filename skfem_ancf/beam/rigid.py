@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..core.errors import (InputError, require_finite, require_finite_scalar,
-                           require_label, require_names, require_positive, shown)
+from ..core.errors import (InputError, require_finite, require_finite_scalar, require_label,
+                           require_names, require_positive, shown)
 from ..core.immutable import Immutable, read_only, rebuilt
 from ..core.linear import angle_of
+from ..core.types import Array
 from ..mesh.places import as_point
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
 
 #: Components of the degrees of freedom: the position of the centre of mass, and the director.
 NAMES = ("r^1", "r^2", "d^1", "d^2")

@@ -1,20 +1,18 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy
 from ..core.source import I1, I2, primitive, shaped, source
+from .beam import Beam
 from .kernels.arrays import add_changes, add_pushes
 from .kernels.law import LINEAR
 from .kernels.strain import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS,
                              run)
 from .kernels.tables import CABLE, StrainTables, repeated, together
-
-if TYPE_CHECKING:
-    from .beam import Beam
 
 #: Columns of the table of a body: first stress of the tables and the one behind the last; samples
 #: of an element and degrees of freedom; first gradient and the one behind the last; the kind.

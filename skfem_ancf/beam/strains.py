@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
 
+from ..core.types import Array, Law, Rule
 from ..formulations import COMPONENTS
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..core.types import Array, Law, Rule
-    from ..formulations.base import Term
+from ..formulations.base import Term
 
 #: Points that are evaluated at once.
 CHUNK = 3072

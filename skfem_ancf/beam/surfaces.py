@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from ..mesh.places import facets_of
 from ..core.quadrature import gauss
+from ..core.types import Array, Place
+from ..mesh.mesh_beam import MeshBeam
+from ..mesh.places import facets_of
+from .beam import Beam
 from .distribution import Facets, station_of_node
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .beam import Beam
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array, Place
 
 #: Sides of an element, as facets are numbered in it; the body is on the left along the first two.
 BOTTOM, RIGHT, TOP, LEFT = range(4)

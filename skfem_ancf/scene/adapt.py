@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..elements.base import DEGREES
+from ..actions.joints.nodes import chain_ends
+from ..beam.beam import Beam
 from ..core.errors import (ConvergenceError, InputError, NameUnknown, require_integer,
                            require_positive)
-from ..actions.joints.nodes import chain_ends
 from ..core.quadrature import gauss
+from ..core.types import Array
+from ..elements.base import DEGREES
+from ..results.state import State
 from .solve import solve_static
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..beam.beam import Beam
-    from ..results.state import State
-    from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..actions.axial import LineLoad
-from ..beam.beam import Beam
-from ..beam.rigid import RigidBody
-from ..beam.kinematics import direction
-from ..results.arguments import displacement
-from ..elements import ElementBeamCable
-from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
-                           require_integer, require_names, require_option, require_options,
-                           require_positive, shown,
-                           require_unmasked)
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
+from ..beam.beam import Beam
+from ..beam.kinematics import direction
+from ..beam.layout import WhichBeam
+from ..beam.rigid import RigidBody
+from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
+                           require_integer, require_names, require_option, require_options,
+                           require_positive, require_unmasked, shown)
+from ..core.types import Array, TimeFunction
+from ..elements import ElementBeamCable
 from ..mesh.frame_files import net_from_meshio
 from ..mesh.frame_graph import Net, mapping_of
 from ..mesh.places import as_point
+from ..results.arguments import displacement
+from ..results.state import State
 from .scene import Scene
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..results.state import State
-    from ..core.types import Array, TimeFunction
-    from ..beam.layout import WhichBeam
 
 #: What is given for all lines, or for those of a group.
 BEAM = "height", "material", "width", "section", "element", "formulation", "damping", "compiled"

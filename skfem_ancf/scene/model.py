@@ -4,40 +4,36 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from numpy.typing import ArrayLike
+from skfem.assembly import LinearForm
 
 from ..actions.axial import FollowerForce, LineLoad
 from ..actions.binding import bind_item
 from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
+from ..actions.energy import Energy
 from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
                               TorsionalSpring)
 from ..actions.item import Item
 from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
 from ..actions.joints.sliders import slider
-from ..actions.energy import Energy
 from ..actions.loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight
-from ..actions.obstacles import Obstacle
+from ..actions.obstacles import Obstacle, Shape
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
 from ..beam.beam import Beam
-from ..beam.layout import Layout
+from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody
 from ..core.errors import InputError, shown
+from ..core.types import Array, Place, TimeFunction
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import ArrayLike
-    from skfem.assembly import LinearForm
     from typing_extensions import Self
-
-    from ..actions.obstacles import Shape
-    from ..beam.layout import WhichBeam, WhichMember
-    from ..core.types import Array, Place, TimeFunction
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 

@@ -2,44 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..actions.loads import Load
-from ..beam.layout import select_beam
+from ..beam.beam import Beam
+from ..beam.layout import WhichBeam, WhichMember, select_beam
 from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite,
                            require_finite_scalar, require_label, require_positive, shown)
+from ..core.types import Array, StrPath
 from ..dynamics import choose_scheme, get_scheme
+from ..dynamics.base import Scheme
 from ..dynamics.checkpoint import resume
 from ..dynamics.choice import RTOL
+from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
 from ..dynamics.sensors import Sensor, locate
+from ..equations.system import System
 from ..results.arguments import configuration, displacement
+from ..results.modes import Buckling, Modes
 from ..results.path import CriticalPoint, Path
 from ..results.state import State
 from ..solvers import continuation, eigen
 from ..visuals.html import scene_html
 from .adapt import solve_adaptive
 from .model import Model
-from .plan import make_plan
-from .solve import (critical_of, solve_linear, solve_static, system_of, velocity_of, warn_about)
+from .plan import Plan, make_plan
+from .solve import critical_of, solve_linear, solve_static, system_of, velocity_of, warn_about
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
     from typing_extensions import Self
-
-    from ..beam.beam import Beam
-    from ..beam.layout import WhichBeam, WhichMember
-    from ..core.types import Array, StrPath
-    from ..dynamics.base import Scheme
-    from ..dynamics.history import History
-    from ..equations.system import System
-    from ..results.modes import Buckling, Modes
-    from .plan import Plan
 
 
 class Scene(Model):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,24 +11,20 @@ from ..actions.forces import PointMass
 from ..actions.forces.base import ForceElement
 from ..actions.joints import Joint
 from ..actions.loads import Load, PointForce, bind_load
+from ..beam.beam import Beam
+from ..beam.layout import Layout
 from ..beam.masses import projected
 from ..beam.rigid import RigidBody
 from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
                            SupportError, ask_field, require_finite, require_options, shown, warn)
+from ..core.types import Array
 from ..equations.linearised import linear_external_force, linear_force
 from ..equations.system import System
+from ..materials.damping import Damping
 from ..results.checks import warn_of
 from ..results.path import CriticalPoint
 from ..results.state import State
 from ..solvers import eigen, newton
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..beam.beam import Beam
-    from ..beam.layout import Layout
-    from ..core.types import Array
-    from ..materials.damping import Damping
 
 OPTIONS = ("method", "tol", "max_iterations", "first_step", "min_step", "progress", "stable")
 #: How often a linear system is solved at most, with one factorisation; the degrees of freedom up to

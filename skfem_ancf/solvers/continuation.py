@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,14 +11,9 @@ from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrup
                            require_function, require_integer, require_positive, shown)
 from ..core.progress import progress_bar
 from ..core.switch import expecting
-from .critical import find_critical
+from ..equations.system import System
+from .critical import Critical, find_critical
 from .tracing import Failed, Point, Tracer
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..equations.system import System
-    from .critical import Critical
 
 logger = logging.getLogger(__name__)
 #: Evaluations of the equations in a step, about.

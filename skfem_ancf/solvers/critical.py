@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from .tracing import Point, Tracer
+from ..core.types import Array
+from .tracing import Point, Tracer
 
 #: How often a step is halved to tell critical points from each other.
 DEPTH = 12

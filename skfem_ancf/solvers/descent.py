@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
@@ -11,14 +12,10 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from ..actions.forces.turns import Turns
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS
+from ..core.types import Array
 from ..equations.stability import position_weights, potential, verdict
+from ..equations.system import System
 from .outcome import Equilibrium, StaticResult, StepFailed
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
-    from ..equations.system import System
 
 logger = logging.getLogger(__name__)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
@@ -12,13 +10,11 @@ from ..core.band import fix
 from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportError,
                            require_integer, warn)
 from ..core.linalg import NO_FACTORS
+from ..core.types import Array
+from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
+from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
-from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
 
 DENSE = 600  # free coordinates up to which the dense solver is used
 WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it

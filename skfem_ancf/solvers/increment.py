@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError
+from ..core.types import Array
 from ..equations import stability
+from ..equations.system import System
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
                         Target, Unknowns, equilibrium, workspace_for_iterations)
-from .outcome import (Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed,
-                      Unstable)
+from .outcome import Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed, Unstable
 from .touching import found_touching
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
 
 logger = logging.getLogger(__name__)
 

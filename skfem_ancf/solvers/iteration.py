@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core.band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
-                         weighted)
-from ..beam.strain_energy import body_carry, body_force, body_tangent
 from ..actions.forces.kernels import (add_elastic_force, add_element_tangent, contact_along,
-                                    contact_work)
-from ..core.callbacks import own_solve
-from ..core.source import F1, indices, source
+                                      contact_work)
 from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                               external_force)
-
-if TYPE_CHECKING:
-    from ..equations.tables import Equations
+from ..beam.strain_energy import body_carry, body_force, body_tangent
+from ..core.band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
+                         weighted)
+from ..core.callbacks import own_solve
+from ..core.source import F1, indices, source
+from ..equations.tables import Equations
 
 #: Stiffness that a coordinate is taken to have in norms at least, over the mean of all, each times
 #: the square of its size: that of a rigid body has none of its own.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,15 +13,13 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, require_fi
 from ..core.linalg import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.switch import expecting
+from ..core.types import Array
 from ..equations import stability
+from ..equations.system import System
 from . import descent
 from .increment import Increment, Options, Route
 from .outcome import Attempt, Equilibrium, Soft, StaticResult, StepFailed, Unstable
 from .strategies import HELD_BY_LOADS, STRATEGIES, Strategy
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
 
 logger = logging.getLogger(__name__)
 

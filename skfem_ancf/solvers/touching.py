@@ -14,18 +14,15 @@ penetration stores is by how much the whole is too compliant.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..actions.contact.contacts import Contacts
 from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from ..actions.contact.contacts import Contacts
-    from ..core.types import Array
+from ..core.types import Array
 
 #: How near a point lies that is held at first, and how far it is held, relative to the height.
 NEAR, FAR = 0.5, 1e3

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.linalg import NO_FACTORS
-from .iteration import CLOSED, reference_work, settled
-from .increment import rules_of
+from ..core.types import Array
 from ..equations.stability import position_weights
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
+from ..equations.system import System
+from .increment import rules_of
+from .iteration import CLOSED, reference_work, settled
 
 #: Motion of the nodes below which the load counts in the arc length, over what it could stretch.
 STILL = 1e-3

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.archive import Unreadable, read, write
-from ..core.errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown)
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..core.types import Array, StrPath
+from ..core.errors import FileError, InputError, MissingExtra, NameUnknown, require_path, shown
+from ..core.types import Array, StrPath
 
 _FORMAT = 2
 

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..core.errors import (CallbackError, CallError, CheckpointWarning, FileError, InputError,
+from ..core.errors import (CallError, CallbackError, CheckpointWarning, FileError, InputError,
                            Interrupted, NameUnknown, SweepWarning, require_function,
                            require_integer, require_path, shown, warn)
-from .members import Sweep, column_of, require_plain
 from ..core.progress import progress_bar
-from .probes import Probes, measured
 from ..core.switch import expecting
+from ..core.types import Array, ArrayLike, StrPath
+from .members import Sweep, column_of, require_plain
+from .probes import Probes, measured
 from .workers import Task, here, in_processes, in_threads, on_cluster
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    from ..core.types import Array, ArrayLike, StrPath
 
 #: Seconds between two files, and how many times longer than writing one they are at least.
 _SECONDS, _RARER = 2.0, 20.0

@@ -7,26 +7,23 @@ import pickle
 import signal
 import sys
 from collections import deque
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import copy_context
 from functools import partial
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.errors import AncfError, CallbackError, InputError, PickleError, require_like, shown
 from ..core.switch import expecting
+from ..core.types import Array
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable
-
-    from ..core.types import Array
-
-    #: Values by name, or the text of an error.
-    Found = dict[str, Array] | str
-    Results = Generator[tuple[int, Found], None, None]
+#: Values by name, or the text of an error.
+Found = dict[str, Array] | str
+Results = Generator[tuple[int, Found], None, None]
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.band import Band
 from ...core.callbacks import handle_of
 from ...core.errors import InputError
+from ...core.types import Array
 from .active_set import project, projected, projection
 from .crossing import CrossingGuard, middle_of
 from .gap import distances, places, surface
@@ -20,11 +22,6 @@ from .poses import taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, LARGEST, NOW, POSE,
                      POSES, PRESSURES, PROJECTED, RATE, SETTLE, SLOTS, STIFFNESS, TANGENT, WIDTH,
                      ContactTables, Pair, Question, pair_of)
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from ...core.types import Array
 
 
 #: Penetration, relative to the height, from which on an obstacle is too soft, and that which a

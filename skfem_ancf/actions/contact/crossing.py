@@ -8,16 +8,14 @@ deeper on the way than at both of its ends, and on another side at its end.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ...core.types import Array
 from .gap import outline
 from .poses import taken_back
 from .tables import CUSTOM, STIFFNESS
-
-if TYPE_CHECKING:
-    from ...core.types import Array
 
 #: Parts of a way at which points are looked at, at most; points that are looked at together.
 MOST_PARTS, TOGETHER = 400, 200_000

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from ...core.types import Array
+from ...core.types import Array
 
 
 def carried(pose: Array, x: Array) -> Array:

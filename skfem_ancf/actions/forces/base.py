@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...beam.beam import Beam
+from ...beam.distribution import Facets
+from ...beam.layout import Layout
 from ...core.errors import (AncfError, InputError, require_finite, require_slope, shown,
                             warnings_as_errors)
 from ...core.origin import ours
+from ...core.types import Array
 from ..item import Item, beside
 from ..places import Vector
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ...beam.beam import Beam
-    from ...beam.layout import Layout
-    from ...beam.distribution import Facets
-    from ...core.types import Array
 
 #: Relative step of differences, where a force takes no complex numbers.
 STEP = 1e-6

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable, Mapping
 from copy import copy
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...beam.layout import Layout, WhichBeam
+from ...beam.rigid import RigidBody
 from ...core.errors import (InputError, ask_array, ask_number, require_function, require_option,
                             require_positive, shown)
-from ..places import Vector, is_ground, named_place, section
+from ...core.types import Array
 from ...mesh.places import is_point
-from ...beam.rigid import RigidBody
+from ..places import Vector, is_ground, named_place, section
 from .base import ForceElement, differences
-from .springs import end_of
 from .kernels import turned, turning
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import ArrayLike
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ...beam.layout import WhichBeam
+from .springs import end_of
 
 KINDS = ("force", "moment")
 #: Part of the time between two samples that is round-off.

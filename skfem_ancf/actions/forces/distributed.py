@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...beam.interpolation import probe_reference
-from ...beam.layout import select_beam
-from ...core.errors import require_flag, require_not_negative
-from ...beam.kernels.section import beam_gradients
-from ...core.quadrature import gauss
 from ...beam.distribution import AXIS, Facets
+from ...beam.interpolation import probe_reference
+from ...beam.kernels.section import beam_gradients
+from ...beam.layout import Layout, WhichBeam, select_beam
 from ...beam.surfaces import groups_of, surfaces_of
+from ...core.errors import require_flag, require_not_negative
+from ...core.quadrature import gauss
+from ...core.types import Place
+from ..item import Item
 from ..places import Vector
 from .base import ForceElement, Part
 from .kernels import DRAG, FOUNDATION
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..item import Item
-    from ...beam.layout import Layout
-    from ...core.types import Place
-    from ...beam.layout import WhichBeam
 
 
 class Foundation(ForceElement):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy
 
 from ...core.errors import InputError, ask_number, require_function, require_not_negative, shown
 from ...core.quadrature import gauss
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: Points by which the work between two states of a step is integrated.
 POINTS = 8

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...beam.layout import Layout, WhichBeam
 from ...core.errors import InputError, require_finite, require_not_negative, shown
+from ...core.types import Array
 from ..places import Vector, point, section
 from .base import ForceElement, Part
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ...beam.layout import WhichBeam
 
 
 class PointMass(ForceElement):

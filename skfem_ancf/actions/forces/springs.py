@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown
-from ..places import GROUND, Vector, both_of, named_place, point, section
-from ...mesh.places import points_of_rows
-from ...beam.rigid import RigidBody, on_body
-from .base import ForceElement, Part
 from ...beam.kernels.moments import mean_turning
-from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
+from ...beam.layout import Layout, WhichBeam
+from ...beam.rigid import RigidBody, on_body
+from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown
+from ...core.types import Array, Place
+from ...mesh.places import points_of_rows
+from ..places import GROUND, Vector, both_of, named_place, point, section
+from .base import ForceElement, Part
 from .kernels import SPRING, TINY, TORSION, turned, turning
-
-if TYPE_CHECKING:
-    from ...beam.layout import Layout
-    from ...core.types import Array, Place
-    from ...beam.layout import WhichBeam
+from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
 
 #: Rate beside which the step of a difference of a dashpot's law is small.
 STILL = 1e-3

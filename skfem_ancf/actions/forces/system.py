@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .base import Part
+from ...core.types import Array
 from ..contact.contacts import NO_CONTACTS, Contacts
+from ..places import Vector
+from .base import ForceElement, Part
 from .control import Control
 from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
                       potential, run_kinds, turned, vectors_of)
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from ...core.types import Array
-    from ..places import Vector
-    from .base import ForceElement
 
 #: Kinds that the kernels know.
 KINDS = 4

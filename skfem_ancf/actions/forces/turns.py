@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..loads import EndMoment
-    from ...core.types import Array
+from ...core.types import Array
+from ..loads import EndMoment
 
 
 class Turns:

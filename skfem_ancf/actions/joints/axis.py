@@ -6,15 +6,13 @@ A point of the axis has the parameter s: the number of its element, and where in
 from __future__ import annotations
 
 from math import factorial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ...beam.beam import Beam
+from ...core.types import Array
 from ...mesh.reference_cell import hermite_basis
-
-if TYPE_CHECKING:
-    from ...beam.beam import Beam
-    from ...core.types import Array
 
 #: Points at least of an element among which the nearest is looked for first.
 SAMPLES = 5

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...beam.layout import Layout
 from ...core.errors import AncfError, InputError, require_finite, require_slope, shown
-from ..item import Item, beside, require_entries
 from ...core.origin import ours
+from ...core.types import Array
+from ..item import Item, beside, require_entries
 from ..places import Vector, point, section
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from ...beam.rigid import RigidBody
+from ...core.types import Array
 from .base import Joint
-
-if TYPE_CHECKING:
-    from ...beam.rigid import RigidBody
-    from ...core.types import Array
 
 
 class UnitDirector(Joint):

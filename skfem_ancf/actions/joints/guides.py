@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ...beam.layout import Layout, WhichBeam
 from ...core.errors import InputError, require_finite, require_label, require_positive
-from .base import Joint, gradients
+from ...core.types import Array
 from ..places import point
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ...beam.layout import WhichBeam
+from .base import Joint, gradients
 
 
 class OnLine(Joint):

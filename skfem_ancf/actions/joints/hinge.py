@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from ...beam.layout import Layout
 from ...core.errors import require_label
-from .base import Joint, equations_of, gradients
+from ...core.types import Array
 from ..places import each, point, several
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
+from .base import Joint, equations_of, gradients
 
 
 class Hinge(Joint):

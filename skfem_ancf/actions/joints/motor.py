@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
+from ...beam.layout import Layout
 from ...core.errors import InputError, require_finite_scalar
+from ...core.types import TimeFunction
 from ..item import Item
 from ..loads import EndMoment
 from ..places import both_of
 from .prescribed import PrescribedAngle, PrescribedTurn, Turned
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ...beam.layout import Layout
-    from ...core.types import TimeFunction
 
 
 class Motor(Item):

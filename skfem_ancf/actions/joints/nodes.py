@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ...beam.beam import Beam
 from ...beam.kinematics import direction
+from ...beam.layout import Layout
+from ...core.types import Array
+from ...mesh.frame_graph import Net
 from .base import Joint
 from .settlements import HELD, Settlements
-
-if TYPE_CHECKING:
-    from ...beam.beam import Beam
-    from ...mesh.frame_graph import Net
-    from ...beam.layout import Layout
-    from ...core.types import Array
 
 FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .base import Joint
+from ...beam.layout import Layout
 from ...core.origin import ours
-
-if TYPE_CHECKING:
-    from ...beam.layout import Layout
-    from ...core.types import Array
+from ...core.types import Array
+from .base import Joint
 
 
 class Part(Joint):

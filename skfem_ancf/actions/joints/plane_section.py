@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ...mesh.places import node_of
 from ...beam.kinematics import plane
+from ...beam.layout import Layout, WhichBeam
 from ...core.errors import require_label
+from ...core.types import Array, Place
+from ...mesh.places import node_of
 from .base import Joint
-
-if TYPE_CHECKING:
-    from ...beam.layout import Layout
-    from ...core.types import Array, Place
-    from ...beam.layout import WhichBeam
 
 
 class PlaneSection(Joint):

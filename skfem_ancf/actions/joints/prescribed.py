@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
+from ...beam.layout import Layout, WhichMember
+from ...beam.rigid import on_body
 from ...core.errors import (ask_array, ask_number, require_finite_scalar, require_function,
                             require_label)
-from ...beam.rigid import on_body
 from ...core.sampling import sample
-from .base import Aligned, Joint, angle_to, gradients, rotation
+from ...core.types import Array
 from ..places import both_of, point, section
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ...beam.layout import WhichMember
+from .base import Aligned, Joint, angle_to, gradients, rotation
 
 #: Pieces of an integral over time, at most.
 PIECES = 500

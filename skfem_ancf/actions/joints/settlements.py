@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...core.sampling import sample
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ...core.types import Array
+from ...core.types import Array
 
 #: What may be held of a node.
 HELD = "x", "y", "angle"

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from skfem.helpers import dot
 
+from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
+from ...beam.rigid import RigidBody
 from ...core.errors import InputError, require_finite, require_flag, require_label, shown
-from ...beam.layout import select_beam
+from ...core.types import Array
 from ...mesh.mapping import cross
+from ..places import GROUND, Vector, is_ground, named_place, point, section
 from .axis import Axis
 from .base import Aligned, Joint, angle_to, gradients, rotation
-from ...beam.rigid import RigidBody
-from ..places import GROUND, Vector, is_ground, named_place, point, section
 from .spans import Family, Product, Span
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ...beam.layout import WhichBeam, WhichMember
 
 #: How far beyond an end of a beam a sleeve may be, in elements.
 BEYOND = 1e-6

@@ -17,14 +17,12 @@ momenta.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...core.types import Array
+from ...core.types import Array
 
 #: Lengths of a way, in elements, below which nothing is divided by it.
 TINY = 1e-9

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from ...beam.layout import Layout
 from ...core.errors import InputError, require_flag, require_label
+from ...core.types import Array
+from ..places import Vector, each, is_ground, section, several
 from .base import Aligned, Joint, angle_to, equations_of, gradients, rotation
-from ..places import each, is_ground, section, several
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ..places import Vector
 
 
 class Weld(Joint):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...core.errors import InputError, require_index
-
-if TYPE_CHECKING:
-    from ...core.types import Array
+from ...core.types import Array
 
 
 @dataclass(frozen=True)

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...beam.interpolation import locate
-from ...beam.layout import select_beam
+from ...beam.kernels.section import beam_gradients
+from ...beam.layout import Layout, WhichBeam, select_beam
 from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                             require_integer, require_not_negative, require_option, require_positive,
                             shown, warn)
-from ..forces.base import ForceElement, Part
-from ..contact.contacts import Contacts, Group
-from ..places import Vector
-from ..contact.poses import carried, taken_back
-from ...beam.kernels.section import beam_gradients
 from ...core.quadrature import gauss_lobatto
+from ...core.types import Array
+from ..contact.contacts import Contacts, Group
+from ..contact.poses import carried, taken_back
+from ..forces.base import ForceElement, Part
+from ..places import Vector
 from .shapes import Shape
-
-if TYPE_CHECKING:
-    from ...beam.layout import Layout
-    from ...core.types import Array
-    from ...beam.layout import WhichBeam
 
 METHODS = ("penalty", "augmented")
 #: What an obstacle may be told; the last two may be left to it.

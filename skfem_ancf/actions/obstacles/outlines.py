@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...core.types import Array
+from ...core.types import Array
 
 #: Cells of a grid along each side, in which a surface is looked for.
 CELLS = 160

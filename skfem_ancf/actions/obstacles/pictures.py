@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ...core.types import Array
+from ...core.types import Array
 
 #: By how much what is drawn is larger than the body, relative to its size.
 AROUND = 0.15

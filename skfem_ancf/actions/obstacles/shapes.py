@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...core.errors import (CallbackError, InputError, ask, require_finite, require_flag,
                             require_function, require_not_negative, require_positive, shown,
                             warnings_as_errors)
+from ...core.immutable import Immutable
+from ...core.types import Array
 from ..contact.gap import outline
 from ..contact.tables import CUSTOM, OUTLINE
 from ..item import takes_time
-from ...core.immutable import Immutable
 from .outlines import circle, clipped, contour
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from ...core.types import Array
 
 #: Relative step of differences of a distance function, and of its gradient.
 STEP, COARSE = 1e-6, 1e-4
