@@ -122,14 +122,14 @@ class LineLoad(Load):
         axis that returns (2, ...).
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
-    chains
-        Numbers of the chains of elements that it acts on, shape (k,); None for all of them.
     """
 
+    #: Numbers of the chains of elements that it acts on, shape (k,); None for all of them.
+    chains: Any = None
+
     def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
-                 amplitude: TimeFunction = None, chains: Array | None = None) -> None:
+                 amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
-        self.chains = chains
         self.per_length = force if callable(force) else require_finite("force", force, (2,))
 
     def bind(self, beam: Beam) -> Load:

@@ -635,25 +635,23 @@ class EndMoment(Load):
         The moment (force times length), counterclockwise.
     beam, amplitude
         As for :class:`Load`; the beam may be a RigidBody.
-    couple
-        Any object that two moments have in common of which one is the opposite of the other: they
-        keep the angular momentum. None for a moment from the ground.
     """
 
     constant = False
     turning = True
     for_bodies = True
-
+    #: An object that two opposite moments share: they keep the angular momentum.
+    couple: Any = None
     # of a bound one: the node, and coordinates and weights of the direction of its section
     node: int
     dofs: Any
     c: Any
 
     def __init__(self, boundary: Any, M: float, beam: WhichMember = None,
-                 amplitude: TimeFunction = None, couple: Any = None) -> None:
+                 amplitude: TimeFunction = None) -> None:
         self.boundary, beam = on_body(boundary, beam)
         super().__init__(beam, amplitude)
-        self.M, self.couple = require_finite_scalar("M", M), couple
+        self.M = require_finite_scalar("M", M)
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         if isinstance(beam, RigidBody):

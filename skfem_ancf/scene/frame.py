@@ -14,7 +14,7 @@ from ..actions.joints.settlements import HELD
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
 from ..beam.beam import Beam
 from ..beam.kinematics import direction
-from ..beam.layout import WhichBeam
+from ..beam.layout import WhichBeam, WhichMember
 from ..beam.rigid import RigidBody
 from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
                            require_integer, require_names, require_option, require_options,
@@ -458,7 +458,7 @@ class Frame(Scene):
 
     # loads
 
-    def point_force(self, force: ArrayLike, at: Any, beam: WhichBeam = None,
+    def point_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                     amplitude: TimeFunction = None) -> Frame:
         """A dead force on each of some nodes, or on a material point of a beam.
 
@@ -487,7 +487,7 @@ class Frame(Scene):
                     for k in np.unique(number)))
         return self
 
-    def moment(self, boundary: Any, M: float, beam: WhichBeam = None,
+    def moment(self, boundary: Any, M: float, beam: WhichMember = None,
                amplitude: TimeFunction = None) -> Frame:
         """A moment on each of some nodes.
 
@@ -520,7 +520,7 @@ class Frame(Scene):
                     for k, end in zip(*self._ends_at(boundary))))
         return self
 
-    def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+    def follower_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                        amplitude: TimeFunction = None, line: int | None = None) -> Frame:
         """A force that turns with the tangent of a line: a :class:`~skfem_ancf.FollowerForce`.
 
@@ -578,7 +578,8 @@ class Frame(Scene):
         for k, b in enumerate(self.beams):
             some, chains = np.split(chains, [len(chain_ends(b))])
             if np.any(some):
-                loads.append(LineLoad(force, k, amplitude, np.flatnonzero(some)))
+                load = LineLoad(force, k, amplitude)
+                loads.append(load._with(chains=np.flatnonzero(some)))
         self._put(*loads)
         return self
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from threading import RLock
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from numpy.typing import ArrayLike
-from skfem.assembly import LinearForm
 
 from ..actions.axial import FollowerForce, LineLoad
 from ..actions.binding import bind_item
@@ -21,34 +20,37 @@ from ..actions.item import Item
 from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
 from ..actions.joints.sliders import slider
 from ..actions.loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight
-from ..actions.obstacles import Obstacle, Shape
+from ..actions.obstacles import Obstacle
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
 from ..beam.beam import Beam
-from ..beam.layout import Layout, WhichBeam, WhichMember
+from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
 from ..core.errors import InputError, shown
-from ..core.types import Array, Place, TimeFunction
+from ..core.types import TimeFunction
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-Method = TypeVar("Method", bound=Callable[..., Any])
+P = ParamSpec("P")
+M = TypeVar("M", bound="Model")
 
 
-def parameters_of(item: type) -> Callable[[Method], Method]:
-    """Give a method the *Parameters* of the class of which it adds an instance."""
-    found = re.search(r"^Parameters\n-+\n.*?(?=^\w+\n-+\n|\Z)",
-                      inspect.cleandoc(item.__doc__ or ""), re.DOTALL | re.MULTILINE)
+def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
+    """A method of a scene that adds an item of a class, whose arguments it takes."""
+    def method(self, *arguments, **options):
+        return self.add(item(*arguments, **options))
 
-    def add(method: Method) -> Method:
-        if method.__doc__ and found:
-            method.__doc__ = f"{inspect.cleandoc(method.__doc__)}\n\n{found[0].rstrip()}\n"
-        return method
-
-    return add
+    signature, about = inspect.signature(item), inspect.cleandoc(item.__doc__ or "")
+    itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    other = re.search(r"^(?!Parameters$)\w[\w ]*\n-{3,}$", about, re.MULTILINE)
+    method.__doc__ = about[:other.start() if other else None].rstrip() + "\n"
+    method.__name__, method.__qualname__ = name, f"Model.{name}"
+    vars(method).update(item=item, __signature__=signature.replace(
+        parameters=[itself, *signature.parameters.values()], return_annotation="Self"))
+    return method
 
 
 class Entry(NamedTuple):
@@ -67,18 +69,7 @@ class Entry(NamedTuple):
 
 
 class Model:
-    """Beams, rigid bodies, and what acts on them: the description of a :class:`Scene`.
-
-    Methods that add something return the scene, so that they can be chained, but for those of
-    joints, which return the joint: ``state.joint_force(joint)`` is its force. Each constructs an
-    item and adds it; ``scene.add(Spring(...))`` is the same as ``scene.spring(...)``.
-
-    Parameters
-    ----------
-    *beams
-        One or more :class:`~skfem_ancf.Beam`, and :class:`~skfem_ancf.RigidBody` among them. Bodies
-        are numbered behind the beams.
-    """
+    """Beams, rigid bodies, and what acts on them: the description of a :class:`Scene`."""
 
     def __init__(self, *beams: Any) -> None:
         if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
@@ -209,23 +200,29 @@ class Model:
         self._put(item)
         return self
 
-    # supports
+    # items: a new one is one line here
 
-    @parameters_of(Clamp)
-    def clamp(self, boundary: Place, beam: WhichBeam = None, thickness: str = "fixed") -> Self:
-        """Weld a face, or hold it as a plane: a :class:`~skfem_ancf.Clamp`."""
-        return self.add(Clamp(boundary, beam, thickness))
-
-    @parameters_of(Pin)
-    def pin(self, boundary: Place, beam: WhichBeam = None) -> Self:
-        """Fix the position of the axis; the section may turn: a :class:`~skfem_ancf.Pin`."""
-        return self.add(Pin(boundary, beam))
-
-    @parameters_of(Support)
-    def fix(self, boundary: Place, names: str | Sequence[str] | None = None,
-            displacement: float = 0.0, beam: WhichBeam = None) -> Self:
-        """Fix degrees of freedom by their scikit-fem names: a :class:`~skfem_ancf.Support`."""
-        return self.add(Support(boundary, names, displacement, beam))
+    clamp = adds("clamp", Clamp)
+    pin = adds("pin", Pin)
+    fix = adds("fix", Support)
+    gravity = adds("gravity", Weight)
+    point_force = adds("point_force", PointForce)
+    follower_force = adds("follower_force", FollowerForce)
+    line_load = adds("line_load", LineLoad)
+    traction = adds("traction", Traction)
+    pressure = adds("pressure", Pressure)
+    temperature = adds("temperature", Temperature)
+    eigenstrain = adds("eigenstrain", EigenStrain)
+    moment = adds("moment", EndMoment)
+    load = adds("load", FormLoad)
+    energy = adds("energy", Energy)
+    spring = adds("spring", Spring)
+    torsional_spring = adds("torsional_spring", TorsionalSpring)
+    control = adds("control", Control)
+    foundation = adds("foundation", Foundation)
+    drag = adds("drag", Drag)
+    point_mass = adds("point_mass", PointMass)
+    obstacle = adds("obstacle", Obstacle)
 
     # joints
 
@@ -359,145 +356,30 @@ class Model:
         """
         return self.joint(slider(self.layout, at, on, direction, angle, name))
 
-    @parameters_of(Motor)
     def motor(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,
               other: Any = None) -> Joint | Load:
-        """Turn a rigid body or a section: a :class:`~skfem_ancf.Motor`.
+        """Add a :class:`~skfem_ancf.Motor`; returns its joint, or the load of a torque.
 
-        It returns the joint, whose ``joint_force`` is the moment of the motor, or the load.
+        Parameters
+        ----------
+        at, angle, speed, torque, other
+            As for :class:`~skfem_ancf.Motor`.
         """
         return self._put(Motor(at, angle, speed, torque, other))[0]
 
-    # loads
-
-    @parameters_of(Weight)
-    def gravity(self, g: ArrayLike, beam: WhichBeam = None, amplitude: TimeFunction = None) -> Self:
-        """Weight of every beam and rigid body, or of one: a :class:`~skfem_ancf.Weight`."""
-        return self.add(Weight(g, beam, amplitude))
-
-    @parameters_of(PointForce)
-    def point_force(self, force: ArrayLike, at: Any, beam: WhichBeam = None,
-                    amplitude: TimeFunction = None) -> Self:
-        """A dead force on a material point: a :class:`~skfem_ancf.PointForce`."""
-        return self.add(PointForce(force, at, beam, amplitude))
-
-    @parameters_of(FollowerForce)
-    def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
-                       amplitude: TimeFunction = None, line: int | None = None) -> Self:
-        """A force that turns with the tangent of the axis: a :class:`~skfem_ancf.FollowerForce`."""
-        return self.add(FollowerForce(force, at, beam, amplitude, line))
-
-    @parameters_of(LineLoad)
-    def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
-                  amplitude: TimeFunction = None) -> Self:
-        """A dead force per length of the axis: a :class:`~skfem_ancf.LineLoad`."""
-        return self.add(LineLoad(force, beam, amplitude))
-
-    @parameters_of(Traction)
-    def traction(self, boundary: Place, t: ArrayLike | Callable[[Array], Array],
-                 beam: WhichBeam = None, amplitude: TimeFunction = None) -> Self:
-        """A dead traction on a surface: a :class:`~skfem_ancf.Traction`."""
-        return self.add(Traction(boundary, t, beam, amplitude))
-
-    @parameters_of(Pressure)
-    def pressure(self, boundary: Place, p: float, beam: WhichBeam = None,
-                 amplitude: TimeFunction = None) -> Self:
-        """A pressure normal to the deformed surface: a :class:`~skfem_ancf.Pressure`."""
-        return self.add(Pressure(boundary, p, beam, amplitude))
-
-    @parameters_of(Temperature)
-    def temperature(self, change: Any, beam: WhichBeam = None,
-                    amplitude: TimeFunction = None) -> Self:
-        """A change of the temperature: a :class:`~skfem_ancf.Temperature`."""
-        return self.add(Temperature(change, beam, amplitude))
-
-    @parameters_of(EigenStrain)
-    def eigenstrain(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
-                    amplitude: TimeFunction = None) -> Self:
-        """A strain that the body would have without stress, of growth, muscles, drying, voltage.
-
-        An :class:`~skfem_ancf.EigenStrain`.
-        """
-        return self.add(EigenStrain(xx, yy, xy, beam, amplitude))
-
-    @parameters_of(EndMoment)
-    def moment(self, boundary: Place, M: float, beam: WhichBeam = None,
-               amplitude: TimeFunction = None) -> Self:
-        """A moment on a section or a rigid body: an :class:`~skfem_ancf.EndMoment`."""
-        return self.add(EndMoment(boundary, M, beam, amplitude))
-
-    @parameters_of(FormLoad)
-    def load(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
-             amplitude: TimeFunction = None) -> Self:
-        """Any scikit-fem ``LinearForm`` as a dead load: a :class:`~skfem_ancf.FormLoad`."""
-        return self.add(FormLoad(form, boundary, beam, amplitude))
-
-    @parameters_of(Energy)
-    def energy(self, psi: Callable[..., Any], gradient: Callable[..., Any] | None = None,
-               hessian: Callable[..., Any] | None = None, over: Place = "cells",
-               beam: WhichBeam = None, amplitude: TimeFunction = None) -> Self:
-        """An energy density of position, deformation gradient, point and time: an Energy.
-
-        See :class:`~skfem_ancf.Energy`.
-        """
-        return self.add(Energy(psi, gradient, hessian, over, beam, amplitude))
-
-    # force elements
-
-    @parameters_of(Spring)
-    def spring(self, k: Any, between: Sequence[Any], damping: Any = 0.0,
-               length: float | None = None) -> Self:
-        """A spring between two points, with a dashpot: a :class:`~skfem_ancf.Spring`."""
-        return self.add(Spring(k, between, damping, length))
-
-    @parameters_of(TorsionalSpring)
-    def torsional_spring(self, k: Any, at: Place, damping: Any = 0.0, beam: WhichBeam = None,
-                         other: Any = None, angle: float = 0.0) -> Self:
-        """A moment against the angle of a section: a :class:`~skfem_ancf.TorsionalSpring`."""
-        return self.add(TorsionalSpring(k, at, damping, beam, other, angle))
-
-    @parameters_of(Control)
-    def control(self, law: Callable[..., Any], at: Any, kind: str = "force", other: Any = None,
-                points: Mapping[str, Any] | None = None,
-                sections: Mapping[str, Any] | None = None, dt: float | None = None,
-                beam: WhichBeam = None) -> Self:
-        """A force or a moment of time and measurements: a :class:`~skfem_ancf.Control`."""
-        return self.add(Control(law, at, kind, other, points, sections, dt, beam))
-
-    @parameters_of(Foundation)
-    def foundation(self, k: float, side: Place = "bottom", one_sided: bool = False,
-                   damping: float = 0.0, beam: WhichBeam = None) -> Self:
-        """Springs along the normal of a side: a :class:`~skfem_ancf.Foundation`."""
-        return self.add(Foundation(k, side, one_sided, damping, beam))
-
-    @parameters_of(Drag)
-    def drag(self, density: float, normal: float, tangential: float = 0.0,
-             beam: WhichBeam = None) -> Self:
-        """A force against the velocity of the axis: a :class:`~skfem_ancf.Drag`."""
-        return self.add(Drag(density, normal, tangential, beam))
-
-    @parameters_of(PointMass)
-    def point_mass(self, mass: float, at: ArrayLike, inertia: float = 0.0,
-                   beam: WhichBeam = None) -> Self:
-        """A mass on a material point, with its weight: a :class:`~skfem_ancf.PointMass`."""
-        return self.add(PointMass(mass, at, inertia, beam))
-
-    @parameters_of(Obstacle)
-    def obstacle(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
-                 beam: WhichBeam = None, **options: Any) -> Self:
-        """Something that the surface of beams cannot enter; ``state.contact()`` says where it is.
-
-        An :class:`~skfem_ancf.actions.obstacles.Obstacle`.
-        """
-        return self.add(Obstacle(shape, friction, stiffness, beam, **options))
-
-    @parameters_of(Damping)
     def damping(self, mass: float = 0.0, stiffness: float = 0.0, modal: ArrayLike = ()) -> Self:
         """Damping of the whole scene: Rayleigh's, and of modes.
 
         A mode of the angular frequency omega gets the damping ratio ``mass / (2 omega) + stiffness
         omega / 2``. It acts in motions; materials may have their own, ``Beam(...,
         damping=KelvinVoigt(time))``. A second call takes the place of the first.
+
+        Parameters
+        ----------
+        mass, stiffness
+            A rate by which velocities decay, and a retardation time of all beams.
+        modal
+            Damping ratios of the lowest modes that are no rigid motions, shape (k,).
         """
         with self._lock:
             self._damping, self._system = Damping(mass, stiffness, modal), None

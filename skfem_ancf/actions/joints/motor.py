@@ -61,5 +61,5 @@ class Motor(Item):
         M, amplitude = (1.0, self.torque) if callable(self.torque) else (self.torque, None)
         couple = None if self.other is None else object()
         places = [(self.at, M)] + ([] if self.other is None else [(self.other, -M)])
-        return [EndMoment(place, size, layout.number(which), amplitude, couple)
+        return [EndMoment(place, size, layout.number(which), amplitude)._with(couple=couple)
                 for (which, place), size in places]
