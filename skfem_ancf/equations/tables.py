@@ -325,12 +325,8 @@ class Tables:
 
         Of joints whose derivatives do not depend on time c alone, shape (n, m).
         """
-        s = self.system
-        if not self.turns:
-            return self.offsets(times)
-        found = [(joint.driven(times, s.N), len(joint.equations)) for joint in s.constraints.joints]
-        return found[0][0] if len(found) == 1 else np.hstack([
-            *[x[:, :m] for x, m in found], *[x[:, m:] for x, m in found]])
+        offsets = self.offsets(times)
+        return np.hstack([offsets, self.slopes(times)]) if self.turns else offsets
 
     def at(self, t: float) -> tuple[Array, Array]:
         """c and g of all joints at one time, shapes (m,) and (k,)."""

@@ -13,6 +13,7 @@ from ...beam.layout import Layout
 from ...core.errors import AncfError, InputError, require_finite, require_slope, shown
 from ...core.origin import ours
 from ...core.types import Array
+from ...mesh.places import is_point
 from ..item import Item, beside, require_entries
 from ..places import Vector, point, section
 
@@ -84,25 +85,6 @@ class Joint(Item):
     moving = False
     tabled = True
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
-        super().__init_subclass__(**options)
-        if "jacobian" in vars(cls) and "entries" not in vars(cls):
-            def entries(self: Joint, u: Array, t: float) -> tuple[Array, Array, Array]:
-                J = cls.jacobian(self, u, t)
-                rows, columns = np.nonzero(J)
-                return rows, columns, J[rows, columns]
-
-            cls.entries = entries  # type: ignore[method-assign]
-        elif "entries" in vars(cls) and "jacobian" not in vars(cls):
-            def jacobian(self: Joint, u: Array, t: float) -> Array:
-                rows, columns, values = cls.entries(self, u, t)
-                J = np.zeros((len(self.equations), len(u)))
-                np.add.at(J, (rows, columns), values)
-                return J
-
-            cls.jacobian = jacobian  # type: ignore[method-assign]
-
     def bind(self, layout: Layout) -> None:
         """Find the points and sections; the scene calls it of a copy."""
         raise NotImplementedError
@@ -113,15 +95,19 @@ class Joint(Item):
 
     def jacobian(self, u: Array, t: float) -> Array:
         """Derivative of Phi by u, shape (m, N); by default that of :meth:`entries`."""
-        raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
+        rows, columns, values = self.entries(u, t)
+        J = np.zeros((len(self.equations), len(u)))
+        np.add.at(J, (rows, columns), values)
+        return J
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         """Rows, columns and values (k,) of :meth:`jacobian`; those at one place add up.
 
-        A joint that defines them costs what it holds, however many beams a scene has; else they
-        are looked for in the dense rows.
+        By default they are looked for in the dense rows, which cost more the larger a scene is.
         """
-        raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
+        J = self.jacobian(u, t)
+        rows, columns = np.nonzero(J)
+        return rows, columns, J[rows, columns]
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
@@ -180,36 +166,20 @@ class Joint(Item):
         """Those columns of :meth:`offset` that depend on time, shape (n, k)."""
         return self.offset(times, N)
 
-    def slope(self, times: Array, N: int) -> tuple[Array, Array]:
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         """The derivative of Phi in the reference configuration at several times.
 
         Returns
         -------
-        columns, values
-            Shapes (k,) and (n, m, k): of the degrees of freedom on which it depends.
+        rows, columns, values
+            Shapes (k,), (k,) and (n, k).
         """
-        zero = np.zeros(N)
+        zero, m = np.zeros(N), len(self.equations)
         if self.turning:
-            return np.arange(N), np.array([self.jacobian(zero, t) for t in times])
-        rows, found, values = self.entries(zero, times[0])
-        columns, where = np.unique(found, return_inverse=True)
-        J = np.zeros((len(self.equations), len(columns)))
-        np.add.at(J, (rows, where), values)
-        return columns, np.broadcast_to(J, (len(times),) + J.shape)
-
-    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        """Rows and columns (k,) and values (n, k) of :meth:`slope`."""
-        if type(self).slope is Joint.slope and not self.turning:
-            rows, columns, values = self.entries(np.zeros(N), times[0])
-            return rows, columns, values[None].repeat(len(times), axis=0)
-        columns, values = self.slope(times, N)
-        _, m, k = values.shape
-        entry = np.arange(m * k)
-        return entry // k, columns[entry % k], values.reshape(len(times), m * k)
-
-    def driven(self, times: Array, N: int) -> Array:
-        """:meth:`offset`, and beside it the values of :meth:`slope_entries`, shape (n, m + k)."""
-        return np.hstack([self.offset(times, N), self.slope_entries(times, N)[2]])
+            J = np.array([self.jacobian(zero, t) for t in times])
+            return np.repeat(np.arange(m), N), np.tile(np.arange(N), m), J.reshape(len(times), -1)
+        rows, columns, values = self.entries(zero, times[0])
+        return rows, columns, values[None].repeat(len(times), axis=0)
 
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
         """The second derivatives of Phi in the reference configuration.
@@ -220,8 +190,6 @@ class Joint(Item):
             Shapes (k,).
         """
         none = np.zeros(0, dtype=int)
-        if type(self).curvature is Joint.curvature:
-            return none, none, none, np.zeros(0)
         zero, out = np.zeros(N), [(none, none, none, np.zeros(0))]
         for row, unit in enumerate(np.eye(len(self.equations))):
             found = self.curvature(zero, 0.0, unit)
@@ -234,8 +202,8 @@ class Joint(Item):
 
     def __repr__(self) -> str:
         at = getattr(self, "at", None)
-        if isinstance(at, tuple) and len(at) > 1 and all(x is at[0] for x in at):  # given once
-            at = at[0]
+        if isinstance(at, tuple) and not is_point(at) and all(x is at[0] for x in at):
+            at = at[0]  # given once for all
         parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
         return f"<{' '.join(part for part in parts if part)}>"
 

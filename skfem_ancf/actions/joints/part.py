@@ -72,10 +72,6 @@ class Part(Joint):
     def turning(self) -> bool:
         return self.joint.turning
 
-    def slope(self, times: Array, N: int) -> tuple[Array, Array]:
-        columns, values = self.joint.slope(times, N)
-        return columns, values[:, self.kept]
-
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.slope_entries(times, N))
 

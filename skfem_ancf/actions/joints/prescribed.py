@@ -112,9 +112,9 @@ class PrescribedAngle(Joint):
     def offset(self, times: Array, N: int) -> Array:
         return self._normals(times) @ self.d.start[:, None]
 
-    def slope(self, times: Array, N: int) -> tuple[Array, Array]:
-        values = self._normals(times)[:, :, None] * self.d.weights
-        return self.d.dofs.ravel(), values.reshape(len(times), 1, -1)
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
+        values, columns = self._normals(times)[:, :, None] * self.d.weights, self.d.dofs.ravel()
+        return 0 * columns, columns, values.reshape(len(times), -1)
 
 
 class Turned:

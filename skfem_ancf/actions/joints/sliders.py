@@ -10,6 +10,7 @@ from skfem.helpers import dot
 
 from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
 from ...beam.rigid import RigidBody
+from ...core.caching import array_cache
 from ...core.errors import InputError, require_finite, require_flag, require_label, shown
 from ...core.types import Array
 from ...mesh.mapping import cross
@@ -20,6 +21,8 @@ from .spans import Family, Product, Span
 
 #: How far beyond an end of a beam a sleeve may be, in elements.
 BEYOND = 1e-6
+#: Displacements whose nearest points are cached, of all sleeves.
+KNOWN = 64
 
 
 def _pairs(A: Array, B: Array) -> Array:
@@ -32,6 +35,21 @@ def _dots(A: Array, B: Array) -> Array:
     """a_i . b_j of the columns of two matrices, made symmetric."""
     M = A.T @ B
     return M + M.T
+
+
+def _placed(*dofs: Array) -> tuple[Array, Any]:
+    """All DOFs of vectors, (n,), and what makes rows (..., 2, n) of the weights of one of them."""
+    columns = np.concatenate([x.ravel() for x in dofs])
+    first = np.cumsum([0, *(x.size for x in dofs)])
+
+    def rows(vector: int, weights: Array) -> Array:
+        out, k = np.zeros((*weights.shape[:-2], 2, len(columns))), dofs[vector].shape[1]
+        for c in range(2):
+            at = first[vector] + c * k
+            out[..., c, at:at + k] = weights[..., c % weights.shape[-2], :]
+        return out
+
+    return columns, rows
 
 
 class Sleeve(Joint):
@@ -66,8 +84,6 @@ class Sleeve(Joint):
     """
 
     constant = tabled = False
-    #: of the last two displacements: the parameter, and derivatives
-    _known: list[dict[str, Any]]
 
     def __init__(self, at: Any, on: WhichBeam, angle: bool = False,
                  name: str | None = None) -> None:
@@ -82,7 +98,6 @@ class Sleeve(Joint):
             raise InputError(f"{self!r}: a point of {beam!r} cannot slide along the beam itself")
         self.axis = Axis(beam, layout.offset(beam))
         zero = np.zeros(layout.N)
-        self._known = []
         if self.angle:
             self.p, self.d = section(layout, which, at)
         else:
@@ -94,9 +109,6 @@ class Sleeve(Joint):
                              f"is {gap:.6g} off the axis of {beam!r}: name one that is on it")
         tangent = self.axis.at(zero, s)[1]
         self.Q = rotation(angle_to(self.d.start, tangent))
-
-    def __repr__(self) -> str:
-        return f"<Sleeve {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
 
     def _outside(self, s: float) -> bool:
         return not -BEYOND <= s <= self.axis.beam.mesh.nelements + BEYOND
@@ -120,41 +132,9 @@ class Sleeve(Joint):
         return (f"{self!r} has left the beam {beam.name or ''!r} at its {end} end: "
                 "stop before, with until=, hold it by a spring or a support, or lengthen the beam")
 
-    def _at(self, u: Array) -> dict[str, Any]:
-        """What is known of a displacement, which comes to the front."""
-        for k, known in enumerate(self._known):
-            if np.array_equal(known["u"], u):
-                self._known.insert(0, self._known.pop(k))
-                return known
-        self._known[1:] = self._known[:1]
-        self._known[:1] = [{"u": u.copy(), "s": self.axis.nearest(u, self.p(u))}]
-        return self._known[0]
-
+    @array_cache(KNOWN)
     def _parameter(self, u: Array) -> float:
-        return float(self._at(u)["s"])
-
-    def _terms(self, u: Array) -> tuple[Any, ...]:
-        """Coordinates, position and derivatives of the axis, and what depends on coordinates."""
-        s = self._parameter(u)
-        dofs, weights = self.axis.weights(s)
-        e = self.axis.element(s)
-        # by the length of the stress-free axis
-        weights = weights / self.axis.beam.mesh.lengths[e] ** np.arange(4)[:, None]
-        c = self.axis.at(u, s) / self.axis.beam.mesh.lengths[e] ** np.arange(4)[:, None]
-        columns = np.concatenate([self.p.dofs.ravel(), self.d.dofs.ravel(), dofs.ravel()])
-        P, D, C = (np.zeros((2, len(columns))) for _ in range(3))
-        n, m = self.p.dofs.shape[1], self.d.dofs.shape[1]
-        at, parts = 0, ((P, self.p.weights, n), (D, self.d.weights, m))
-        for matrix, rows, size in parts:
-            for k in range(2):
-                matrix[k, at:at + size] = rows[k]
-                at += size
-        nb, Cs = weights.shape[1], []
-        for row in weights:
-            C = np.zeros((2, len(columns)))
-            C[0, at:at + nb] = C[1, at + nb:] = row
-            Cs.append(C)
-        return columns, c, self.p(u) - c[0], P - Cs[0], Cs, D
+        return self.axis.nearest(u, self.p(u))
 
     def value(self, u: Array, t: float) -> Array:
         s = self._parameter(u)
@@ -165,15 +145,18 @@ class Sleeve(Joint):
             out.append(cross(self.d(u), self.Q @ d))
         return np.array(out)
 
+    @array_cache(KNOWN)
     def _slopes(self, u: Array) -> tuple[Any, ...]:
-        """The derivatives of the equations and of s, and what they are made of."""
-        known = self._at(u)
-        if "slopes" not in known:
-            known["slopes"] = self._differentiate(u)
-        return known["slopes"]
+        """The derivatives of the equations and of s, and what they are made of.
 
-    def _differentiate(self, u: Array) -> tuple[Any, ...]:
-        columns, c, e, E, C, D = self._terms(u)
+        Derivatives c and C of the axis and of its weights are by the length of the reference axis.
+        """
+        s = self._parameter(u)
+        dofs, weights = self.axis.weights(s)
+        lengths = self.axis.beam.mesh.lengths[self.axis.element(s)] ** np.arange(4)[:, None]
+        columns, rows = _placed(self.p.dofs, self.d.dofs, dofs)
+        c, C = self.axis.at(u, s) / lengths, rows(2, (weights / lengths)[:, None])
+        e, E, D = self.p(u) - c[0], rows(0, self.p.weights) - C[0], rows(1, self.d.weights)
         Gs = c[2] @ e - c[1] @ c[1]
         s_y = -(c[1] @ E + e @ C[1]) / Gs
         first = [(cross(c[2], e), cross(c[1], E) - cross(e, C[1]))]
@@ -211,45 +194,30 @@ class Sleeve(Joint):
 
     # between two displacements
 
+    @array_cache(KNOWN)
     def _span(self, u0: Array, u1: Array) -> Span:
         """The :class:`~skfem_ancf.actions.joints.spans.Span` from one displacement to another."""
-        known = self._at(u1)
-        if "span" not in known or not np.array_equal(known["span"][0], u0):
-            known["span"] = u0.copy(), self._new_span((u0, u1))
-        return known["span"][1]
-
-    def _new_span(self, ends: tuple[Array, Array]) -> Span:
+        ends = u0, u1
         s = [self._parameter(u) for u in ends]
         dofs, weights, quotients = self.axis.between(*s)
-        columns = np.concatenate([self.p.dofs.ravel(), self.d.dofs.ravel(), dofs.ravel()])
-        n, first = len(columns), 0
-        parts = []
-        for width in (self.p.dofs.shape[1], self.d.dofs.shape[1], dofs.shape[1]):
-            parts.append(first + np.arange(2 * width).reshape(2, width))
-            first += 2 * width
+        columns, rows = _placed(self.p.dofs, self.d.dofs, dofs)
 
-        def rows(part: Array, of: Array) -> Array:
-            out = np.zeros((*of.shape[:-2], 2, n))
-            for k in range(2):
-                out[..., k, part[k]] = of[..., k % of.shape[-2], :]
-            return out
-
-        def held(part: Array, vector: Vector) -> Family:
+        def held(part: int, vector: Vector) -> Family:
             at = np.array([vector(u) for u in ends])
             matrix = rows(part, vector.weights)
             return Family(np.array([matrix, matrix]), np.array([at, at]), 0.0 * matrix, 0.0 * at)
 
         def along(order: int) -> Family:
             places, w, q = [self.axis.places(u, dofs).T for u in ends], weights, quotients[order]
-            return Family(rows(parts[2], w[:, order, None]),
+            return Family(rows(2, w[:, order, None]),
                           np.array([[w[k, order] @ x for x in places] for k in range(2)]),
-                          rows(parts[2], q[None]), np.array([q @ x for x in places]))
+                          rows(2, q[None]), np.array([q @ x for x in places]))
 
         c = along(1)
-        gap = held(parts[0], self.p).minus(along(0))
+        gap = held(0, self.p).minus(along(0))
         equations = [Product(cross, c, gap)]
         if self.angle:
-            equations.append(Product(cross, held(parts[1], self.d), c.turned(self.Q)))
+            equations.append(Product(cross, held(1, self.d), c.turned(self.Q)))
         shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
                   for slopes in (self._slopes(u) for u in ends)]
         return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], Product(dot, c, gap),
@@ -304,9 +272,6 @@ class Slot(Joint):
         self.at, self.on, self.angle = at, on, require_flag("angle", angle)
         self.name = require_label("name", name)
         self.equations = ("force normal to the line",) + ("moment",) * self.angle
-
-    def __repr__(self) -> str:
-        return f"<Slot {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
 
     def bind(self, layout: Layout) -> None:
         which, at = named_place(layout, self.at)
