@@ -2,7 +2,7 @@
 
 from .actions.axial import FollowerForce, LineLoad
 from .actions.eigenstrain import EigenStrain, Temperature
-from .actions.energy import Energy
+from .actions.energy import Energy, check_derivatives
 from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
                              TorsionalSpring)
 from .actions.item import Item
@@ -51,6 +51,6 @@ __all__ = [
     "PrescribedAngle", "PrescribedPosition", "PrescribedTurn", "Pressure", "Radau", "Reaction",
     "Resultants", "RigidBody", "Scene", "Scheme", "Section", "SignedDistance", "Sleeve", "Slot",
     "Spring", "StVenantKirchhoff", "StabilityWarning", "State", "Support", "SupportError",
-    "Temperature", "TorsionalSpring", "Traction", "Weight", "Weld", "forms",
+    "Temperature", "TorsionalSpring", "Traction", "Weight", "Weld", "check_derivatives", "forms",
     "reference_coordinates", "sweep",
 ]

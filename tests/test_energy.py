@@ -1,5 +1,7 @@
 """Energies of one's own, against closed forms and differential equations solved by SciPy."""
 
+import sys
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,7 +9,8 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import minimize_scalar
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Energy,
-                        InputError, MeshBeam, Scene, StVenantKirchhoff)
+                        InputError, MeshBeam, MissingExtra, Scene, StVenantKirchhoff,
+                        check_derivatives)
 
 MATERIAL = StVenantKirchhoff(2e8, 0.0, 1000.0)
 
@@ -136,6 +139,55 @@ def test_an_electrode_pulls_a_beam_in():
     assert limit.load == pytest.approx(load, rel=1e-3)
 
 
+# not scaled with the loads
+
+
+def column(k, **options):
+    """Pinned at both ends, on springs of k per length and deflection, under a force of 1."""
+    height, width = 0.01, 0.01
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 17), height)
+    scene = Scene(Beam(mesh, ElementBeamANCFCubic(2), MATERIAL, width))
+    scene.pin("left").fix("right", "r^2").point_force((-1.0, 0.0), at=(1.0, 0.0))
+    return scene.energy(lambda r, F, X, t: 0.5 * k * (r[1] - X[1])**2, over="axis", **options)
+
+
+@pytest.mark.parametrize("waves", [1, 2])
+def test_a_column_on_a_bedding_buckles(waves):
+    """Timoshenko, Gere: "Theory of elastic stability" (1961), 2.10: a bedding that buckling() does
+    not scale."""
+    EI = stiffness(0.01, 0.01)
+    k = {1: 1.0, 2: 15.0}[waves] * np.pi**4 * EI
+    force = EI * (waves * np.pi)**2 + k / (waves * np.pi)**2
+    found = column(k, scaled=False).buckling(1)
+    assert found.factors[0] == pytest.approx(force, rel=2e-3)
+    path = column(k, scaled=False).continuation(ds=force * 1e-3, max_load=1.2 * force)
+    assert path.critical_points[0].load == pytest.approx(force, rel=3e-3)
+
+
+@pytest.mark.parametrize("scaled", [True, False])
+def test_a_bedding_alone_holds_a_beam(scaled):
+    """It sinks by its weight over the bedding's stiffness, and vibrates as a mass on a spring."""
+    k = 2e6
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 9), 0.05)
+    scene = Scene(Beam(mesh, ElementBeamANCF(2), MATERIAL, 0.05)).gravity((0.0, -9.81))
+    scene.energy(lambda r, F, X, t: 0.5 * k * ((r - X)**2).sum(axis=0), scaled=scaled)
+    for state in (scene.solve_linear(), scene.solve_static()):
+        assert_allclose(state.displacement((0.3, 0.0)), (0.0, -9.81 * 1000.0 / k), atol=1e-12)
+    assert str(state.verdict).startswith("stable")
+    assert_allclose(scene.modes(2, state).frequencies, np.sqrt(k / 1000.0), rtol=1e-6)
+    history = scene.integrate(0.05, 1e-3, scheme="energy-momentum")
+    assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
+
+
+def test_what_is_not_scaled_is_a_body_force_too():
+    one = cantilever().gravity((0.0, -9.81)).solve_static()
+    two = cantilever().energy(lambda r, F, X, t: 9810.0 * r[1], scaled=False).solve_static()
+    assert_allclose(two.u, one.u, rtol=0, atol=1e-9 * np.abs(one.u).max())
+    for at in ((0.0, 0.0), (0.4, 0.0)):
+        a, b = one.resultants(at), two.resultants(at)
+        assert_allclose((b.M, b.Q), (a.M, a.Q), rtol=1e-6)
+
+
 # derivatives, shapes of problems
 
 
@@ -158,6 +210,80 @@ def test_derivatives_given_and_found_agree():
         soft, gradient).solve_static() for gradient in (None, soft_gradient))
     assert_allclose(a.u, b.u, rtol=0, atol=1e-10)
     assert str(a.verdict).startswith("stable")
+
+
+def test_psi_compiled_by_numba():
+    njit = pytest.importorskip("numba").njit
+
+    @njit
+    def psi(r, F, X, t):
+        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        return (50.0 * ((r[0] - X[0])**2 + (r[1] - X[1])**2 + J**2 * r[1]) + 10.0 * F[0, 1]**2
+                + 1e-9 * t)
+
+    @njit
+    def gradient(r, F, X, t):
+        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        d = 100.0 * (r - X)
+        d[1] += 50.0 * J**2
+        P = 100.0 * J * r[1] * np.array([[F[1, 1], -F[1, 0]], [-F[0, 1], F[0, 0]]])
+        P[0, 1] += 20.0 * F[0, 1]
+        return d, P
+
+    def solved(*functions):
+        return cantilever(4, 0.1, 0.1, ElementBeamANCF(2)).gravity((0.0, -9.81)).energy(
+            *functions).solve_static().u
+
+    u = solved(soft)
+    assert_allclose(solved(psi), u, rtol=0, atol=1e-10)
+    assert_allclose(solved(psi, gradient), u, rtol=0, atol=1e-10)
+    with pytest.raises(InputError, match="has to be, too"):
+        Energy(psi, soft_gradient)
+
+
+def test_derivatives_by_jax():
+    jnp = pytest.importorskip("jax.numpy")
+
+    def psi(r, F, X, t):
+        return soft(r, F, X, t) + 3.0 * jnp.abs(r[1] + 5.0)
+
+    a, b = (cantilever(4, 0.1, 0.1, ElementBeamANCF(2)).gravity((0.0, -9.81)).energy(
+        one, autodiff=auto).solve_static() for one, auto in (
+            (lambda r, F, X, t: soft(r, F, X, t) + 3.0 * r[1], False), (psi, True)))
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-10)
+
+
+def test_jax_is_an_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "jax", None)
+    with pytest.raises(MissingExtra, match="autodiff"):
+        cantilever(2).energy(lambda r, F, X, t: 4.0 * r[1], autodiff=True)
+    with pytest.raises(InputError, match="leave it out"):
+        Energy(soft, soft_gradient, autodiff=True)
+
+
+def test_an_energy_of_the_material_does_not_change_with_the_frame():
+    def neo_hooke(r, F, X, t):
+        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        return (F**2).sum(axis=(0, 1)) - 2.0 - 2.0 * np.log(J)
+
+    assert len(cantilever(2).energy(neo_hooke, check=True).loads) == 1
+    for psi, word in ((lambda r, F, X, t: F[0, 1]**2, "turned"),
+                      (lambda r, F, X, t: r[1]**2, "moved")):
+        with pytest.raises(InputError, match=f"is {word} as a whole"):
+            cantilever(2).energy(psi, check=True)
+
+
+def test_derivatives_are_checked_where_one_asks():
+    def psi(r, F, X, t):
+        return r[1] + (np.abs(r[1]) > 0.5) * (r[1] - 0.5)**2
+
+    beam = cantilever(2).beams[0]
+    wrong = Energy(psi, lambda r, F, X, t: (np.array([0 * r[0], 1.0 + 0 * r[1]]), 0 * F))
+    check_derivatives(wrong, beam)
+    with pytest.raises(InputError, match="not the derivative of psi"):
+        check_derivatives(wrong, beam, beam.rigid_motions()[:, 1])
+    with pytest.raises(InputError, match="takes an Energy"):
+        check_derivatives(psi, beam)
 
 
 @pytest.mark.parametrize("over", ["cells", "axis", "top", "right"])
@@ -190,10 +316,16 @@ def test_it_depends_on_time():
     (lambda r, F, X, t: np.nan * r[1], None, "NaN"),
     (lambda r, F, X, t: r[1], lambda r, F, X, t: (2.0 + 0.0 * r, 0.0 * F), "not the derivative"),
     (lambda r, F, X, t: r[1], lambda r, F, X, t: r, "two arrays"),
+    (lambda r, F, X, t: 1 / 0, None, "raised ZeroDivisionError"),
     (3, None, "must be a function")])
 def test_what_is_no_energy_is_said(psi, gradient, words):
     with pytest.raises(InputError, match=words):
         cantilever(2).energy(psi, gradient)
+
+
+def test_what_is_not_scaled_has_no_amplitude():
+    with pytest.raises(InputError, match="scaled=False"):
+        Energy(soft, amplitude=np.sin, scaled=False)
 
 
 def test_a_cable_has_none():

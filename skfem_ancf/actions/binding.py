@@ -12,6 +12,7 @@ from ..beam.layout import Layout
 from ..core.errors import AncfError, InputError, require_finite, shown
 from ..core.types import Array
 from .forces.base import ForceElement, Part, bind_force, derivative, try_force
+from .forces.unscaled import Unscaled
 from .item import Item, beside, require_entries
 from .joints.base import Joint, bind_joint, require_derivatives
 from .loads import Load, bind_load
@@ -19,12 +20,13 @@ from .places import Vector
 from .supports import Support
 
 
-def bind_item(item: Item, layout: Layout) -> list[Item]:
+def bind_item(item: Item, layout: Layout) -> list[Any]:
     """What an item is in the equations of a scene: loads, joints, force elements, supports."""
     if isinstance(item, Support):
         return [item.bind(layout)]
     if isinstance(item, Load):
-        return [bind_load(item, layout.beam(item.beam))]
+        load = bind_load(item, layout.beam(item.beam))
+        return [load if load.scaled else Unscaled(load, layout)]
     if isinstance(item, Joint):
         return [bind_joint(item, layout)]
     if isinstance(item, ForceElement):

@@ -8,41 +8,40 @@ import numpy as np
 
 from ..beam.distribution import AXIS, BODY, Sampled, Spread
 from ..beam.masses import points_along
-from ..beam.surfaces import LEFT, RIGHT, TOP, add_nodal, groups_of, surfaces_of
-from ..core.errors import InputError, ask, require_finite, require_function, require_slope
+from ..beam.surfaces import LEFT, RIGHT, TOP, groups_of, surfaces_of
+from ..core.errors import (InputError, ask, require_finite, require_flag, require_function,
+                           require_slope, shown)
 from ..core.quadrature import gauss, product_rule
+from .density import Density, points_of
+from .derivatives import IMAGINARY, REAL, by_jax, by_loops
 from .item import beside
-from .loads import Load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
 
     from ..beam.beam import Beam
     from ..beam.layout import Layout, WhichBeam
     from ..core.types import Array, Place, TimeFunction
     from .item import Item
 
-#: The six variables are r_0, r_1, F_00, F_01, F_10, F_11: by component, of r and of both slopes.
-_VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])
 _LOWER = np.tril_indices(6)
-#: Steps of the imaginary part, and of the real part relative to the size of a variable.
-_IMAGINARY, _REAL = 1e-30, 1e-5
 #: Part of the energies that is round-off of their sums.
 _ROUND_OFF = 1e-15
+#: By how much a density may change where the body is turned, relative to its largest value.
+_INVARIANT = 1e-9
 
 
-class _Points(NamedTuple):
-    """Points of elements (n,): where, X (2, n, np), weights (n, np), functions (n, nb, np, 3)."""
+class _Where(NamedTuple):
+    """Where points are: BODY, AXIS, a face or -1, the elements (n,), and the rule."""
 
     where: int
     elements: Array
     rule: Any
-    X: Array
-    weights: Array
-    functions: Array
 
 
-class Energy(Load):
+class Energy(Density):
     """An energy whose density is a function of yours, with derivatives that may be found.
 
     ``psi(r, F, X, t)`` is the energy per volume of the stress-free body, per area of a side or an
@@ -53,8 +52,12 @@ class Energy(Load):
     * ``X``: the material point, (2, nelements, npoints), its place in the stress-free body,
     * ``t``: the time of a motion; 0 in statics.
 
-    It is scaled with the loads, as gravity is: ``scene.buckling()`` finds the factor on it. The
-    energy-momentum scheme keeps the total energy. It acts on elements with sections.
+    It is scaled with the loads, as gravity is: ``scene.buckling()`` finds the factor on it; with
+    ``scaled=False`` it is there before any load, as a bedding is. The energy-momentum scheme keeps
+    the total energy. It acts on elements with sections.
+
+    A psi that Numba compiles, by ``@njit``, is asked at one point after the other, with arrays of
+    shapes (2,), (2, 2), (2,) and the time, and returns a number.
 
     Parameters
     ----------
@@ -73,6 +76,15 @@ class Energy(Load):
         The beam, its name or its number; None for all, of a place where the scene has only one.
     amplitude
         A function of time by which the energy is multiplied in a motion.
+    scaled
+        False for an energy that load factors do not scale. Its time is, as that of springs, in
+        statics the load factor.
+    autodiff
+        psi is written in ``jax.numpy``, for one point, and JAX finds its derivatives. Needs the
+        extra "autodiff".
+    check
+        Raise InputError if psi changes where the body is moved and turned as a whole: an energy of
+        the material alone does not.
 
     Raises
     ------
@@ -100,23 +112,25 @@ class Energy(Load):
     Science 6 (1996).
     """
 
-    constant = False
-    # of a bound one
-    _parts: Sequence[_Points]
-    _time = 0.0
-
     def __init__(self, psi: Callable[..., Any], gradient: Callable[..., Any] | None = None,
                  hessian: Callable[..., Any] | None = None, over: Place = "cells",
-                 beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
+                 beam: WhichBeam = None, amplitude: TimeFunction = None, scaled: bool = True,
+                 autodiff: bool = False, check: bool = False) -> None:
         super().__init__(beam, amplitude)
-        for name, function in (("psi", psi), ("gradient", gradient), ("hessian", hessian)):
-            if function is not None or name == "psi":
+        require_function("psi", psi, "of r, F, X and t")
+        given = {"gradient": gradient, "hessian": hessian}
+        for name, function in given.items():
+            if function is not None:
                 require_function(name, function, "of r, F, X and t")
+                if autodiff or hasattr(psi, "py_func") > hasattr(function, "py_func"):
+                    raise InputError(f"autodiff=True finds the {name}: leave it out" if autodiff
+                                     else f"psi is compiled by Numba: the {name} has to be, too")
+        self.scaled, self.check = require_flag("scaled", scaled), require_flag("check", check)
+        if amplitude is not None and not scaled:
+            raise InputError("an amplitude scales a load, and scaled=False says that this is none: "
+                             "let psi depend on its time t")
         self.psi, self.gradient, self.hessian, self.over = psi, gradient, hessian, over
-
-    @property
-    def first_order(self) -> bool:
-        return True
+        self.autodiff = require_flag("autodiff", autodiff)
 
     def expand(self, layout: Layout) -> Sequence[Item]:
         everywhere = self.beam is None and isinstance(self.over, str) and (
@@ -124,48 +138,42 @@ class Energy(Load):
         which = range(len(layout.beams)) if everywhere else [layout.number(self.beam)]
         return [self._with(beam=k) for k in which]
 
-    def bind(self, beam: Beam) -> Load:
+    def bind(self, beam: Beam) -> Any:
         if not getattr(beam, "has_sections", False):
             raise InputError(f"an Energy acts on elements with sections, as ElementBeamANCF(2), "
                              f"with positions linear in the degrees of freedom; not on {beam!r}")
         bound = self._with(beam=beam, _parts=_parts_of(beam, self.over))
         beside(bound._require_derivatives, beam.sizes)
+        if self.check:
+            bound._require_invariance()
         return bound
-
-    def acting(self, t: float | None) -> tuple[float, Load]:
-        return self.factor(t), self if t is None else self._with(_time=float(t))
 
     # the density and its derivatives at the six variables y, (6, n, np)
 
-    def _of_points(self, part, u):
-        """The six variables at the points, shape (6, n, np)."""
-        n, nb, points, _ = part.functions.shape
-        moved = part.functions.reshape(n, nb, -1).swapaxes(1, 2) @ (
-            self.beam.kernel.gather(u, part.elements))
-        moved = moved.reshape(n, points, 3, 2).transpose(3, 2, 0, 1)
-        y = np.empty((6, n, points), dtype=moved.dtype)
-        y[_VARIABLES] = moved
-        y[:2] += part.X
-        y[2] += 1.0
-        y[5] += 1.0
-        return y
+    @property
+    def _functions(self):
+        if self.autodiff:
+            return by_jax(self.psi)
+        if hasattr(self.psi, "py_func"):
+            return by_loops(self.psi, self.gradient, self.hessian, self.beam.mesh.height)
+        return {"psi": self.psi, "gradient": self.gradient, "hessian": self.hessian}
 
-    def _ask(self, name, y, X):
-        return ask(f"{name}(r, F, X, t) of an Energy", getattr(self, name), y[:2],
+    def _ask(self, name, y, part, times=1):
+        X = np.tile(part.X, (1, times, 1)) if times > 1 else part.X
+        return ask(f"{name}(r, F, X, t) of an Energy", self._functions[name], y[:2],
                    y[2:].reshape(2, 2, *y.shape[1:]), X, self._time)
 
-    def _density(self, y, X):
-        """psi at the variables (6, ..., n, np), all at once; X of shape (2, n, np)."""
+    def _density(self, y, part):
+        """psi at the variables (6, ..., n, np), all at once."""
         flat = y.reshape(6, -1, y.shape[-1])
-        times = flat.shape[1] // X.shape[1]
-        found = self._ask("psi", flat, np.tile(X, (1, times, 1)) if times > 1 else X)
+        found = self._ask("psi", flat, part, flat.shape[1] // part.X.shape[1])
         return _shaped("psi", found, flat.shape[1:]).reshape(y.shape[1:])
 
-    def _slope(self, y, X):
-        if self.gradient is None:
-            steps = _IMAGINARY * 1j * np.eye(6)[:, :, None, None]
-            return self._density(y[:, None] + steps, X).imag / _IMAGINARY
-        found = self._ask("gradient", y, X)
+    def _slope(self, y, part):
+        if self._functions["gradient"] is None:
+            steps = IMAGINARY * 1j * np.eye(6)[:, :, None, None]
+            return self._density(y[:, None] + steps, part).imag / IMAGINARY
+        found = self._ask("gradient", y, part)
         if not isinstance(found, (tuple, list)) or len(found) != 2:
             raise InputError("gradient(r, F, X, t) of an Energy must return two arrays, of "
                              "d psi / d r, (2, ...), and of d psi / d F, (2, 2, ...)")
@@ -174,49 +182,23 @@ class Energy(Load):
             _shaped("gradient", found[0], (2, *shape)),
             _shaped("gradient", found[1], (2, 2, *shape)).reshape(4, *shape)])
 
-    def _curvature(self, y, X):
-        if self.hessian is not None:
-            return _shaped("hessian", self._ask("hessian", y, X), (6, *y.shape))
+    def _curvature(self, y, part):
+        if self._functions["hessian"] is not None:
+            return _shaped("hessian", self._ask("hessian", y, part), (6, *y.shape))
         if self.gradient is not None:
-            steps = _IMAGINARY * 1j * np.eye(6)
-            return np.array([self._slope(y + d[:, None, None], X).imag for d in steps]) / _IMAGINARY
+            steps = IMAGINARY * 1j * np.eye(6)[:, :, None, None]
+            return np.array([self._slope(y + d, part).imag for d in steps]) / IMAGINARY
         i, j = _LOWER
-        sizes = _REAL * np.array([self.beam.mesh.height] * 2 + [1.0] * 4)
+        sizes = REAL * np.array([self.beam.mesh.height] * 2 + [1.0] * 4)
         d = (sizes * np.eye(6))[:, j, None, None]
-        step = _IMAGINARY * 1j * np.eye(6)[:, i, None, None]
-        both = self._density(np.stack([y[:, None] + step + d, y[:, None] + step - d], 1), X).imag
+        step = IMAGINARY * 1j * np.eye(6)[:, i, None, None]
+        both = self._density(np.stack([y[:, None] + step + d, y[:, None] + step - d], 1), part).imag
         out = np.empty((6, *y.shape))
-        out[i, j] = (both[0] - both[1]) / (2.0 * _IMAGINARY * sizes[j])[:, None, None]
+        out[i, j] = (both[0] - both[1]) / (2.0 * IMAGINARY * sizes[j])[:, None, None]
         out[j, i] = out[i, j]
         return out
 
-    # contracted for all local functions at once
-
-    def force(self, u: Array) -> Array:
-        out = np.zeros(self.beam.N)
-        for part in self._parts:
-            n, nb = part.functions.shape[:2]
-            P = self._slope(self._of_points(part, u), part.X) * part.weights
-            P = P[_VARIABLES].transpose(2, 3, 1, 0).reshape(n, -1, 2)
-            add_nodal(self.beam, part.elements, -(part.functions.reshape(n, nb, -1) @ P), out)
-        return out
-
-    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        rows, columns, values = [], [], []
-        for part in self._parts:
-            n, nb, points, _ = part.functions.shape
-            A = self._curvature(self._of_points(part, u), part.X) * part.weights
-            A = A[_VARIABLES[:, :, None, None], _VARIABLES].transpose(4, 5, 0, 1, 2, 3)
-            T = part.functions
-            AT = A.reshape(n, points, 12, 3) @ T.transpose(0, 2, 3, 1)  # (n, np, (i, k, j), nb)
-            AT = AT.reshape(n, points, 2, 3, 2, nb).transpose(0, 1, 3, 2, 5, 4)
-            K = T.reshape(n, nb, -1) @ AT.reshape(n, 3 * points, -1)  # (n, nb, (i, b, j))
-            dofs = self.beam.basis.element_dofs.T[part.elements]
-            i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
-            rows.append(i.ravel())
-            columns.append(j.ravel())
-            values.append(-K.ravel())
-        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+    # energies
 
     def potential(self, u: Array) -> float:
         return self._gain(np.zeros(self.beam.N), u)[0]
@@ -225,7 +207,7 @@ class Energy(Load):
         """The energy at u1 less that at u0, and what of it is round-off."""
         gain = noise = 0.0
         for part in self._parts:
-            a, b = (self._density(self._of_points(part, u), part.X) for u in (u0, u1))
+            a, b = (self._density(self._variables(u, part), part) for u in (u0, u1))
             gain += float(np.sum(part.weights * (b - a)))
             noise += _ROUND_OFF * float(np.sum(part.weights * (np.abs(a) + np.abs(b))))
         return gain, noise
@@ -243,19 +225,18 @@ class Energy(Load):
         """How its force is distributed; None if psi depends on F, or in sections of layers."""
         sampled = []
         for part in self._parts:
-            y = self._of_points(part, u)
-            P = self._slope(y, part.X)
+            P, (where, elements, rule) = self._slope(self._variables(u, part), part), part.of
             if np.any(np.abs(P[2:]) > 1e-12 * np.max(np.abs(P[:2]), initial=0.0)):
                 return None
-            if part.where == BODY:
+            if where == BODY:
                 if not self.beam.across.plain:
                     return None
-                xi, eta = part.rule
+                xi, eta = rule
                 values = -P[:2].reshape(*P[:2].shape[:2], len(xi), len(eta))
-                sampled.append(Sampled(BODY, part.elements, xi, values, eta))
-            elif part.where >= 0:
-                xi, w = part.rule
-                sampled.append(Sampled(part.where, part.elements, xi, -P[:2] * part.weights / w))
+                sampled.append(Sampled(BODY, elements, xi, values, eta))
+            elif where >= 0:
+                xi, w = rule
+                sampled.append(Sampled(where, elements, xi, -P[:2] * part.weights / w))
         stations: tuple[float, ...] = ()
         if self.over not in ("cells", "axis"):
             stations = groups_of(self.beam.mesh, surfaces_of(self.beam, self.over, 1))[1]
@@ -268,10 +249,10 @@ class Energy(Load):
     def _require_derivatives(self, u, d):
         """Raise InputError unless all functions fit together near a displacement u."""
         for part in self._parts:
-            y, dy = self._of_points(part, u), self._of_points(part, d)
-            dy -= self._of_points(part, 0.0 * d)
-            psi, before, after = (self._density(y + s * dy, part.X) for s in (0.0, -1.0, 1.0))
-            slopes = [self._slope(y + s * dy, part.X) for s in (-1.0, 0.0, 1.0)]
+            y, dy = self._variables(u, part), self._variables(d, part)
+            dy -= self._variables(0.0 * d, part)
+            psi, before, after = (self._density(y + s * dy, part) for s in (0.0, -1.0, 1.0))
+            slopes = [self._slope(y + s * dy, part) for s in (-1.0, 0.0, 1.0)]
             for name, one in (("psi", psi), ("its gradient", slopes[1])):
                 require_finite(f"{name} of {self!r}", one)
             noise = 1e-13 * np.max(np.abs(psi))
@@ -281,11 +262,62 @@ class Energy(Load):
                 (after - before).ravel(), 2.0 * np.einsum("kep,kep->ep", slopes[1], dy).ravel(),
                 noise, "; psi has to take complex arrays (no abs, real, comparisons), or give "
                 "gradient=" if own else "")
-            H = require_finite(f"the second derivatives of {self!r}", self._curvature(y, part.X))
+            H = require_finite(f"the second derivatives of {self!r}", self._curvature(y, part))
             if self.hessian is not None or not own:
                 require_slope(f"hessian of {self!r}", "gradient", (slopes[2] - slopes[0]).ravel(),
                               2.0 * np.einsum("klep,lep->kep", H, dy).ravel(),
                               1e-13 * np.max(np.abs(slopes[1])))
+
+    def _require_invariance(self):
+        """Raise InputError where psi changes while the body is moved and turned as a whole."""
+        shift, Q = self.beam.size * np.array([0.7, -0.4]), np.array([[0.6, -0.8], [0.8, 0.6]])
+        for part in self._parts:
+            y = self._variables(1e-2 * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)
+            moved = y.copy()
+            moved[:2] += shift[:, None, None]
+            turned = np.concatenate([moved[:2], np.einsum(
+                "ij,jk...->ik...", Q, y[2:].reshape(2, 2, *y.shape[1:])).reshape(y[2:].shape)])
+            psi, *others = (self._density(x, part) for x in (y, moved, turned))
+            for what, other in zip(("moved", "turned"), others):
+                if np.max(np.abs(other - psi)) > _INVARIANT * np.max(np.abs(psi)):
+                    raise InputError(
+                        f"psi of {self!r} changes where the body is {what} as a whole: it is no "
+                        "energy of the material alone, which depends on F^T F. Leave out check=True"
+                        " if something outside acts, as a bedding or a field")
+
+
+def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) -> None:
+    """Raise InputError unless gradient and hessian of an energy are derivatives of its psi.
+
+    A scene asks for this near the reference configuration, where it is given the energy.
+
+    Parameters
+    ----------
+    energy
+        An :class:`Energy`.
+    beam
+        A :class:`~skfem_ancf.Beam` with sections, at whose points it is asked.
+    u
+        Displacement of the degrees of freedom, shape (N,), near which it is asked, too.
+
+    Examples
+    --------
+    >>> from skfem_ancf import (Beam, ElementBeamANCF, Energy, MeshBeam, StVenantKirchhoff,
+    ...                         check_derivatives)
+    >>> beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> check_derivatives(Energy(lambda r, F, X, t: r[1]**2 * F[0, 1],
+    ...                          lambda r, F, X, t: (r, 0 * F)), beam)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    skfem_ancf.core.errors.InputError: gradient of ... is not the derivative of psi: ...
+    """
+    if not isinstance(energy, Energy):
+        raise InputError(f"check_derivatives takes an Energy, got {shown(energy)}")
+    bound = energy.bind(beam)
+    if u is not None:
+        bound._require_derivatives(require_finite("u", u, (beam.N,)),
+                                   1e-6 * beam.sizes * np.sin(np.arange(beam.N) + 1.0))
 
 
 def _shaped(name, found, shape):
@@ -307,23 +339,25 @@ def _parts_of(beam, over):
             X, W = product_rule(axis, section)
             weights = np.broadcast_to(beam.across.volume(layer, X, W, every, full=True),
                                       (len(every), len(W)))
-            out.append(_points(beam, BODY, every, X, weights, (axis[0], section[0])))
+            out.append(_points(beam, every, X, weights, _Where(BODY, every, (axis[0], section[0]))))
     elif over == "axis":
         xi, w = gauss(along)
         X = np.array([xi, 0.5 + 0.0 * xi])
         lengths = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))
-        out.append(_points(beam, AXIS, every, X, lengths * w, (xi, w)))
+        out.append(_points(beam, every, X, lengths * w, _Where(AXIS, every, (xi, w))))
     else:
         rule = gauss(beam.element.facet_points + 1)
         for one in surfaces_of(beam, over, len(rule[0])):
             where = -1 if one.side in (LEFT, RIGHT) else one.side // TOP
-            out.append(_points(beam, where, one.elements, one.X, one.areas, rule))
+            out.append(_points(beam, one.elements, one.X, one.areas,
+                               _Where(where, one.elements, rule)))
     return out
 
 
-def _points(beam, where, elements, X, weights, rule):
-    mapping = beam.mesh.mapping()
-    N, grad = beam.element.functions(mapping, X, elements)
-    both = np.stack(np.broadcast_arrays(N, grad[:, 0], grad[:, 1]), axis=-1)
-    functions = np.ascontiguousarray(both.swapaxes(0, 1))
-    return _Points(where, elements, rule, np.asarray(mapping.F(X, elements)), weights, functions)
+def _points(beam, elements, X, weights, of):
+    """Points at reference places X (2, np) of elements (n,)."""
+    mesh, mapping = beam.mesh, beam.mesh.mapping()
+    dofs = (beam.nd * mesh.t[:, elements].T[:, :, None] + np.arange(beam.nd)).reshape(
+        len(elements), -1)
+    return points_of(dofs, np.asarray(mapping.F(X, elements)), weights,
+                     *beam.element.functions(mapping, X, elements), of)

@@ -85,6 +85,8 @@ class Load(Item):
         The derivative of the force is symmetric: the load has a potential.
     linear : bool
         The force is linear in the displacement, but for a constant: it is assembled once.
+    scaled : bool
+        Load factors scale it. False for what is there before any load.
     for_bodies : bool
         It may act on a :class:`~skfem_ancf.RigidBody` too.
 
@@ -128,6 +130,7 @@ class Load(Item):
     beam: Any
     linear = False
     turning = False
+    scaled = True
     #: The factor in statics: 1 but for some loads of the package.
     at_rest = 1.0
     #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.

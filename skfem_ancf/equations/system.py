@@ -100,7 +100,8 @@ class System:
                      if len(np.intersect1d(fixed, self.of(body).start + np.arange(2, 4))) < 2]
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*directors, *joints],
-                                       self.stiffness_at_rest if elements else None)
+                                       self._holding if elements or any(
+                                           map(_holds, self.loads)) else None)
         self.forces = Forces(elements, self.N, self.bandwidth)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
@@ -236,6 +237,14 @@ class System:
         i, j, v = self.forces.entries(self.backend.tables.plain.forces, 0.0, zero, zero, 0.0)
         return sparse.csr_array((v, (i, j)), shape=(self.N, self.N))
 
+    def _holding(self):
+        """The stiffness that may hold what supports leave free."""
+        K = self.stiffness_at_rest()
+        for load in filter(_holds, self.loads):
+            first, (i, j, v) = self.of(load).start, load.stiffness(np.zeros(load.beam.N))
+            K = K - sparse.csr_array((v, (first + i, first + j)), shape=K.shape)
+        return K
+
     # damping
 
     @cached_property
@@ -358,6 +367,10 @@ class System:
         if u.shape != (self.N,):
             raise InputError(f"the displacement of the scene's coordinates has shape ({self.N},), "
                              f"got {u.shape}; the state of another mesh?")
+
+
+def _holds(load):
+    return load.first_order and not load.constant
 
 
 def _extent(bodies):

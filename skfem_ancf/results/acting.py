@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
+from ..actions.forces.unscaled import Unscaled
 from ..recovery.recovered import Recovery
 from ..recovery.section_forces import NotRecovered, SectionForces, viscous_forces
 from ..beam.distribution import Sampled, station_of_node, stations_of_vector
@@ -88,6 +89,9 @@ def recover(state: Any, number: int, at: list[float], u: Array,
             (unit * state.load * load.factor(state.t),
              load.spread((state if state.base is None else state.base).u_of(number)))
             for load in system.loads if load.beam is beam]
+        loads += [(unit, element.load.spread(state.u_of(number))) for element in
+                  system.forces.elements if isinstance(element, Unscaled)
+                  and element.load.beam is beam]
         sampled, places = distributed(state, beam, unit)
         acceleration = viscous = None
         if state.acceleration is not None:

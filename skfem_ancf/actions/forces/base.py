@@ -56,6 +56,9 @@ class ForceElement(Item):
         What :meth:`bind` has returned, once it is bound.
     groups
         Points of the surface that it may touch, of an obstacle.
+    entries
+        Of one whose stiffness is sparse, bound: rows and columns of its values, numbers of
+        components of the links, neighbours; None for one of the shape (n, 2, n, 2).
 
     Other Parameters
     ----------------
@@ -96,6 +99,7 @@ class ForceElement(Item):
     along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None
     links: Any = ()
     groups: Any = ()
+    entries: tuple[Array, Array] | None = None
 
     def bind(self, layout: Layout) -> Sequence[Vector]:
         """The points and sections on which it acts; the scene calls it of a copy.

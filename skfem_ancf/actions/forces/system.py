@@ -52,7 +52,6 @@ class Forces:
         self._place = np.argsort(order) if order else np.zeros(0, np.int64)
         n = len(self.parts)
         vectors = [[part.d, part.e] for part in self.parts]
-        own = [element.links for element in self.own]
         # links, numbers of their components, and where the derivatives by them are
         blocks: list[tuple[list[Vector], Array, Array]] = []
         for k, pair in enumerate(vectors):
@@ -60,11 +59,13 @@ class Forces:
             blocks.append((pair, rows, k + n * np.arange(16).reshape(4, 4)))
         row, at = 4 * n, 16 * n
         self._slices = []
-        for links in own:
-            m = 2 * len(links)
-            self._slices.append((slice(row, row + m), slice(at, at + m * m)))
-            blocks.append((links, row + np.arange(m), at + np.arange(m * m).reshape(m, m)))
-            row, at = row + m, at + m * m
+        for element in self.own:
+            m = 2 * len(element.links)
+            shape = (m, m) if element.entries is None else element.entries[0].shape
+            end = at + int(np.prod(shape))
+            self._slices.append((slice(row, row + m), slice(at, end)))
+            blocks.append((element.links, row + np.arange(m), np.arange(at, end).reshape(shape)))
+            row, at = row + m, end
         self._blocks, self.rows, self.size = blocks, row, at
         self._couplings = [self._coupling(k) for k in range(len(blocks))]
         self._far = [bool(np.any(np.abs(i - j) > bandwidth)) for i, j, _, _ in self._couplings]
@@ -78,6 +79,9 @@ class Forces:
         """Rows, columns, weights and places of the derivatives that element k adds."""
         links, _, places = self._blocks[k]
         dofs = [link.dofs[c] for link in links for c in range(2)]
+        if k >= len(self.parts) and (entries := self.own[k - len(self.parts)].entries) is not None:
+            i, j = (np.concatenate(dofs)[x] for x in entries)
+            return i, j, np.ones(len(i)), places
         weights = [row for link in links for row in link.weights]
         known = k >= len(self.parts)
         used = range(len(dofs)) if known or self.parts[k].kind == TORSION else range(2)
@@ -275,7 +279,7 @@ class Forces:
             if what == 0:
                 out[rows] -= np.ravel(element.mean_force(x, y, t))
             elif what == 1:
-                if np.any(y):
+                if element.resists and np.any(y):
                     out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
                                           - element.force(x, 0.0 * y, t))
             else:

@@ -1,0 +1,115 @@
+"""Loads that are densities at points, contracted for all local functions at once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .loads import Load
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..core.types import Array
+
+#: The six variables are r_0, r_1, F_00, F_01, F_10, F_11: by component, of r and of both slopes.
+VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])
+
+
+class Points(NamedTuple):
+    """Points of elements or facets.
+
+    Attributes
+    ----------
+    dofs
+        Degrees of freedom of each, shape (n, 2 nb).
+    X
+        The material points, shape (2, n, np).
+    weights
+        What they stand for, shape (n, np).
+    functions
+        Values and both derivatives of the local functions, shape (n, nb, np, 3).
+    of
+        What else is known of them.
+    """
+
+    dofs: Array
+    X: Array
+    weights: Array
+    functions: Array
+    of: Any = None
+
+
+def points_of(dofs: Array, X: Array, weights: Array, N: Array, grad: Array, of: Any) -> Points:
+    """Points with the local functions N, (nb, n, np), and their gradients, (nb, 2, n, np)."""
+    both = np.stack(np.broadcast_arrays(N, grad[:, 0], grad[:, 1]), axis=-1)
+    return Points(dofs, X, weights, np.ascontiguousarray(both.swapaxes(0, 1)), of)
+
+
+class Density(Load):
+    """A load by minus its force on virtual changes of position and deformation gradient.
+
+    A subclass finds ``_parts``, sequences of :class:`Points`, in ``bind``, and defines ``_slope(y,
+    part)`` and ``_curvature(y, part)``: six numbers at each point, (6, n, np), whose product with
+    the change of r_0, r_1, F_00, F_01, F_10, F_11 is minus the work, and their derivatives by
+    these, (6, 6, n, np), those of the change last. The variables are ``y``, (6, n, np).
+    """
+
+    constant = False
+    # of a bound one
+    _parts: Sequence[Points]
+    _time = 0.0
+
+    @property
+    def first_order(self) -> bool:
+        return True
+
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        return self.factor(t), self if t is None else self._with(_time=float(t))
+
+    def _slope(self, y, part):
+        raise NotImplementedError
+
+    def _curvature(self, y, part):
+        raise NotImplementedError
+
+    def _variables(self, u, part):
+        """The six variables at points, shape (6, n, np)."""
+        n, nb, points, _ = part.functions.shape
+        moved = part.functions.reshape(n, nb, -1).swapaxes(1, 2) @ u[part.dofs].reshape(n, nb, 2)
+        moved = moved.reshape(n, points, 3, 2).transpose(3, 2, 0, 1)
+        y = np.empty((6, n, points), dtype=moved.dtype)
+        y[VARIABLES] = moved
+        y[:2] += part.X
+        y[2] += 1.0
+        y[5] += 1.0
+        return y
+
+    def _force(self, P, part):
+        """The force (N,) of six numbers at the points."""
+        n, nb = part.functions.shape[:2]
+        P = (P * part.weights)[VARIABLES].transpose(2, 3, 1, 0).reshape(n, -1, 2)
+        out = np.zeros(self.beam.N)
+        np.add.at(out, part.dofs, -(part.functions.reshape(n, nb, -1) @ P).reshape(n, -1))
+        return out
+
+    def force(self, u: Array) -> Array:
+        return sum((self._force(self._slope(self._variables(u, part), part), part)
+                    for part in self._parts), np.zeros(self.beam.N))
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        rows, columns, values = [], [], []
+        for part in self._parts:
+            n, nb, points, _ = part.functions.shape
+            A = self._curvature(self._variables(u, part), part) * part.weights
+            A = A[VARIABLES[:, :, None, None], VARIABLES].transpose(4, 5, 0, 1, 2, 3)
+            T = part.functions
+            AT = A.reshape(n, points, 12, 3) @ T.transpose(0, 2, 3, 1)  # (n, np, (i, k, j), nb)
+            AT = AT.reshape(n, points, 2, 3, 2, nb).transpose(0, 1, 3, 2, 5, 4)
+            K = T.reshape(n, nb, -1) @ AT.reshape(n, 3 * points, -1)  # (n, nb, (i, b, j))
+            i, j = np.broadcast_arrays(part.dofs[:, :, None], part.dofs[:, None])
+            rows.append(i.ravel())
+            columns.append(j.ravel())
+            values.append(-K.ravel())
+        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

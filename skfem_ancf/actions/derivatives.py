@@ -1,0 +1,120 @@
+"""Densities of points as functions of arrays, with derivatives, by Numba's loops or by JAX."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import MissingExtra
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+#: Steps of the imaginary part, and of the real part relative to the size of a variable.
+IMAGINARY, REAL = 1e-30, 1e-5
+
+
+@lru_cache(32)
+def by_jax(psi: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
+    """A density in JAX, and its derivatives."""
+    try:
+        import jax
+    except ImportError:
+        raise MissingExtra("jax", "autodiff") from None
+    double = getattr(jax, "enable_x64", None)
+    if double is None:  # before 0.8
+        from jax.experimental import enable_x64 as double
+
+    def one(y, X, t):
+        return psi(y[:2], y[2:].reshape(2, 2), X, t)
+
+    def at_points(function):
+        found = jax.jit(jax.vmap(function, (1, 1, None), -1))
+
+        def of(r, F, X, t):
+            y = np.concatenate([r, F.reshape(4, *r.shape[1:])])
+            with double(True):
+                out = np.asarray(found(y.reshape(6, -1), X.reshape(2, -1), t))
+            return out.reshape(*out.shape[:-1], *r.shape[1:])
+
+        return of
+
+    return {"psi": at_points(one), "gradient": _in_two(at_points(jax.grad(one))),
+            "hessian": at_points(jax.hessian(one))}
+
+
+def _in_two(gradient):
+    """A gradient by all six variables as those by r and F."""
+    def of(r, F, X, t):
+        out = gradient(r, F, X, t)
+        return out[:2], out[2:].reshape(F.shape)
+
+    return of
+
+
+@lru_cache(32)
+def by_loops(psi: Any, gradient: Any, hessian: Any,
+             height: float) -> dict[str, Callable[..., Any]]:
+    """Compiled functions of one point, called in loops, and derivatives of psi where none is given.
+
+    These are complex steps, and differences of them for the second ones, with steps relative to
+    the height.
+    """
+    from numba import njit
+
+    steps = REAL * np.array([height] * 2 + [1.0] * 4)
+
+    def stepped(r, F, x, t, z, out):
+        for k in range(6):
+            kept = z[k]
+            z[k] += 1j * IMAGINARY
+            out[k] = complex(psi(r, F, x, t)).imag / IMAGINARY
+            z[k] = kept
+
+    def density(r, F, x, t, z, out):
+        out[0] = psi(r, F, x, t)
+
+    def given(r, F, x, t, z, out):
+        out[:2], b = gradient(r, F, x, t)
+        out[2:] = b.copy().reshape(4)
+
+    def curvature(r, F, x, t, z, out):
+        out[:] = hessian(r, F, x, t).copy().reshape(36)
+
+    def differences(r, F, x, t, z, out):
+        a = np.empty((2, 6))
+        for k in range(6):
+            kept = z[k]
+            for side in range(2):
+                z[k] = kept + (2 * side - 1) * steps[k]
+                slope_of(r, F, x, t, z, a[side])
+            z[k] = kept
+            out[k::6] = 0.5 * (a[1] - a[0]) / steps[k]
+
+    slope = stepped if gradient is None else given
+    slope_of, kind = njit(slope), complex if gradient is None else float
+
+    def at_points(function, shape, dtype):
+        one, size = njit(function), int(np.prod(shape))
+
+        @njit(error_model="numpy")
+        def loop(y, X, t, z, x, out):
+            r, F = z[:2], z[2:].reshape(2, 2)
+            for p in range(y.shape[1]):
+                z[:], x[:] = y[:, p], X[:, p]
+                one(r, F, x, t, z, out[p])
+
+        def of(r, F, X, t):
+            y = np.concatenate([r, F.reshape(4, *r.shape[1:])]).reshape(6, -1)
+            out = np.empty((y.shape[1], size))
+            loop(y, X.reshape(2, -1), float(t), np.empty(6, dtype), np.empty(2), out)
+            return out.T.reshape(*shape, *r.shape[1:])
+
+        return of
+
+    return {"psi": at_points(density, (), float),
+            "gradient": _in_two(at_points(slope, (6,), kind)),
+            "hessian": at_points(differences, (6, 6), kind) if hessian is None else
+            at_points(curvature, (6, 6), float)}
