@@ -23,9 +23,8 @@ def by_jax(psi: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
         import jax
     except ImportError:
         raise MissingExtra("jax", "autodiff") from None
-    double = getattr(jax, "enable_x64", None)
-    if double is None:  # before 0.8
-        from jax.experimental import enable_x64 as double
+    from jax import experimental
+    double = getattr(jax, "enable_x64", None) or experimental.enable_x64  # the latter before 0.8
 
     def one(y, X, t):
         return psi(y[:2], y[2:].reshape(2, 2), X, t)
