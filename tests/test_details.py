@@ -18,7 +18,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
                         SupportError, forms)
 from skfem_ancf.actions.joints import Joint, PrescribedAngle, Weld
 from skfem_ancf.beam.distribution import BODY, Sampled
-from skfem_ancf.beam.interpolation import locate
+from skfem_ancf.beam.kinematics import locate
 from skfem_ancf.core.quadrature import gauss, tensor
 from skfem_ancf.dynamics import steps
 from skfem_ancf.dynamics.integrator import Integrator

@@ -1,11 +1,16 @@
 """Material points, one and many: found, remembered, refused, and what they give."""
 
+import sys
+import time
+from pathlib import Path
+
 import numpy as np
 import pytest
 from conftest import quarter_arc, s_curve
 from numpy.testing import assert_allclose
 from test_io import affine
 
+import skfem_ancf
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, MeshError,
                         NameUnknown, Scene, StVenantKirchhoff)
 
@@ -155,3 +160,63 @@ def test_points_of_the_exact_curve_are_points_of_a_cable(degree):
     Scene(beam).clamp("left").spring(1.0, between=((beam, at), ("ground", (0.5, 1.0)))).system
     with pytest.raises(InputError, match="off the axis"):
         Scene(beam).clamp("left").point_force(force, tuple(arc(0.546875) + [-1e-4, 1e-4]))
+
+
+def modules_of(call):
+    """Modules of the package that a call passes, in order, and from which each is entered."""
+    folder, found = str(Path(skfem_ancf.__file__).parent), {}
+
+    def watch(frame, event, _):
+        if event != "call" or not frame.f_code.co_filename.startswith(folder):
+            return
+        back = frame.f_back
+        while back is not None and not back.f_code.co_filename.startswith(folder):
+            back = back.f_back
+        here, there = (f and f.f_code.co_filename[len(folder) + 1:] for f in (frame, back))
+        if here != there:
+            found.setdefault(here, set()).add(there)
+
+    sys.setprofile(watch)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    return found
+
+
+@pytest.mark.parametrize("recover", [True, False])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
+@pytest.mark.parametrize("mesh", MESHES)
+def test_the_strain_at_points_takes_one_short_road(mesh, element, recover):
+    """One point and many pass the same modules, each once, and at most five."""
+    state = loaded(Beam(MESHES[mesh](), element, STEEL, 0.1))
+    x = inside(state.beams[0].mesh)[2]
+    state.strain(x, recover=recover)  # recovered fields are made when they are first asked for
+    roads = [modules_of(lambda p=p: state.strain(p, recover=recover))
+             for p in (x, x[:, 0], [tuple(p) for p in x.T])]
+    assert roads[0] == roads[1] == roads[2]
+    assert len(roads[0]) <= 5, list(roads[0])
+    for module, entered in roads[0].items():
+        assert len(entered) == 1 or module == "core/errors.py", (module, entered)
+        assert "results/state.py" != module or entered == {None}
+
+
+def test_time_of_the_strain_at_points():
+    """Relative to that of 800 square roots of 1000 numbers, about 1 ms."""
+    state = loaded(Beam(MeshBeam.init_line(np.linspace(0, 1, 17), 0.1), ElementBeamANCF(2), STEEL,
+                        0.1))
+    x = np.random.default_rng(0).random((2, 10_000)) * [[1.0], [0.1]] - [[0.0], [0.05]]
+    numbers = np.linspace(1.0, 2.0, 1000)
+
+    def least(call, times=20):
+        out = []
+        for _ in range(times):
+            start = time.perf_counter()
+            call()
+            out.append(time.perf_counter() - start)
+        return min(out)
+
+    state.strain(x)
+    unit = least(lambda: [np.sqrt(numbers) for _ in range(800)])
+    assert least(lambda: state.strain(x)) < 20.0 * unit
+    assert least(lambda: state.strain((0.3, 0.02))) < unit

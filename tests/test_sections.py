@@ -13,7 +13,7 @@ from skfem.helpers import sym_grad
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, ModelWarning, NameUnknown, NeoHookean, Scene, Section,
                         StVenantKirchhoff)
-from skfem_ancf.beam.interpolation import locate
+from skfem_ancf.beam.kinematics import locate
 from skfem_ancf.core.errors import CallError
 from skfem_ancf.core.quadrature import gauss
 from skfem_ancf.materials.base import hooke

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, Sampled, Spread
-from ..beam.interpolation import probe
+from ..beam.kinematics import probe
 from ..beam.kernels.section import beam_gradients
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.points import Points

@@ -24,7 +24,7 @@ from skfem.element import DiscreteField
 
 from ..beam.beam import Beam
 from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
-from ..beam.interpolation import locate, probe
+from ..beam.kinematics import locate, probe
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..beam.kinematics import direction
 from ..beam.layout import Layout, WhichBeam, WhichMember

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..beam.interpolation import locate, probe_reference
+from ..beam.kinematics import locate, probe_reference
 from ..beam.kinematics import direction as direction_of, direction_weights
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
@@ -175,7 +175,7 @@ def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
         return found
     where = [(b, *locate(b, at)) for b in beams]
     off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]
-    return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.alike]
+    return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.equal]
 
 
 def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:

@@ -27,7 +27,6 @@ from ..mesh.mesh_beam import MeshBeam, reach
 from ..mesh.places import facets_of
 from ..sections import Across, Rectangle, Section
 from . import kinematics
-from .interpolation import probe
 from .masses import Masses, exact_rule, masses_of
 from .strains import BeamLayer, Interpolation, on_grid, strain_at, stress_at
 
@@ -298,7 +297,7 @@ class Beam(Immutable):
         dofs, weights
             Shapes (2, n) and (n,): ``q[dofs] @ weights`` is the position.
         """
-        return probe(self, point)
+        return kinematics.probe(self, point)
 
     @cached_property
     def size(self) -> float:

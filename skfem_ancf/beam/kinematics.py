@@ -14,6 +14,7 @@ from ..core.errors import InputError, ModelWarning, warn
 from ..core.linear import first_order
 from ..core.quadrature import gauss
 from ..core.types import Array
+from ..mesh.places import as_point
 from .kernels import CableKernel, SectionKernel
 from .strains import cable_axis, fibres
 
@@ -40,6 +41,34 @@ def require_cable(beam: Any) -> None:
         warn(f"a cable has no shear deformation and ignores GA={GA:g} of {section!r}, which would "
              f"add {share:.1%} to the deflection of a cantilever of its length: use an element "
              "with sections, as ElementBeamANCFCubic(2), or leave GA out", ModelWarning)
+
+
+def locate(beam: Any, point: Any) -> tuple[int, Array]:
+    """The element of a material point, and its point (xi, eta) of the reference cell.
+
+    The point is its place (x, y) in the reference configuration, or the name of an end; raises
+    MeshError outside the body.
+    """
+    e, X, _ = beam.finder.inside(as_point(point, beam.mesh)[:, None])
+    return int(e[0]), X[:, 0]
+
+
+def probe(beam: Any, point: Any, at: tuple[int, Array] | None = None) -> tuple[Array, Array]:
+    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`, of a point that :func:`locate` may know."""
+    e, X = locate(beam, point) if at is None else at
+    if not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed:
+        raise InputError(
+            f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
+            "position there is no linear function of its degrees of freedom: name a point of the "
+            "axis, and put a moment on an end section with scene.moment")
+    return probe_reference(beam, e, X)
+
+
+def probe_reference(beam: Any, e: int, X: Array) -> tuple[Array, Array]:
+    """As :func:`probe`, for a point (2,) of the reference cell of an element."""
+    dofs = beam.mesh.t[0, e] * beam.nd + np.arange(2 * beam.nd).reshape(-1, 2).T
+    X = np.reshape(X, (2, 1, 1))
+    return dofs, beam.element.of_mesh(beam.mesh.mapping(), X, np.array([e]))[0].ravel()
 
 
 def direction(beam: Any, node: int) -> tuple[Array, Array]:

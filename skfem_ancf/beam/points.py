@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
+from ..core.errors import (InputError, MeshError, require_finite, require_integer, require_point,
+                           shown)
 from ..core.types import Array
-from ..mesh.mesh_beam import MeshBeam
 from ..mesh.places import as_point
 from .beam import Beam
-from .interpolation import BeamPoints, BodyPoints, Located
 from .layout import WhichMember, select_beam, select_member
 from .rigid import RigidBody
+from .strains import strain_at
 
 
 def is_many(points: Any) -> bool:
@@ -30,21 +30,194 @@ def is_many(points: Any) -> bool:
         isinstance(p, (list, tuple, np.ndarray)) for p in points)
 
 
-def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
+def as_points(points: Any) -> Array:
     """Many points as an array (2, n), or one as an array (2,); raises MeshError for others.
 
     Two numbers are one point. Many are a list of pairs, or an array (2, n), whose columns are
     points: those of an array of shape (2, 2) too, as of scikit-fem's ``mesh.p``.
     """
     if not is_many(points):
-        return as_point(points, mesh)
+        return require_point(points)
     if isinstance(points, np.ndarray):
         if len(points) == 2:
             return require_finite("points", points)
         hint = "; give its transpose, or a list" if points.shape[1] == 2 else ""
         raise MeshError("an array of points has shape (2, n), the x in its first row and the y in "
                         f"its second, got {points.shape}{hint}")
-    return np.array([as_point(p) for p in points]).T
+    return np.array([require_point(p) for p in points]).T
+
+
+#: How far from the middle of the section, relative to its height, the axis of a cable reaches.
+ON_AXIS = 1e-12
+
+
+class BeamPoints:
+    """Points of one beam.
+
+    Attributes
+    ----------
+    beam, number
+        The beam and its number.
+    slice : slice
+        Its degrees of freedom in the scene.
+    index
+        Which of the points asked for they are, (n,), or None for all.
+    e, X
+        Elements (n,) and reference points (2, n).
+    """
+
+    def __init__(self, beam: Any, number: int, dofs: slice, index: Array | None,
+                 e: Array, X: Array) -> None:
+        self.beam, self.number, self.slice, self.index = beam, number, dofs, index
+        self.n, self.e, self.X = len(e), e, X
+
+    @cached_property
+    def at(self) -> Array:
+        """Reference points as the fields of a beam take them, (2, n, 1)."""
+        return self.X[:, :, None]
+
+    @cached_property
+    def start(self) -> Array:
+        """Positions in the reference configuration, (2, n)."""
+        return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
+
+    @cached_property
+    def off_axis(self) -> bool:
+        """Points of a cable off its axis: their section turns with the tangent."""
+        return not self.beam.has_sections and bool(np.any(np.abs(self.X[1] - 0.5) > ON_AXIS))
+
+    @cached_property
+    def dofs(self) -> Array:
+        """Degrees of freedom of the scene that move each point, (nb, 2, n)."""
+        first = self.slice.start + self.beam.mesh.t[0, self.e] * self.beam.nd
+        return first + np.arange(2 * self.beam.nd).reshape(-1, 2, 1)
+
+    @cached_property
+    def _functions(self):
+        return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.at, self.e)
+
+    @property
+    def weights(self) -> Array:
+        """Their weights in the position, (nb, n)."""
+        return self._functions[0][..., 0]
+
+    @property
+    def slopes(self) -> Array:
+        """Their weights in the derivative of the position by xi, (nb, n)."""
+        return self._functions[1][..., 0]
+
+    def combine(self, weights: Array, u: Array) -> Array:
+        """The sum (..., 2, n) of weighted degrees of freedom (..., N) at each point."""
+        return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
+        moved = self.combine(self.weights, u)
+        if not self.off_axis:
+            return moved
+        before, now = self._tangents(u)
+        turn = now / _length(now) - before / _length(before)
+        return moved + self._lever * np.stack([-turn[..., 1, :], turn[..., 0, :]], -2)
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
+        moved = self.combine(self.weights, v)
+        if not self.off_axis:
+            return moved
+        a, rate = self._tangents(u)[1], self.combine(self.slopes, v)
+        turn = (a[..., 0, :] * rate[..., 1, :] - a[..., 1, :] * rate[..., 0, :])[..., None, :]
+        return moved - self._lever * turn / _length(a) ** 3 * a
+
+    def _tangents(self, u):
+        """Derivatives of the axis by xi before and after a displacement, (..., 2, n)."""
+        start, q0 = self.slice.start, self.beam.q0_local
+        before = sum(w * q0[d - start] for w, d in zip(self.slopes, self.dofs))
+        return before, before + self.combine(self.slopes, u)
+
+    @cached_property
+    def _lever(self):
+        basis, (xi, eta) = self.beam.interpolation, self.X
+        return (eta - 0.5) * basis.height * basis.height_at(self.e, xi)
+
+    def strain(self, u: Array, recovery: Any = None) -> Array:
+        """Strain (eps_xx, eps_yy, 2 eps_xy), (3, n), for ``u`` (N,) of the scene.
+
+        The recovered one, where a :class:`~skfem_ancf.recovery.recovered.Recovery` is given.
+        """
+        if recovery is not None:
+            return recovery.at(self.e, self.X, slice(0, 3))
+        return strain_at(self.beam, u[self.slice], self.e, self.X)
+
+
+def _length(a):
+    return (a[..., :1, :] ** 2 + a[..., 1:, :] ** 2) ** 0.5
+
+
+class BodyPoints:
+    """Points of one rigid body; attributes as of :class:`BeamPoints`."""
+
+    off_axis = False  # its points move linearly in its degrees of freedom
+
+    def __init__(self, body: RigidBody, dofs: slice, index: Array | None,
+                 start: Array) -> None:
+        self.body, self.slice, self.index, self.start = body, dofs, index, start
+        self._frame = body.local(start)
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
+        x, y, c, s = np.moveaxis(u[..., self.slice, None], -2, 0)
+        a, b = self._frame
+        return np.stack([x + a * c - b * s, y + a * s + b * c], axis=-2)
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
+        return self.displacement(v)
+
+    @property
+    def number(self) -> int:
+        """Raises InputError: a rigid body has no fields."""
+        raise InputError(f"{self.body!r} has no strain, stress or section forces: ask for points "
+                         "of beams")
+
+
+class Located:
+    """Points of a scene.
+
+    Attributes
+    ----------
+    one : bool
+        They were given as a single point.
+    n : int
+        How many.
+    parts : list of BeamPoints and BodyPoints
+        Those of each beam and body that has some.
+    """
+
+    def __init__(self, one: bool, n: int, parts: Sequence[Any]) -> None:
+        self.one, self.n, self.parts = one, n, parts
+
+    def gather(self, values: Sequence[Array]) -> Array:
+        """One array of those of the parts, (..., n) each; (...) for a single point."""
+        if len(self.parts) == 1 and self.parts[0].index is None:
+            out = values[0]
+        else:
+            out = np.empty(values[0].shape[:-1] + (self.n,), np.result_type(*values))
+            for part, value in zip(self.parts, values):
+                out[..., part.index] = value
+        return out[..., 0] if self.one else out
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (..., 2), or (..., 2, n) of many, for degrees of freedom (..., N)."""
+        return self.gather([part.displacement(u) for part in self.parts])
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2), or (..., 2, n) of many, for degrees of freedom and their rates."""
+        return self.gather([part.velocity(u, v) for part in self.parts])
+
+    @cached_property
+    def start(self) -> Array:
+        """Positions in the reference configuration."""
+        return self.gather([part.start for part in self.parts])
 
 
 class Points:
@@ -96,7 +269,7 @@ class Points:
             beam = select_beam(self.beams, beam)
         elif len(self.beams) == 1 and not self.bodies:
             beam = self.beams[0]
-        x = as_points(points, None if beam is None else beam.mesh)
+        x = as_points(points)
         one, x = x.ndim == 1, np.reshape(x, (2, -1))
         return Located(one, x.shape[1], self._in_all(x, ask) if beam is None else
                        [self._in_one(x, beam, chain, ask)])
@@ -124,14 +297,9 @@ class Points:
 
     def _ask(self, x, beams):
         """Raise InputError: the axes of several lines are nearest to a point, shape (2, 1)."""
-        found, least = [], np.inf
-        for b in beams:
-            for chain in b.finder.chains_at(x):
-                e, X, *_ = b.finder.find(x, chain)
-                off = float(b.finder.from_axis(e, X)[0])
-                found.append((off, b, chain))
-                least = min(least, off)
-        found = [(b, chain) for off, b, chain in found if off <= least + b.finder.alike]
+        held = [(off, b, chain) for b in beams for off, chain in b.finder.chains_at(x)]
+        least = min(off for off, *_ in held)
+        found = [(b, chain) for off, b, chain in held if off <= least + b.finder.equal]
         where = f"the point {shown(tuple(map(float, x[:, 0])))} is as near to the axes of "
         if self._lines is None and len({id(b) for b, _ in found}) > 1:
             names = [k if b.name is None else b.name
@@ -156,13 +324,11 @@ class Points:
                        [BodyPoints(body, self._slice_of(body), None, start)])
 
     def _slice_of(self, body):
-        return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
+        return self.slices[len(self.beams) + self.bodies.index(body)]
 
     def _in_one(self, x, beam, chain, ask):
         """Points (2, n) of one beam."""
-        e, X, outside, tied = beam.finder.find(x, chain)
-        if np.any(outside > beam.finder.allowed):
-            raise beam.finder.refuse(x, outside, chain)
+        e, X, tied = beam.finder.inside(x, chain)
         if ask and np.any(tied):
             self._ask(x[:, [np.argmax(tied)]], [beam])
         k = self.beams.index(beam)
@@ -183,7 +349,7 @@ class Points:
             on = outside <= finder.allowed
             near, e, X, tied = near[on], e[on], X[:, on], tied[on]
             off, before = finder.from_axis(e, X), least[near]
-            nearer, farther = off < before - finder.alike, off > before + finder.alike
+            nearer, farther = off < before - finder.equal, off > before + finder.equal
             several[near] = np.where(nearer, tied, several[near] | ~farther)
             near, e, X, off = near[nearer], e[nearer], X[:, nearer], off[nearer]
             which[near], least[near], elements[near], cells[:, near] = k, off, e, X

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
+from numpy.polynomial.polynomial import polyval
 
 from ..core.types import Array, Law, Rule
 from ..formulations import COMPONENTS
@@ -50,19 +51,27 @@ class Interpolation:
 
     def __init__(self, beam: Any) -> None:
         mesh, element, mapping = beam.mesh, beam.element, beam.mesh.mapping()
-        self.nodes, self.lengths = mesh.t, mesh.lengths
-        #: Of straight elements of one height the tangents and the height; else the mapping.
+        self.nodes, self.lengths, self.start = mesh.t, mesh.lengths, beam.q0_local
+        #: The reference configuration is more than straight elements of this height.
+        self.is_general = not mesh.is_straight or mesh.heights is not None
         self.tangents, self.height = mesh.p_X[:, mesh.t[0]], mesh.height
-        self.mapping = None if mesh.is_straight and mesh.heights is None else mapping
+        self._heights = None if mesh.heights is None else mapping.heights
+        #: Of the layers of a cable, lateral contraction over stretch.
+        self.lateral_ratios = None if beam.has_sections else np.array(
+            [layer.material.lateral_ratio for layer in beam.across.layers])
         p, m = element.axis_degree + 1, max(element.order, 1) + 1
         swell = np.array([across for _, _, across in element.functionals] * 2)
         X = np.array([np.repeat(places(p), m), np.tile(places(m), p)])
         unit = transform(p) @ element.local(X, 1.0)[0].reshape(-1, p, m) @ transform(m).T
         self.table = mesh.height ** swell[:, None, None] * unit
-        n = p if mapping.heights_of(0) is None else p + mapping.height_degree * int(swell.max())
+        n = p + mapping.height_degree * int(swell.max())
         self.shape, self.swell = (n, m), swell
         self.by_xi, self.by_eta = _slope_matrix(n), _slope_matrix(m)
         self.slope = element.local(np.zeros((2, 1)), 1.0)[3]
+
+    def height_at(self, e: Array, xi: Array) -> Any:
+        """Heights over the largest at places xi (..., n) of elements (n,)."""
+        return 1.0 if self._heights is None else polyval(xi, self._heights[:, e], tensor=False)
 
     def of_elements(self, q: Array, e: Array) -> Array:
         """The coefficients (p, m, 2, n) of degrees of freedom (N,) on elements (n,)."""
@@ -71,14 +80,13 @@ class Interpolation:
         q_e[:, len(self.slope) // 2] -= q_e[:, 0]  # from the first node: less round-off
         q_e[:, 0] = 0.0
         q_e = q_e.transpose(1, 2, 0) * (self.lengths[e] ** self.slope[:, None])[:, None]
-        heights = self.mapping and self.mapping.heights_of(e)
-        if heights is None:
+        if self._heights is None:
             found = self.table.reshape(len(q_e), -1).T @ q_e.reshape(len(q_e), -1)
         else:  # functions of the section are h^m P(Y / h)
             n, p = self.shape[0], self.table.shape[1]
             x = places(n)
             functions = (chebvander(2.0 * x - 1.0, p - 1) @ self.table).transpose(1, 2, 0)
-            swollen = heights(x[:, None])[0][:, None] ** self.swell[:, None]
+            swollen = self.height_at(e, x[:, None])[:, None] ** self.swell[:, None]
             found = transform(n) @ (functions @ (
                 swollen[:, :, None] * q_e).reshape(n, len(q_e), -1)).reshape(n, -1)
         return found.reshape(*self.shape, *q_e.shape[1:])
@@ -117,6 +125,8 @@ class Gradients:
         of, self.at = (e, np.arange(len(e))) if few else (np.arange(ne), e)
         self._known: dict[float, Array] = {}
         c = basis.of_elements(u, of)
+        if basis.is_general:  # every element contains its map from the reference cell
+            c = np.concatenate([c, basis.of_elements(basis.start, of)], axis=2)
         self.by = np.array([np.tensordot(basis.by_xi, c, 1),
                             np.einsum("jk,pk...->pj...", basis.by_eta, c)])
 
@@ -132,13 +142,16 @@ class Gradients:
             if xi not in self._known:
                 T = chebvander(2.0 * xi - 1.0, self.by.shape[1] - 1)
                 self._known[xi] = np.tensordot(T, self.by, (-1, 1))
-            table = self._known[xi].reshape(2, m, 2, -1)
+            table = self._known[xi].reshape(2, m, *self.by.shape[3:])
         by_xi, by_eta = _sum(table.swapaxes(0, 1), eta, at)
         basis = self.basis
-        if basis.mapping is None:
+        if not basis.is_general:
             return by_xi / basis.lengths[e], by_eta / basis.height, basis.tangents[:, e]
-        (a, b), (c, d), (x, y) = basis.mapping.derivatives(e, xi, eta)
-        det = a * d - b * c
+        (*by_xi, a, b), (*by_eta, c, d) = by_xi, by_eta
+        x, y = _sum(table[0, :, 2:], 0.5, at)
+        size = np.sqrt(x * x + y * y)
+        x, y, det = x / size, y / size, a * d - b * c
+        by_xi, by_eta = np.array(by_xi), np.array(by_eta)
         return (((x * d - y * c) * by_xi + (a * y - b * x) * by_eta) / det,
                 ((a * x + b * y) * by_eta - (x * c + y * d) * by_xi) / det, (x, y))
 
@@ -286,10 +299,11 @@ def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any,
 
 def fibres(beam: Any, e: Array, X: Array, extension: Array, bending: Array, kappa0: Array) -> Any:
     """Strain of the fibres of a cable by their length at points (2, n), and eps_yy over eps_xx."""
-    at = X[:, :, None]
-    Y, which = beam.mesh.mapping().offset(at, e), beam.across.which(at, e)
-    ratios = np.array([layer.material.lateral_ratio for layer in beam.across.layers])[which]
-    Y, ratios = (np.broadcast_to(x, at.shape[1:])[:, 0] for x in (Y, ratios))
+    basis = beam.interpolation
+    Y = (X[1] - 0.5) * basis.height * basis.height_at(e, X[0])
+    ratios = basis.lateral_ratios
+    if len(ratios) > 1:
+        ratios = ratios[beam.across.which(X[:, :, None], e)[:, 0]]
     return (extension - Y * bending) / (1.0 - Y * kappa0), -ratios
 
 

@@ -272,6 +272,15 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     return array
 
 
+def require_point(point: Any) -> Array:
+    """A material point as an array (2,); MeshError unless it is two numbers."""
+    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and not any(
+            isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x) for x in point):
+        return require_finite("a material point", point, (2,))
+    raise MeshError("a material point has two coordinates (x, y), its place in the reference "
+                    f"configuration, or is the name of an end, as 'right', got {shown(point)}")
+
+
 def _real_array(name, value):
     require_unmasked(name, value)
     try:

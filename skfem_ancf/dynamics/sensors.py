@@ -14,7 +14,7 @@ from ..actions.joints.base import Joint
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..beam.interpolation import Located
+    from ..beam.points import Located
     from ..results.state import State
     from ..equations.system import System
     from ..core.types import Array

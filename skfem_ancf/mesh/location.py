@@ -1,21 +1,101 @@
-"""The elements that hold points of the reference configuration, many points at once."""
+"""Points of the body in the reference cells of its elements, many at once."""
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
+from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
+from numpy.polynomial.polynomial import polyder, polyval
 
 from ..core.errors import MeshError
+from .reference_cell import hermite_basis
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from ..core.types import Array
+
+#: Corrections of Newton's method that are small enough.
+CLOSE = 1e-7
 
 #: Samples of each element in the tree of the finder, and candidates for a point that is in none of
 #: the elements next to its nearest sample.
 SAMPLES, CANDIDATES = 4, 6
+
+
+@lru_cache(16)
+def _taylor(m):
+    """From Hermite coefficients, of m derivatives a node, to those of powers of xi."""
+    return np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d) for d in range(2 * m)])
+
+
+def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
+    """A polynomial with coefficients (n, ...), the lowest first, and its derivative."""
+    return (polyval(xi, coefficients, tensor=False),
+            polyval(xi, polyder(coefficients), tensor=False))
+
+
+class Inverse:
+    """The map from the body to the reference cell, by polynomials of xi.
+
+    Parameters
+    ----------
+    axis, director
+        Hermite coefficients of the axis and of the director of the largest height, (2, n, ne).
+    height, heights
+        The largest height; coefficients (4, ne) of heights relative to it, None where constant.
+    """
+
+    def __init__(self, axis: Array, director: Array, height: float, heights: Array | None) -> None:
+        self.start, axis = axis[:, 0], axis.copy()
+        axis[:, [0, axis.shape[1] // 2]] -= axis[:, :1]  # from the first node: less round-off
+        self.axis, self.director = (_taylor(c.shape[1] // 2) @ c for c in (axis, director))
+        n, m = self.axis.shape[1], self.director.shape[1]
+        #: Minus the cross product of both. Where the section is that holds a point does not depend
+        #: on how high it is.
+        self.beside = np.zeros((n + m - 1, axis.shape[2]))
+        for k in range(n):
+            self.beside[k:k + m] -= _cross(self.axis[:, k, None], self.director)
+        self.largest, self.heights = height, heights
+
+    def height(self, e: Any, xi: Array) -> Any:
+        """The height at places xi (n, ...) of elements e (n,)."""
+        if self.heights is None:
+            return self.largest
+        return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
+
+    def __call__(self, x: Array, e: Any, xi: ArrayLike = 0.5, max_iterations: int = 30) -> Array:
+        """Reference points of points of elements e, both (2, n, npoints), by Newton's method.
+
+        It starts at ``xi``; NaN where there is none after ``max_iterations`` corrections.
+        """
+        axis, director, beside = (c[..., e, None] for c in (self.axis, self.director, self.beside))
+        gap = x - self.start[:, e, None]
+        # from the axis to the point x director: zero at the section that holds the point
+        beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
+        beside[:director.shape[1]] += _cross(gap[:, None], director)
+        X = np.empty(x.shape)
+        X[0] = xi
+        for _ in range(max_iterations):
+            value, slope = with_slope(beside, X[0])
+            change = value / slope
+            X[0] -= np.clip(change, -1.0, 1.0)
+            # the square of the last correction is left
+            far = np.abs(change) > CLOSE * (1.0 + np.abs(X[0]))
+            if not np.any(far):
+                break
+        r, n = (np.array([polyval(X[0], c, tensor=False) for c in of]) for of in (axis, director))
+        X[1] = 0.5 + np.sum((gap - r) * n, axis=0) * self.largest / (
+            np.sum(n * n, axis=0) * self.height(e, X[0]))
+        X[:, far] = np.nan
+        return X
+
+
+def _cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
 
 
 class Finder:
@@ -29,10 +109,12 @@ class Finder:
 
     def __init__(self, mesh: Any) -> None:
         self.mesh, self.mapping = mesh, mesh.mapping()
+        self.inverse, self.is_chain = self.mapping.inverse, mesh.is_chain
         self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
         self.allowed = 1e-6 if mesh.is_straight else 1e-3
-        self._line = self._straight_line()
+        #: Distances from axes that differ by less are the same.
+        self.equal = 1e-8 * mesh.height
 
     @cached_property
     def _beside(self):
@@ -42,34 +124,12 @@ class Finder:
         return np.array([np.append(-1, np.where(joined, e[:-1], -1)),
                          np.append(np.where(joined, e[1:], -1), -1)])
 
-    def _straight_line(self):
-        """Start and direction of the one line of all elements, and their ends on it, or None."""
-        mesh = self.mesh
-        if not mesh.is_straight:
-            return None
-        start, d = mesh.p[:, mesh.t[0, 0]], mesh.p_X[:, mesh.t[0, 0]]
-        x, y = mesh.p - start[:, None]
-        along, off = d[0] * x + d[1] * y, d[0] * y - d[1] * x
-        noise = 16 * np.finfo(float).eps * (self.size + float(mesh.lengths.sum()))
-        ends = along[mesh.t]
-        order = ends.T.ravel()
-        if np.abs(off).max() > noise or (order[1:] - order[:-1] < -noise).any():
-            return None
-        return start, d, ends
-
-    def __call__(self, x: Array) -> tuple[Array, Array, Array]:
+    def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
 
-        The last is zero for points of the body, relative to the element, and infinite far away. Of
-        several chains that hold a point it is the one whose axis is nearest.
-        """
-        e, X, outside, _ = self.find(x)
-        return e, X, outside
-
-    def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
-        """As a call; and of each point whether the axes of several chains are nearest, (n,).
-
-        With a number ``chain`` points are looked for in this chain of elements alone.
+        The third is zero for points of the body, relative to the element, and infinite far away. Of
+        several chains that hold a point it is the one whose axis is nearest; the fourth says of
+        each point whether several are. With a number ``chain`` it is this chain of elements.
         """
         noise = 1e-9 + 8 * np.finfo(float).eps * (
             self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
@@ -79,7 +139,7 @@ class Finder:
                 some = np.flatnonzero(self.mesh.chains == chain)[None]
                 e, X, outside = self._best(x, some, noise)
                 return e, np.clip(X, 0.0, 1.0), outside, tied
-            if self.mesh.is_chain:
+            if self.is_chain:
                 return *self._find(x, noise), tied
             e, X, outside = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape), np.full(
                 x.shape[1], np.inf)
@@ -89,34 +149,35 @@ class Finder:
                 e[left], X[:, left], outside[left] = self._find(x[:, left], noise)
         return e, X, outside, tied
 
+    def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
+        """As :meth:`find`, of points that are all in the body, or in a chain; else a MeshError."""
+        e, X, outside, tied = self.find(x, chain)
+        if np.any(outside > self.allowed):
+            raise self._refusal(x, outside, chain)
+        return e, X, tied
+
     def from_axis(self, e: Array, X: Array) -> Array:
         """How far reference points (2, n) of elements (n,) are from the axis, shape (n,)."""
-        height = np.ravel(self.mapping.height(X[0][:, None], e)[0])
-        return np.abs(X[1] - 0.5) * height
+        return np.abs(X[1] - 0.5) * np.ravel(self.inverse.height(e, X[0][:, None]))
 
-    @property
-    def alike(self) -> float:
-        """Distances from axes that differ by less are the same."""
-        return 1e-8 * self.mesh.height
-
-    def chains_at(self, x: Array) -> list[int]:
-        """Chains of elements whose axes are nearest to a point (2, 1) among those that hold it."""
-        found = {}
+    def chains_at(self, x: Array) -> list[tuple[float, int]]:
+        """Chains of elements that hold a point (2, 1), and how far their axes are from it."""
+        found = []
         for chain in range(int(self.mesh.chains[-1]) + 1):
             e, X, outside, _ = self.find(x, chain)
             if outside[0] == 0.0:
-                found[chain] = float(self.from_axis(e, X)[0])
-        return [k for k, off in found.items() if off <= min(found.values()) + self.alike]
+                found.append((float(self.from_axis(e, X)[0]), chain))
+        return found
 
     def _nearest_axis(self, x, noise, e, X, outside, tied):
         """Of all elements that hold points those with the nearest axis, put into e, X, ..."""
         k, some = self._around(x)
-        Y = self.mapping.invF(x[:, k, None], tind=some)[..., 0]
+        Y = self.inverse(x[:, k, None], some)[..., 0]
         held = self._outside(Y, noise) == 0.0
         k, some, Y = k[held], some[held], np.clip(Y[:, held], 0.0, 1.0)
         off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
         np.minimum.at(least, k, off)
-        near = off <= least[k] + self.alike
+        near = off <= least[k] + self.equal
         k, some, Y = k[near], some[near], Y[:, near]
         order = np.lexsort((some, k))
         at, first = np.unique(k[order], return_index=True)
@@ -148,7 +209,7 @@ class Finder:
         return out
 
     def _find(self, x, noise):
-        e, X, outside = (self._near if self._line is None else self._on_line)(x, noise)
+        e, X, outside = self._near(x, noise)
         left = np.nonzero((outside > 0) & np.isfinite(outside))[0]
         if len(left):
             e[left], X[:, left], outside[left] = self._best(
@@ -165,21 +226,6 @@ class Finder:
         out[out < noise] = 0.0
         out[np.isnan(out)] = np.finfo(float).max
         return out
-
-    def _on_line(self, x, noise):
-        (start, d, ends), mesh = self._line, self.mesh
-        x = x - start[:, None]
-        along = d @ x
-        e = np.searchsorted(ends[1] + noise * mesh.lengths, along)
-        e = np.minimum(e, mesh.nelements - 1)
-        before = np.maximum(e - 1, 0)  # in a gap: the nearer element
-        e = np.where(along - ends[1, before] < ends[0, e] - along, before, e)
-        xi = (along - ends[0, e]) / mesh.lengths[e]
-        height = self.mapping.height(np.clip(xi, 0.0, 1.0)[:, None], e)[0]
-        X = np.array([xi, (d[0] * x[1] - d[1] * x[0]) / np.ravel(height) + 0.5])
-        outside = self._outside(X, noise)
-        outside[outside > 1.0] = np.inf
-        return e, X, outside
 
     @cached_property
     def _samples(self):
@@ -214,7 +260,7 @@ class Finder:
         todo = np.nonzero(~far)[0]
         xi = (near % SAMPLES + 0.5) / SAMPLES
         for _ in range(3):
-            X[:, todo] = self.mapping.invF(x[:, todo, None], e[todo], xi=xi[todo, None])[..., 0]
+            X[:, todo] = self.inverse(x[:, todo, None], e[todo], xi[todo, None])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)
             # a point of the section between two elements is one of the left
             before, after = self._beside[:, e[todo]]
@@ -225,7 +271,7 @@ class Finder:
                 break
             e[todo], xi[todo] = other, 0.5
         else:
-            X[:, todo] = self.mapping.invF(x[:, todo, None], tind=e[todo])[..., 0]
+            X[:, todo] = self.inverse(x[:, todo, None], e[todo])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)
         return e, X, outside
 
@@ -233,7 +279,7 @@ class Finder:
         """The best of the candidates (n, k) for each point."""
         n, k = x.shape[1], candidates.shape[1]
         candidates = np.broadcast_to(candidates, (n, k))
-        X = self.mapping.invF(np.repeat(x, k, axis=1)[:, :, None], tind=candidates.ravel())
+        X = self.inverse(np.repeat(x, k, axis=1)[:, :, None], candidates.ravel())
         X = X[..., 0].reshape(2, n, k)
         outside = self._outside(X.reshape(2, -1), noise).reshape(n, k)
         rows, which = np.arange(n), np.argmin(outside, axis=1)
@@ -248,9 +294,7 @@ class Finder:
         return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
                 f"{low[1]:.6g} to {high[1]:.6g}")
 
-    def refuse(self, x: Array, outside: Array, chain: int | None = None) -> MeshError:
-        """The MeshError for points (2, n), of which some are ``outside``, as the finder says, (n,).
-        """
+    def _refusal(self, x, outside, chain):
         bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
         x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
         return MeshError(

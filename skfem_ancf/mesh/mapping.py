@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache, partial
-from math import factorial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
 from skfem.mapping import Mapping
 
 from ..core.errors import MeshError
-from ..core.immutable import read_only
+from .location import Inverse, with_slope
 from .nodal import nodal_derivatives, turned
 from .reference_cell import SECTIONS, hermite_basis
 from .taper import powers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
     from ..core.types import Array
 
-#: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
-#: are round-off.
-CLOSE, NOTHING = 1e-7, 2e-14
+#: Powers of xi in relative heights that are round-off.
+NOTHING = 2e-14
 
 #: Points of both faces where a body is looked at for folds.
 _FACES = np.array([np.tile(np.linspace(0.0, 1.0, 9), 2), np.repeat([0.0, 1.0], 9)])
@@ -39,19 +35,6 @@ _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right
 def cross(a: Array, b: Array) -> Array:
     """The out-of-plane component of a x b of vectors (2, ...)."""
     return a[0] * b[1] - a[1] * b[0]
-
-
-def _with_slope(coefficients, xi):
-    """A polynomial with coefficients (n, ...), the lowest first, and its derivative."""
-    return (polyval(xi, coefficients, tensor=False),
-            polyval(xi, polyder(coefficients), tensor=False))
-
-
-@lru_cache(16)
-def _taylor(m):
-    """From Hermite coefficients, of m derivatives a node, to those of powers of xi."""
-    return read_only(np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d)
-                               for d in range(2 * m)]))
 
 
 class MappingBeam(Mapping):
@@ -135,8 +118,8 @@ class MappingBeam(Mapping):
     # heights
 
     @cached_property
-    def _heights(self):
-        """Coefficients of the heights of a tapered beam, relative to the largest."""
+    def heights(self) -> Array:
+        """Coefficients (4, ne) of powers of xi in the heights over the largest, if tapered."""
         c = powers(self.mesh.heights) / self.mesh.height
         c[np.abs(c) <= NOTHING] = 0.0  # of a height that is linear
         return c
@@ -145,7 +128,7 @@ class MappingBeam(Mapping):
         """The height over the largest, and its derivative, (ne, np); 1 and 0 where constant."""
         if self.mesh.heights is None:
             return 1.0, 0.0
-        return _with_slope((self._heights if tind is None else self._heights[:, tind])[..., None],
+        return with_slope((self.heights if tind is None else self.heights[:, tind])[..., None],
                            np.asarray(xi))
 
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
@@ -156,23 +139,12 @@ class MappingBeam(Mapping):
         g, rate = self._relative(xi, tind)
         return self.mesh.height * g, self.mesh.height * rate
 
-    def relative_height(self, e: Any, xi: Any) -> tuple[Any, Any]:
-        """The height of a tapered mesh over the largest, and its derivative by xi.
-
-        ``e`` and ``xi`` are an element and a place, or arrays (n,) and (..., n).
-        """
-        return _with_slope(self._heights.take(e, axis=-1), xi)
-
-    def heights_of(self, e: Any) -> Callable[[Any], tuple[Any, Any]] | None:
-        """:meth:`relative_height` of elements, a function of xi; None of a constant height."""
-        return None if self.mesh.heights is None else partial(self.relative_height, e)
-
     @cached_property
     def height_degree(self) -> int:
         """That of the heights as polynomials of xi: 0 where they are constant."""
         if self.mesh.heights is None:
             return 0
-        return int(np.max(np.nonzero(np.any(self._heights, axis=1))))
+        return int(np.max(np.nonzero(np.any(self.heights, axis=1))))
 
     def offset(self, X: Array, tind: Array | None = None) -> Any:
         """Distance Y of reference points from the axis."""
@@ -247,16 +219,6 @@ class MappingBeam(Mapping):
         frame = self.frame(X, tind)
         return np.einsum("kiep,ijep->jkep", self.invDF(X, tind), frame), frame
 
-    def derivatives(self, e: Any, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
-        """The derivatives of the map by xi and eta, and the unit tangent of the axis.
-
-        ``e`` are elements (n,), ``xi`` and ``eta`` arrays (..., n), as are both components of each.
-        """
-        X = np.array(np.broadcast_arrays(xi, eta, e)[:2])
-        flat = X.reshape(2, -1, X.shape[-1]).swapaxes(1, 2)
-        a, b, along = (d.swapaxes(1, 2).reshape(X.shape) for d in self._derivatives(flat, e))
-        return a, b, along / np.hypot(*along)
-
     def curvature(self, X: Array, tind: Array) -> Array:
         """Curvature of the axis, (nelements, npoints)."""
         axis, _ = self._coefficients(tind)
@@ -266,21 +228,11 @@ class MappingBeam(Mapping):
     # the inverse
 
     @cached_property
-    def _powers(self):
-        """Axis from the first node, and director, as polynomials of xi, (2, n, ne) both.
-
-        And minus their cross product, (n, ne). The director is that of the largest height: where
-        the section is that holds a point does not depend on how high it is.
-        """
+    def inverse(self) -> Inverse:
+        """The map from points of the body to those of the reference cell."""
         axis, director = self._all_coefficients
-        axis = axis.copy()
-        axis[:, [0, self._orders[0]]] -= axis[:, :1]
-        axis, director = (_taylor(m) @ c for m, c in zip(self._orders, (axis, director)))
-        n, m = axis.shape[1], director.shape[1]
-        beside = np.zeros((n + m - 1, axis.shape[2]))
-        for k in range(n):
-            beside[k:k + m] -= cross(axis[:, k, None], director)
-        return axis, director, beside
+        return Inverse(axis, director, self.mesh.height,
+                       None if self.mesh.heights is None else self.heights)
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
              xi: ArrayLike = 0.5) -> Array:
@@ -289,27 +241,7 @@ class MappingBeam(Mapping):
         Both are of shape (2, nelements, npoints); NaN where no such point was found after
         ``max_iterations`` corrections from ``xi``, of any shape that fits (nelements, npoints).
         """
-        some = slice(None) if tind is None else tind
-        axis, director, beside = (c[..., some, None] for c in self._powers)
-        gap = x - self._all_coefficients[0][:, 0, some, None]
-        # from the axis to the point x director: zero at the section that holds the point
-        beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
-        beside[:director.shape[1]] += cross(gap[:, None], director)
-        X = np.empty(x.shape)
-        X[0] = xi
-        for _ in range(max_iterations):
-            value, slope = _with_slope(beside, X[0])
-            change = value / slope
-            X[0] -= np.clip(change, -1.0, 1.0)
-            # the square of the last correction is left
-            far = np.abs(change) > CLOSE * (1.0 + np.abs(X[0]))
-            if not np.any(far):
-                break
-        r, n = (np.array([polyval(X[0], c, tensor=False) for c in of]) for of in (axis, director))
-        X[1] = 0.5 + np.sum((gap - r) * n, axis=0) / (
-            np.sum(n * n, axis=0) * self._relative(X[0], tind)[0])
-        X[:, far] = np.nan
-        return X
+        return self.inverse(x, slice(None) if tind is None else tind, xi, max_iterations)
 
     # facets
 

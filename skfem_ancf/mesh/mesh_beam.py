@@ -409,11 +409,7 @@ class MeshBeam(NumberedMesh):
         find = Finder(self)
 
         def finder(*x):
-            x = require_finite("the points", x, (2, None))
-            found, _, outside = find(x)
-            if np.any(outside > find.allowed):
-                raise find.refuse(x, outside)
-            return found.astype(np.int32)
+            return find.inside(require_finite("the points", x, (2, None)))[0].astype(np.int32)
 
         return finder
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, ask, is_masked,
-                           require_finite, shown)
+                           require_point, shown)
 from .location import Finder
 
 if TYPE_CHECKING:
@@ -62,11 +62,7 @@ def as_point(point: Any, mesh: Any = None) -> Array:
     """
     if isinstance(point, str) and mesh is not None and point in (mesh.boundaries or {}):
         return mesh.p[:, node_of(mesh, point)]
-    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and not any(
-            isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x) for x in point):
-        return require_finite("a material point", point, (2,))
-    raise MeshError("a material point has two coordinates (x, y), its place in the reference "
-                    f"configuration, or is the name of an end, as 'right', got {shown(point)}")
+    return require_point(point)
 
 
 def on_other_mesh(place: object) -> bool:
@@ -168,8 +164,8 @@ def section_at(mesh: Any, point: ArrayLike) -> int:
     found = np.nonzero(off <= NEAR * size + noise)[0]
     if len(found) and not mesh.is_chain:  # not the section of a line whose axis is farther away
         finder = Finder(mesh)
-        e, X, _ = finder(x[:, None])
-        found = found[np.abs(Y[found]) <= finder.from_axis(e, X)[0] + finder.alike]
+        e, X, *_ = finder.find(x[:, None])
+        found = found[np.abs(Y[found]) <= finder.from_axis(e, X)[0] + finder.equal]
     if len(found) == 1:
         return int(found[0])
     if len(found):

@@ -19,8 +19,8 @@ from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_
 from ..core.linear import first_order, step
 from ..beam import kinematics
 from ..materials import LinearLaw
-from ..beam.interpolation import BeamPoints
-from ..beam.strains import stretched
+from ..beam.points import BeamPoints
+from ..beam.strains import stress_at, stretched
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -125,7 +125,7 @@ class Values(Mapping):
     Parameters
     ----------
     part
-        The :class:`~skfem_ancf.beam.interpolation.Part` with the points.
+        The :class:`~skfem_ancf.beam.points.BeamPoints` with the points.
     u
         Displacement of the coordinates that the part is numbered by, shape (N,); of a linear
         solution the :func:`~skfem_ancf.core.linear.step` from its base.
@@ -186,9 +186,7 @@ class Values(Mapping):
 
     @cached_property
     def strain(self) -> Array:
-        if self._recovery is not None:
-            return self._recovered(slice(0, 3))
-        return first_order(self._part.strain(self._u))
+        return first_order(self._part.strain(self._u, self._recovery))
 
     @cached_property
     def S(self) -> Array:
@@ -200,8 +198,9 @@ class Values(Mapping):
     def _stress(self):
         """That of the elements."""
         part, u = self._part, self._u[self._part.slice]
-        return part.stress(self._u) - sum(load.stress_at(u, part.at, part.e, factor)[..., 0]
-                                          for factor, load in self._eigen)
+        eigen = sum(load.stress_at(u, part.at, part.e, factor)[..., 0]
+                    for factor, load in self._eigen)
+        return stress_at(self.beam, u, part.e, part.X) - eigen
 
     @property
     def _eigenstrain(self):

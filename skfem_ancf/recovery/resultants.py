@@ -12,7 +12,8 @@ from ..beam.strains import cable_axis, on_grid, stress_at
 from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
 from ..mesh.mapping import cross
-from .section_forces import ArcLength, Sections
+from .recovered import ArcLength
+from .section_forces import Sections
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

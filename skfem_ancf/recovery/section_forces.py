@@ -11,7 +11,6 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebint, chebvander
 
 from ..core.errors import AncfError
 from ..formulations.ecm import AXIS as WHOLE
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from ..beam.distribution import Sampled
     from ..core.types import Array
 
-#: Points along an element for its loads and for its length.
+#: Points along an element for its loads.
 ALONG = 8
 
 #: Largest change of the section force at a node without a load, over its largest value. In a motion
@@ -44,24 +43,6 @@ BALANCED = 1e-4
 
 class NotRecovered(AncfError):
     """The section forces or fields of a beam cannot be recovered; the message says why."""
-
-
-class ArcLength:
-    """Arc length along the reference axis of a beam; ``nodes`` (ne + 1,) at the ends of
-    elements.
-    """
-
-    def __init__(self, beam: Beam) -> None:
-        x, w = gauss(ALONG)
-        speed = np.hypot(*beam.mesh.mapping().DF(np.array([x, 0.5 + 0.0 * x]))[:, 0])
-        series = np.linalg.solve(chebvander(2.0 * x - 1.0, ALONG - 1), speed.T)
-        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T
-        self.nodes = np.append(0.0, np.cumsum(speed @ w))
-
-    def at(self, e: Array, xi: Array) -> Array:
-        """That of places xi of elements e, both of shape (n,)."""
-        return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
-            2.0 * xi - 1.0, ALONG), self._inside[e])
 
 
 class Sections:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..beam.beam import Beam
-    from ..beam.interpolation import BeamPoints
+    from ..beam.points import BeamPoints
     from .checks import Checks
     from ..actions.joints.base import Joint
     from ..actions.obstacles.contact import Contact
@@ -309,7 +309,11 @@ class State(Immutable, MaterialPoints):
         InputError
             If several lines or beams are as near to a point, as at a node: their strains differ.
         """
-        values = self._at_points(lambda v: v.strain, point, beam, recover, line)
+        at, numbers = self._find(point, beam, recover, line)
+        values = at.gather([part.strain(self._places, self._recovery_of(k) if recover else None)
+                            for k, part in zip(numbers, at.parts)])
+        if np.iscomplexobj(values):
+            values = first_order(values)
         return (values.T * [1.0, 1.0, 0.5]).T
 
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
@@ -353,11 +357,16 @@ class State(Immutable, MaterialPoints):
         return self._at_points(find_field(field).of, point, beam, recover, line)
 
     def _at_points(self, ask, point, beam, recover, line):
-        at = self.system.points.find(point, beam, line, ask=True)
+        at, numbers = self._find(point, beam, recover, line)
+        return at.gather([ask(Values(part, self._places, partial(self._recovery_of, k) if recover
+                                     else None, self._eigenstrains(part.beam)))
+                          for k, part in zip(numbers, at.parts)])
+
+    def _find(self, point, beam, recover, line):
+        """Points, and the numbers of the beams of their parts."""
         require_flag("recover", recover)
-        return at.gather([ask(Values(part, self._places, partial(
-            self._recovery_of, part.number) if recover else None, self._eigenstrains(part.beam)))
-            for part in at.parts])
+        at = self.system.points.find(point, beam, line, ask=True)
+        return at, [part.number for part in at.parts]
 
     def values_of(self, beam: Beam, part: BeamPoints, recover: bool = True) -> Values:
         """All fields at points of one beam, for pictures and files.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...beam.distribution import AXIS, Facets
-from ...beam.interpolation import probe_reference
+from ...beam.kinematics import probe_reference
 from ...beam.kernels.section import beam_gradients
 from ...beam.layout import Layout, WhichBeam, select_beam
 from ...beam.surfaces import groups_of, surfaces_of

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...beam.interpolation import locate
+from ...beam.kinematics import locate
 from ...beam.kernels.section import beam_gradients
 from ...beam.layout import Layout, WhichBeam, select_beam
 from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
