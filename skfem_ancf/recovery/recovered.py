@@ -34,6 +34,7 @@ from ..core.quadrature import gauss
 from ..beam.strains import on_grid, stress_at
 from ..formulations.ecm import EnhancedContinuum
 from ..materials import LinearLaw
+from ..sections.across import EDGE
 from .segments import Segment
 from ..mesh.refinement import by_element
 from .section_forces import ALONG, NotRecovered, SectionForces
@@ -185,7 +186,7 @@ class Intervals:
 
     def _which(self, eta):
         """The interval of each place; the upper one between two."""
-        return np.searchsorted(self._high[:-1], eta, side="right")
+        return np.searchsorted(self._high[:-1] - EDGE, eta, side="right")
 
     def weights(self, eta: Array) -> Array:
         """Weights of the values at the points for those at places eta (k,), shape (k, m)."""

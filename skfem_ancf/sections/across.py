@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 #: Points across a layer for areas and moments.
 POINTS = 4
 
+#: Points below a layer by less than this part of the height are in it.
+EDGE = 1e-12
+
 #: Degree of the polynomial of the height that a shear factor is between the least and the largest.
 HEIGHTS = 7
 
@@ -192,7 +195,7 @@ class Across(Immutable):
             return sum((X[1] >= s.measure.ends(h)[-1] for s in self.layers[:-1]),
                        np.zeros(h.shape, dtype=int))
         tops = np.array([s.measure.high for s in self.layers[:-1]])
-        return np.searchsorted(tops, np.asarray(X[1]), side="right")
+        return np.searchsorted(tops - EDGE, np.asarray(X[1]), side="right")
 
     def of_layers(self, X: Array, like: Array, values: Sequence[Callable[[], Array]],
                  tind: Array | None = None, graded: bool = True) -> Array:
