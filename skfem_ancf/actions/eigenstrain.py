@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from scipy import sparse
 
 from ..beam.beam import Beam
 from ..beam.distribution import Spread
@@ -63,11 +62,8 @@ class EigenStrain(Load):
     """
 
     constant = False
-    linear = True
     prestress = True
-    # of a bound one: a matrix for each element, with sections
-    _elements: Any = None
-    _matrix: Any = None
+    # of a bound one
     _spread: Any = None
     # strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
     _strains: Any = None
@@ -117,26 +113,14 @@ class EigenStrain(Load):
             bound.at_rest = function(1.0)
         kernel = beam.kernel
         if not beam.has_sections:
-            bound.pushes, bound.linear = [_resultants(beam, self)], False
+            bound.pushes = [_resultants(beam, self)]
             return bound
         bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
         bound._stresses = list(map(stresses_of, kernel.tables, bound._strains))
-        if not kernel.linear:
-            bound.pushes = [pushed_at(t, E, T) for t, E, T in zip(
-                kernel.tables, bound._strains, bound._stresses)]
-            bound.grows, bound.linear, bound._size = True, False, bound.at_rest
-        else:
-            K, (i, j) = kernel.geometric(
-                np.zeros(beam.N), np.concatenate(bound._stresses, axis=1)), _entries(beam)
-            bound._elements, bound.linear = K, True
-            bound._matrix = sparse.coo_matrix((K.ravel(), (i.ravel(), j.ravel())),
-                                              shape=(beam.N, beam.N)).tocsr()
+        bound.pushes = list(map(pushed_at, kernel.tables, bound._strains, bound._stresses))
+        bound.grows = not kernel.linear
+        bound._size = bound.at_rest if bound.grows else 1.0
         return bound
-
-    @property
-    def alone(self) -> bool:
-        """True if what it does depends on other stress-free strains of its beam."""
-        return self.grows
 
     def acting(self, t: float | None) -> tuple[float, Load]:
         if not self.grows:
@@ -147,12 +131,6 @@ class EigenStrain(Load):
 
     def element_forces(self, u: Array, factor: float = 1.0) -> Array:
         """Forces (nelements, nb, 2) on each element at u (N,), of a factor times the strain."""
-        beam = self.beam
-        u_e = beam.kernel.gather(u)
-        if self._elements is not None:
-            q = beam.kernel.gather(beam.q0_local) + u_e
-            return factor * np.einsum("eij,ej->ei", self._elements,
-                                      q.reshape(len(q), -1)).reshape(q.shape)
         return -self.beam.kernel.pushed_forces(self._pushed(factor), u)
 
     def small_forces(self, factor: float = 1.0) -> Array:
@@ -167,30 +145,23 @@ class EigenStrain(Load):
         return [-factor * given for given in self.pushes]
 
     def force(self, u: Array) -> Array:
-        if self._matrix is not None:
-            return self._matrix @ (self.beam.q0_local + u)
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        if self._matrix is not None:
-            return super().mean_force(u0, u1)
         kernel = self.beam.kernel
         return -kernel.scatter(kernel.pushed_forces(self._pushed(self._size), u0, u1))
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        if self._matrix is not None:
-            A = self._matrix.tocoo()
-            return A.row, A.col, A.data
-        K = self.beam.kernel.pushed_tangents(self._pushed(self._size), u)
-        rows, columns = _entries(self.beam)
+        beam = self.beam
+        K = beam.kernel.pushed_tangents(self._pushed(self._size), u)
+        dofs = beam.mesh.t[0][:, None] * beam.nd + np.arange(2 * beam.nd)
+        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
         return rows.ravel(), columns.ravel(), -K.ravel()
 
     def potential(self, u: Array) -> float:
-        if self.grows:
+        if self._strains is not None:
             return energy_lost(self.beam, 0.0 * u, self._strains, self._size) - energy_lost(
                 self.beam, u, self._strains, self._size)
-        if self._matrix is not None:
-            return -float(u @ (self._matrix @ (self.beam.q0_local + 0.5 * u)))
         strain = self.beam.kernel.strain(u)
         return -float(np.sum(self.pushes[0].T * strain.reshape(-1, strain.shape[2])))
 
@@ -285,19 +256,13 @@ def _asked(name, f, x, y):
 
 def require_alone(loads: Sequence[Any]) -> None:
     """Raise InputError where two stress-free strains of one beam do not add up."""
-    beams = [load.beam for load in loads if isinstance(load, EigenStrain)]
-    for load in loads:
-        if getattr(load, "alone", False) and sum(beam is load.beam for beam in beams) > 1:
+    strains = [load for load in loads if isinstance(load, EigenStrain)]
+    for load in strains:
+        if load.grows and sum(other.beam is load.beam for other in strains) > 1:
             raise InputError(
                 f"{load.beam!r} has a stress that is not linear in the strain, so its stress-free "
                 "strains do not add up: give their sum as one eigenstrain, a function of (x, y) "
                 "or one product of it and a function of t")
-
-
-def _entries(beam):
-    """Rows and columns of the matrices of all elements, shape (nelements, 2 nb, 2 nb) each."""
-    dofs = beam.mesh.t[0][:, None] * beam.nd + np.arange(2 * beam.nd)
-    return np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
 
 
 def _resultants(beam, eigen):
@@ -336,7 +301,7 @@ def products(name: str, function: Callable[..., Any], beam: Beam
                  ).reshape(2, -1)
     x, y = (c.ravel() for c in beam.across.coordinates(X))
     times = np.append(np.linspace(0.0, 1.0, 33), np.geomspace(1e-3, 1e3, 40) * 1.0371)
-    at = [_at(function, t) for t in times]
+    at = [_AtTime(function, float(t)) for t in times]
     F = np.array([_asked(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
     size, left, chosen, places = np.max(np.abs(F)), F.copy(), [], []
     while np.max(np.abs(left)) > CLOSE * size:
@@ -352,10 +317,6 @@ def products(name: str, function: Callable[..., Any], beam: Beam
     inverse = np.linalg.inv(F[np.ix_(chosen, places)])
     return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j]))
             for j, k in enumerate(chosen)]
-
-
-def _at(function, t):
-    return _AtTime(function, float(t))
 
 
 class _AtTime:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -58,9 +58,9 @@ def linear_external_force(system: System, base: Array, d: Array) -> Array:
     for one in system.loads:
         s, stiff = system.of(one), not one.constant and not (at_rest and not one.first_order)
         if at_rest and one.pushes:  # of laws that are not linear
-            pushed: Any = one
+            pushed, (factor, acting) = cast("Any", one), one.acting(None)
             out[s] += pushed.beam.kernel.scatter(pushed.small_forces(pushed.at_rest)) - (
-                one.acting(None)[1].force(base[s]))
+                factor * acting.force(base[s]))
         if stiff:
             factor, acting = one.acting(None)
             i, j, v = acting.stiffness(base[s])

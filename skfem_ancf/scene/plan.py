@@ -49,93 +49,107 @@ class Plan(tuple):
 def make_plan(system: System, kind: str = "static", sensors: int = 0) -> Plan:
     """The plan of a scene."""
     require_option("kind of solution", kind, KINDS)
-    return Plan([Item(*item) for part in (_energy, _matrices, _forces, _solution)
-                 for item in part(system, kind)] + [Item(*_sensors(sensors, kind == "dynamic"))])
+    dynamic, linear = kind == "dynamic", kind == "linear"
+    return Plan([
+        *_beams(system), *_matrices(dynamic, linear), *_forces(system, dynamic, linear),
+        *_solution(system, dynamic, linear),
+        _item("sensors", sensors and dynamic, f"{sensors} read at every step",
+              "they record motions" if sensors else "there are none")])
 
 
-def _energy(s, _):
-    """What belongs to the strain energy of the beams."""
+def _item(term, there, reason, missing, status="computed"):
+    """A term that is computed where there is something of it, and else skipped."""
+    return Item(term, status, reason) if there else Item(term, "skipped", missing)
+
+
+def _beams(s):
+    """The strain energy of the beams, their sections and stress-free strains."""
     beams = s.beams
     points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
-    if beams:
-        yield "strain energy", "computed", f"{points} integration points, " + ", ".join(
-            sorted({b.formulation.name for b in beams}))
-    else:
-        yield "strain energy", "skipped", "rigid bodies alone"
-    shared = [b for b in beams if b.kernel.shared]
-    yield "tables", "constant", (
-        "one for all elements of a straight beam with equal elements"
-        if len(shared) == len(beams) else "one for each element: curved or unequal elements")
-    poisson = [b for b in beams if b.material.nu != 0 and b.has_sections]
-    if poisson:
-        yield "Poisson coupling", "computed", "nu = " + ", ".join(
-            sorted({f"{b.material.nu:g}" for b in poisson}))
-    else:
-        yield "Poisson coupling", "skipped", "nu = 0, or a section without thickness strain"
-    yield from _sections(s)
-    held = [b for b in beams if b.kernel.constant is not None]
-    yield "stabilisation", "constant" if held else "skipped", (
-        "quadratic: one matrix" if held else "the quadrature leaves no mode out")
+    yield _item("strain energy", beams, f"{points} integration points, "
+                + _listed(b.formulation.name for b in beams), "rigid bodies alone")
+    yield Item("tables", "constant", "one for all elements of a straight beam with equal elements"
+               if all(b.kernel.shared for b in beams) else
+               "one for each element: curved or unequal elements")
+    poisson = [f"{b.material.nu:g}" for b in beams if b.material.nu != 0 and b.has_sections]
+    yield _item("Poisson coupling", poisson, "nu = " + _listed(poisson),
+                "nu = 0, or a section without thickness strain")
+    uneven = [b for b in beams if not b.across.simple]
+    if uneven:
+        yield Item("sections", "constant", _listed(map(_section, uneven)))
+    eigen = [load for load in s.loads if isinstance(load, EigenStrain)]
+    if eigen:
+        yield Item("stress-free strain", "computed", f"{len(eigen)} at the points of integration, "
+                   f"{sum(load.grows for load in eigen)} of them under laws that are not linear")
+    yield _item("stabilisation", any(b.kernel.constant is not None for b in beams),
+                "quadratic: one matrix", "the quadrature leaves no mode out", "constant")
 
 
-def _matrices(_, kind):
+def _matrices(dynamic, linear):
     """Tangent and mass."""
-    dynamic, linear = kind == "dynamic", kind == "linear"
-    yield "geometric term", "skipped" if linear else "computed", (
-        "no stress in a linear solve" if linear else "the stress is not zero")
-    yield "tangent", "constant" if linear else "computed", (
-        "one assembly, one factorisation" if linear else
-        "its factors are kept while the iteration contracts; where a step's own do not, "
-        "stresses are carried" if dynamic else
+    yield _item("geometric term", not linear, "the stress is not zero",
+                "no stress in a linear solve")
+    yield Item("tangent", "constant", "one assembly, one factorisation") if linear else Item(
+        "tangent", "computed", "its factors are kept while the iteration contracts; where a step's "
+        "own do not, stresses are independent" if dynamic else
         "each iteration; the last evaluates the force only")
-    yield "mass", "constant" if dynamic else "skipped", (
-        "assembled and factorised once" if dynamic else "no inertia in statics")
+    yield _item("mass", dynamic, "assembled and factorised once", "no inertia in statics",
+                "constant")
 
 
-def _forces(s, kind):
+def _forces(s, dynamic, linear):
     """What acts on the beams, and what holds them."""
-    yield from (_bodies(s), _damping(s, kind == "dynamic"), _elements(s),
-                _obstacles(s, kind == "linear"))
+    yield _item("rigid bodies", s.bodies, f"{len(s.bodies)}: 4 coordinates each, a constant mass, "
+                "a multiplier for the length of the director", "there are none")
+    lossy = sum(time > 0.0 for time in s.retardation)
+    kinds = [text for text, there in (
+        (f"{lossy} beam(s) resist the rate of their strain", lossy),
+        ("dashpots, drag or force elements of your own", s.forces.resists),
+        ("a part of the mass", s.damping.mass),
+        (f"{len(s.damping.modal)} modes", len(s.damping.modal))) if there]
+    yield _item("damping", kinds and dynamic, ", ".join(kinds),
+                "no velocities in statics" if kinds else "there is none")
+    forces = s.forces
+    known = sum(ours(getattr(element, "item", element)) for element in forces.own)
+    yield _item("force elements", forces.elements, (
+        f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
+        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} of your own, "
+        f"{known} by functions asked in Python, {len(forces.masses)} in the mass"
+        + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
+        + (", some couple points far apart" if forces.far else "")), "no springs, no masses")
+    yield _obstacles(forces.contacts, linear)
     dead = [load for load in s.loads if load.constant and load.amplitude is None]
     rest = [load for load in s.loads if load not in dead]
-    yield "dead loads", "constant" if dead else "skipped", (
-        f"{len(dead)} assembled when given" if dead else "there are none")
-    yield "varying loads", "computed" if rest else "skipped", (
-        f"{_kinds(rest)}: they depend on displacement or time" if rest else
-        "no follower load, no amplitude")
-    yield "multipliers", "computed" if s.constraints.m else "skipped", (
-        f"{s.constraints.m} equations of {_kinds(s.constraints.joints)}" if s.constraints.m else
-        "no joints" if not s.constraints.all_joints else "the joints only fix coordinates")
+    yield _item("dead loads", dead, f"{len(dead)} assembled when given", "there are none",
+                "constant")
+    yield _item("varying loads", rest, f"{_kinds(rest)}: they depend on displacement or time",
+                "no follower load, no amplitude")
+    held = s.constraints
+    yield _item("multipliers", held.m, f"{held.m} equations of {_kinds(held.joints)}",
+                "the joints only fix coordinates" if held.all_joints else "no joints")
 
 
-def _solution(s, kind):
+def _solution(s, dynamic, linear):
     """How the equations are solved, and what is looked at."""
-    beams, dynamic, linear = s.beams, kind == "dynamic", kind == "linear"
-    yield "linear solver", "computed", _linear_solver(s, dynamic)
+    beams = s.beams
+    yield Item("linear solver", "computed", _linear_solver(s, dynamic))
     rules = sorted({(b.element.order, t.section_points, t.layer.measure.spent)
                     for b in beams if b.has_sections for t in b.kernel.firsts})
     layer = " a layer" if any(len(b.across.layers) > 1 for b in beams) else ""
-    yield "section quadrature", "constant" if rules else "skipped", (
-        "; ".join(f"order {n}: {p} points{layer}, exact for degree {2 * p - 1 - spent} of {4 * n}"
-                  for n, p, spent in rules) or "a cable has EA and EI")
+    yield _item("section quadrature", rules, "; ".join(
+        f"order {n}: {p} points{layer}, exact for degree {2 * p - 1 - spent} of {4 * n}"
+        for n, p, spent in rules), "a cable has EA and EI", "constant")
     if linear:
-        yield "compiled loop", "skipped", "one solve"
+        yield Item("compiled loop", "skipped", "one solve")
     else:
         with expecting(STEPS * OF_STEP if dynamic else OF_STATICS):
             way, reason = s.backend.choose("steps" if dynamic else "equilibrium")
-        yield "compiled loop", "skipped" if way == "plain" else "computed", (
-            f"whole {f'time steps, in blocks, of {STEPS}' if dynamic else 'iterations'}: {reason}")
+        yield Item("compiled loop", "skipped" if way == "plain" else "computed", "whole " + (
+            f"time steps, in blocks, of {STEPS}" if dynamic else "iterations") + f": {reason}")
     if dynamic:
         scheme, reason = choose_scheme(s)
-        yield "scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}'
-    yield "fields", "skipped", "strain and stress are computed where a State is asked for them"
-
-
-def _sensors(number, dynamic):
-    """Term, status and reason of sensors."""
-    return "sensors", "computed" if number and dynamic else "skipped", (
-        f"{number} read at every step" if number and dynamic else
-        "they record motions" if number else "there are none")
+        yield Item("scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}')
+    yield Item("fields", "skipped", "strain and stress are computed where a State is asked")
 
 
 def _linear_solver(s, dynamic):
@@ -160,21 +174,6 @@ def _linear_solver(s, dynamic):
     return solver
 
 
-def _sections(s):
-    """Terms, status and reasons of sections and stress-free strains, where there are any."""
-    uneven = [b for b in s.beams if not b.across.simple]
-    if uneven:
-        yield "sections", "constant", ", ".join(sorted({_section(b) for b in uneven}))
-    eigen = [load for load in s.loads if isinstance(load, EigenStrain)]
-    if eigen:
-        linear, nonlinear = (sum(of) for of in zip(*((load.linear, load.grows) for load in eigen)))
-        kinds = (linear, "of sections, a constant matrix each"), (
-            len(eigen) - linear - nonlinear, "of cables, normal forces and moments at points"), (
-            nonlinear, "under laws that are not linear, asked twice at points")
-        yield "stress-free strain", "computed", "; ".join(
-            f"{number} {text}" for number, text in kinds if number) + ": compiled where beams are"
-
-
 def _section(beam):
     """The section of a beam that is no rectangle of one height, width and material, in words."""
     mesh, layers = beam.mesh, len(beam.across.layers)
@@ -188,26 +187,9 @@ def _section(beam):
     return " ".join(what)
 
 
-def _damping(s, dynamic):
-    """Term, status and reason of what resists velocities."""
-    lossy = sum(time > 0.0 for time in s.retardation)
-    kinds = [text for text, there in (
-        (f"{lossy} beam(s) resist the rate of their strain", lossy),
-        ("dashpots, drag or force elements of your own", s.forces.resists),
-        ("a part of the mass", s.damping.mass),
-        (f"{len(s.damping.modal)} modes", len(s.damping.modal))) if there]
-    if not kinds:
-        return "damping", "skipped", "there is none"
-    return ("damping", "computed", ", ".join(kinds)) if dynamic else (
-        "damping", "skipped", "no velocities in statics")
-
-
-def _bodies(s):
-    """Term, status and reason of rigid bodies."""
-    if not s.bodies:
-        return "rigid bodies", "skipped", "there are none"
-    return "rigid bodies", "computed", (f"{len(s.bodies)}: 4 coordinates each, a constant mass, a "
-                                        "multiplier for the length of the director")
+def _listed(words):
+    """Different words in order."""
+    return ", ".join(sorted(set(words)))
 
 
 def _kinds(things):
@@ -216,33 +198,14 @@ def _kinds(things):
         type(getattr(thing, "item", thing)).__name__.lstrip("_") for thing in things).items())
 
 
-def _elements(s):
-    """Term, status and reason of force elements."""
-    forces = s.forces
-    if not forces.elements:
-        return "force elements", "skipped", "no springs, no masses"
-    known = sum(ours(getattr(element, "item", element)) for element in forces.own)
-    return "force elements", "computed", (
-        f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
-        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} of your own, "
-        f"{known} by functions asked in Python, {len(forces.masses)} in the mass"
-        + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
-        + (", some couple points far apart" if forces.far else ""))
-
-
-def _obstacles(s, linear):
-    """Term, status and reason of contact."""
-    contacts = s.forces.contacts
-    if not contacts.obstacles:
-        return "obstacles", "skipped", "there are none"
-    if linear:
-        return "obstacles", "skipped", "a linear solution that enters one is refused"
-    points = sum(len(group.first) for one in contacts.obstacles for group in one.groups)
-    elements = sum(group.elements for one in contacts.obstacles for group in one.groups)
+def _obstacles(contacts, linear):
+    """Contact."""
+    groups = [group for one in contacts.obstacles for group in one.groups]
     how = [text for text, there in (
-        ("friction", contacts.anchored),
-        ("augmented Lagrangian", contacts.augmented),
+        ("friction", contacts.anchored), ("augmented Lagrangian", contacts.augmented),
         ("moving", contacts.moving), ("a distance in Python", contacts.own)) if there]
-    return "obstacles", "computed", (
-        f"{len(contacts.obstacles)}, {points} points of the surface where one of {elements} "
-        "elements is near" + "".join(f", {text}" for text in how))
+    return _item(
+        "obstacles", groups and not linear, ", ".join([
+            f"{len(contacts.obstacles)}, {sum(len(group.first) for group in groups)} points of the "
+            f"surface where one of {sum(group.elements for group in groups)} elements is near",
+            *how]), "a linear solution that enters one is refused" if groups else "there are none")
