@@ -54,7 +54,7 @@ def test_shear_stress_of_profiles_is_Jourawskis(name):
     section, _, second = PROFILES[name]
     pieces = section.pieces(H)
     jumps = [p.low * H - H / 2 for p in pieces[1:]]
-    Y = np.concatenate([np.linspace(-0.05, 0.05, 21)] + [[y - 1e-7, y + 1e-7] for y in jumps])
+    Y = np.concatenate([np.linspace(-0.05, 0.05, 20)] + [[y - 1e-7, y + 1e-7] for y in jumps])
 
     def width(y):
         p = next(p for p in pieces if y / H + 0.5 <= p.high or p is pieces[-1])
