@@ -22,23 +22,25 @@ def column(x):
 
 
 def multiply(A, x, y):
-    flat, ld, n, top = A.flat, A.ld, x.size, A.top
+    n, top = x.size, max(A.top, 0)
+    columns = A.flat.reshape(n, A.flat.size // n)
     for i in range(n):
         y[i] = 0.0
     for j in range(n):
-        at, m, c = j * ld + max(top, 0), min(A.width, n - 1 - j), x[j]
-        s = flat[at] * c
-        if top > 0:
-            for k in range(1, min(A.width, j) + 1):
-                y[j - k] += flat[at - k] * c
-            for k in range(1, m + 1):
-                y[j + k] += flat[at + k] * c
+        # an index that is no sum of unknown sign needs no check: slices instead of x[j + k]
+        column, later, out, m = columns[j][top:], x[j:], y[j:], min(A.width, n - 1 - j) + 1
+        c, s = later[0], column[0] * later[0]
+        for k in range(1, m):
+            out[k] += column[k] * c
+        if A.top > 0:
+            left = min(A.width, j)
+            above, before = columns[j][top - left:], y[j - left:]
+            for k in range(left):
+                before[k] += above[k] * c
         else:
-            for k in range(1, m + 1):
-                y[j + k] += flat[at + k] * c
-            for k in range(1, m + 1):
-                s += flat[at + k] * x[j + k]
-        y[j] += s
+            for k in range(1, m):
+                s += column[k] * later[k]
+        out[0] += s
 
 
 def add_multiple(c, x, y):
@@ -109,16 +111,17 @@ def solve(A, x):
     if A.top > 0:
         _solve_exchanged(A, x)
         return
-    flat, ld, n, half = A.flat, A.ld, x.size, A.ld // 2 if A.top < 0 else 0
+    n, half = x.size, A.ld // 2 if A.top < 0 else 0
+    columns = A.flat.reshape(n, A.ld)
     for j in range(n):
-        c = x[j]
+        column, later, c = columns[j], x[j:], x[j]
         for k in range(1, min(A.width, n - 1 - j) + 1):
-            x[j + k] -= flat[j * ld + k] * c
+            later[k] -= column[k] * c
     for j in range(n - 1, -1, -1):
-        s = 0.0
+        column, later, s = columns[j][half:], x[j:], 0.0
         for k in range(1, min(A.width, n - 1 - j) + 1):
-            s += flat[j * ld + half + k] * x[j + k]
-        x[j] = x[j] / flat[j * ld] - s
+            s += column[k] * later[k]
+        later[0] = later[0] / columns[j, 0] - s
 
 
 @source

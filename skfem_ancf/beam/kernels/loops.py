@@ -8,20 +8,19 @@ from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION
 
 @source
 def block():
-    return 32
+    return 16
 
 
 @source
 def gathered(t, first, last, u):
     m, n, start = t.G.shape[2], last - first, t.start[first:last]
     U = np.empty((m, 2, n))
-    for k in range(m):
+    for e in range(n):
+        both = u[start[e]:]
+        for k in range(m):
+            U[k, 0, e], U[k, 1, e] = both[2 + 2 * k], both[3 + 2 * k]
         for i in range(2):
-            for e in range(n):
-                U[k, i, e] = u[start[e] + 2 + 2 * k + i]
-    for i in range(2):
-        for e in range(n):
-            U[m // 2, i, e] -= u[start[e] + i]
+            U[m // 2, i, e] -= both[i]
     return U
 
 
@@ -224,11 +223,11 @@ def add_forces(t, first, X, T, f):
 def add_to_nodes(t, begin, F, f):
     m, n = F.shape[0], F.shape[2]
     for e in range(n):
-        first = t.start[begin + e]
+        both = f[t.start[begin + e]:]
         for i in range(2):
-            f[first + i] -= F[m // 2, i, e]
+            both[i] -= F[m // 2, i, e]
             for k in range(m):
-                f[first + 2 + 2 * k + i] += F[k, i, e]
+                both[2 + 2 * k + i] += F[k, i, e]
 
 
 @source
@@ -313,34 +312,53 @@ def add_geometric(t, first, d, T, w):
 
 @source
 def add_products(t, first, w, one, other, K):
-    size, n, m = len(w), len(K), t.G.shape[2]
-    both, Q = np.empty((size, m, m)), np.empty((4 * n, m * m))
-    flat = both.reshape(size, m * m)
+    n, m = len(K), t.G.shape[2]
     if len(t.G) == 1:
-        products(t.products, t.G[0], both)
-        np.dot(w.reshape(size, 4 * n).T, flat, Q)
-    else:
+        Q = np.empty((m, m, 4, n))
+        put_products(t.products, t.G[0], w, Q)
         for e in range(n):
-            products(t.products, t.G[t.at[first + e, OF_G]], both)
-            Q[e::n] = np.dot(np.ascontiguousarray(w[:, :, e].T), flat)
-    P, blocks = Q.reshape(2, 2, n, m, m), K.reshape(n, m, 2, m, 2)
-    for e in range(n):
-        for i in range(2):
-            for j in range(2):
-                for k in range(m):
-                    for l in range(m):
-                        blocks[e, k, i, l, j] += (one * P[i, j, e, k, l]
-                                                  + other * P[j, i, e, l, k])
+            add_block(Q[:, :, :, e], one, other, K[e])
+    else:
+        Q = np.empty((m, m, 4, 1))
+        for e in range(n):
+            each = np.ascontiguousarray(w[:, :, e:e + 1])
+            put_products(t.products, t.G[t.at[first + e, OF_G]], each, Q)
+            add_block(Q[:, :, :, 0], one, other, K[e])
 
 
 @source
-def products(rows, G, out):
-    """``G_g G_h^T`` of pairs of rows, (np, nb - 1, nb - 1)."""
-    for p in range(len(out)):
-        g, h = G[rows[0, p]], G[rows[1, p]]
-        for k in range(len(g)):
-            for l in range(len(h)):
-                out[p, k, l] = g[k] * h[l]
+def put_products(rows, G, w, Q):
+    """Write the sum of ``w[p, c, e] G_g[k] G_h[l]`` over pairs of rows, (nb - 1, nb - 1, 4, ne)."""
+    m, size, p = G.shape[1], w.shape[1] * w.shape[2], 0
+    of_row, flat, total = np.empty((m, size)), w.reshape(len(w), size), Q.reshape(m, m * size)
+    every = of_row.reshape(m * size)
+    total[:] = 0.0
+    for g in range(len(G)):
+        of_row[:] = 0.0
+        while p < len(w) and rows[0, p] == g:
+            x, h = flat[p], G[rows[1, p]]
+            for l in range(m):
+                c, out = h[l], of_row[l]
+                for e in range(size if c != 0.0 else 0):
+                    out[e] += c * x[e]
+            p += 1
+        for k in range(m):
+            c, out = G[g, k], total[k]
+            for e in range(m * size if c != 0.0 else 0):
+                out[e] += c * every[e]
+
+
+@source
+def add_block(Q, one, other, K):
+    """Add ``one Q + other Q^T`` of one element, Q (nb - 1, nb - 1, 4)."""
+    m = len(Q)
+    both = K.reshape(m, 2, m, 2)
+    for k in range(m):
+        for l in range(m):
+            x, y, out = Q[k, l], Q[l, k], both[k, :, l]
+            for i in range(2):
+                for j in range(2):
+                    out[i, j] += one * x[2 * i + j] + other * y[2 * j + i]
 
 
 @source
@@ -354,27 +372,27 @@ def add_stiffness(t, first, K):
 
 @source
 def add_to_band(t, begin, K, to, halves):
-    n, flat = K.shape[1], to.flat
-    q, half = n // 2 - 1, to.ld // 2
+    n, ld, half = K.shape[1], to.ld, to.ld // 2
+    q = n // 2 - 1
     for e in range(len(K)):
-        one, first = K[e], t.start[begin + e]
+        one, flat = K[e], to.flat[t.start[begin + e] * to.ld:]
         for j in range(n):
-            at = (first + j + 2) * to.ld - j
+            out = flat[(j + 2) * ld - j:]
             for i in range(j, n):
-                flat[at + i] += one[i, j]
+                out[i] += one[i, j]
             for i in range(j, n if halves else 0):
-                flat[at + half + i] += one[j, i]
+                out[half + i] += one[j, i]
         for j in range(2):
-            at = (first + j) * to.ld - j
+            out = flat[j * ld - j:]
             for i in range(j, 2):
-                flat[at + i] += one[q + i, q + j]
+                out[i] += one[q + i, q + j]
             for i in range(n):  # of what is symmetric the entries of the lower half, to the bit
                 one_half = halves or i >= q + j
-                flat[at + 2 + i] -= one[i, q + j] if one_half else one[q + j, i]
+                out[2 + i] -= one[i, q + j] if one_half else one[q + j, i]
             for i in range(j, 2 if halves else 0):
-                flat[at + half + i] += one[q + j, q + i]
+                out[half + i] += one[q + j, q + i]
             for i in range(n if halves else 0):
-                flat[at + half + 2 + i] -= one[q + j, i]
+                out[half + 2 + i] -= one[q + j, i]
 
 
 @source

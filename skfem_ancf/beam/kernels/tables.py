@@ -49,7 +49,7 @@ class StrainTables(NamedTuple):
     pairs
         Samples s <= t of each modulus, sorted by s, with all s = t; (2, nq).
     products
-        Rows g <= h of the products that tangents are made of, (2, np).
+        Rows g <= h of the products that tangents are made of, sorted, (2, np).
     terms
         Which product, which two rows a and b of samples, and which modulus make a coefficient, (4,
         nt), sorted by products: rows g of the samples are the first ns, rows h the others.
@@ -94,20 +94,15 @@ def _products(rows, pairs, size):
     g, h = np.frombuffer(rows, np.int64).reshape(2, size)
     ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
     row = np.concatenate([g, h])
-    found: dict[tuple[int, int], int] = {}
-
-    def product(a, b):
-        return found.setdefault((min(row[a], row[b]), max(row[a], row[b])), len(found))
-
-    of = [product(s, size + s) for s in range(size)]
-    terms = []
-    for q, (s, t) in enumerate(np.frombuffer(pairs, np.int64).reshape(2, -1).T):
-        for a in ends[s]:
-            for b in ends[t]:
-                if s < t or a <= b:
-                    terms.append([product(a, b), *sorted((a, b), key=lambda c: row[c]), q])
-    return tuple(np.array(x, np.int64) for x in (
-        np.transpose(list(found)), np.transpose(sorted(terms)), of))
+    terms = [(*sorted((a, b), key=lambda c: row[c]), q)
+             for q, (s, t) in enumerate(np.frombuffer(pairs, np.int64).reshape(2, -1).T)
+             for a in ends[s] for b in ends[t] if s < t or a <= b]
+    of, found = (np.sort(x, axis=0) for x in (np.array([g, h]), row[np.transpose(terms)[:2]]))
+    products = np.unique(np.concatenate([of, found], axis=1), axis=1)
+    number = {tuple(x): k for k, x in enumerate(products.T.tolist())}
+    numbers = [[number[tuple(x)] for x in y.T.tolist()] for y in (found, of)]
+    terms = sorted((p, *x) for p, x in zip(numbers[0], terms))
+    return products, np.transpose(np.array(terms, np.int64)).copy(), np.array(numbers[1], np.int64)
 
 
 def products_of(rows: Any, pairs: Any) -> Any:
