@@ -24,7 +24,7 @@ def by_jax(psi: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
     except ImportError:
         raise MissingExtra("jax", "autodiff") from None
     from jax import experimental
-    double = getattr(jax, "enable_x64", None) or experimental.enable_x64  # the latter before 0.8
+    double = jax.enable_x64 if hasattr(jax, "enable_x64") else experimental.enable_x64
 
     def one(y, X, t):
         return psi(y[:2], y[2:].reshape(2, 2), X, t)
