@@ -8,8 +8,8 @@ from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass,
 from .actions.item import Item
 from .actions.joints import (Hinge, Joint, Motor, OnCircle, OnLine, PlaneSection, PrescribedAngle,
                              PrescribedPosition, PrescribedTurn, Sleeve, Slot, Weld)
-from .actions.loads import (DeadLoad, EndMoment, FormLoad, Load, PointForce, Pressure, Traction,
-                            Weight)
+from .actions.form_load import FormLoad
+from .actions.loads import (DeadLoad, EndMoment, Load, PointForce, Pressure, Traction, Weight)
 from .actions.obstacles import Circle, Line, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support
 from .beam.beam import Beam, reference_coordinates

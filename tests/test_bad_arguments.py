@@ -568,7 +568,7 @@ def arc(r):
     (lambda: loaded().continuation(until=lambda point: point.nothing),
      r"until\(point\) raised AttributeError", AttributeError),
     (lambda: loaded().continuation(until=lambda point: None), "must return True or False", None),
-    (lambda: clamped().load(LinearForm(lambda v, w: w.r[0] * v[1])), r"uses w\.r.*w\.x",
+    (lambda: clamped().load(LinearForm(lambda v, w: w.q[0] * v[1])), r"uses w\.q.*w\.x",
      (KeyError, AttributeError)),
 ])
 def test_functions_of_the_caller(action, message, cause):

@@ -6,33 +6,25 @@ again for the same scene on other meshes.
 
 from __future__ import annotations
 
-import copyreg
-import re
-import sys
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from importlib import import_module
-from operator import attrgetter
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from skfem.assembly import FacetBasis, LinearForm, asm
-from skfem.assembly.form.form import FormExtraParams
-from skfem.element import DiscreteField
 
 from ..beam.beam import Beam
-from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
+from ..beam.distribution import Spread, on_facets, stations_of_vector
 from ..beam.kinematics import locate, probe
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..beam.kinematics import direction
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
 from ..beam.surfaces import add_nodal, surfaces_of
-from ..core.errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field,
+from ..core.errors import (AncfError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_finite_scalar, require_function,
-                           require_slope, shown, warn, warnings_as_errors)
+                           require_slope, shown, warn)
 from ..core.immutable import read_only
 from ..core.origin import ours
 from ..core.types import Array, Place, TimeFunction
@@ -405,107 +397,6 @@ def _warn_of_lever(beam, surfaces, forces):
             f"a traction on {beam!r} acts on its axis: it leaves out a moment of {left_out:.3g} by "
             "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or "
             "give an end its moment by scene.moment", ModelWarning)
-
-
-def _form_of(module, name):
-    return attrgetter(name)(import_module(module))
-
-
-def _reduced(form):
-    """For pickle: by its name what a decorator made, since its function has the same name."""
-    module, name = form.form.__module__, form.form.__qualname__
-    named = getattr(sys.modules.get(module), name, None) is form
-    return (_form_of, (module, name)) if named else object.__reduce_ex__(form, 4)
-
-
-copyreg.pickle(LinearForm, _reduced)
-
-
-class FormLoad(Load):
-    """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary.
-
-    Parameters
-    ----------
-    form
-        A ``LinearForm`` of scikit-fem, which knows ``w.x``, ``w.h`` and, on a boundary, ``w.n``.
-    boundary
-        A place, see :func:`skfem_ancf.mesh.places.facets_of`; None for the body.
-    beam, amplitude
-        As for :class:`Load`.
-    """
-
-    def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
-                 amplitude: TimeFunction = None) -> None:
-        super().__init__(beam, amplitude)
-        if not isinstance(form, LinearForm):
-            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
-                             "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
-        self.form, self.boundary = form, boundary
-
-    def bind(self, beam: Beam) -> Load:
-        basis = (beam.exact_basis() if self.boundary is None else
-                 beam.facet_basis(self.boundary))
-        vector = _assembled(self.form, basis)
-        return DeadLoad(beam, vector, self.amplitude, _density(self.form, basis, beam, vector))
-
-
-def _density(form, basis, beam, vector):
-    """How the force of a form is spread, from its values for constant test functions.
-
-    None if these do not give its vector again: then it acts on derivatives.
-    """
-    parameters = FormExtraParams(basis.default_parameters())
-    shape = basis.dx.shape
-    try:
-        with warnings_as_errors():
-            f = np.array([np.broadcast_to(form.form(_constant(i, shape), parameters), shape)
-                          for i in range(2)])
-    except Exception:  # the form is the user's: it may ask for what a constant has not
-        return None
-    again = asm(LinearForm(lambda v, w: f[0] * v[0] + f[1] * v[1]), basis)
-    if np.max(np.abs(again - vector)) > 1e-10 * np.max(np.abs(vector)):
-        return None
-    if isinstance(basis, FacetBasis):
-        groups, stations = facets_along(beam.mesh, basis)
-        per_xi = f * basis.dx / basis.W
-        return Spread(stations=stations, sampled=tuple(
-            Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
-    if not beam.across.plain:
-        return None
-    xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
-    values = (f / beam.across.layers[0].width).reshape(*f.shape[:2], len(xi), len(eta))
-    return Spread(sampled=(Sampled(BODY, np.arange(shape[0]), xi, values, eta),))
-
-
-def _constant(i, shape):
-    """A test function that is the unit vector i."""
-    value = np.zeros((2, *shape))
-    value[i] = 1.0
-    return DiscreteField(value=value, grad=np.zeros((2, 2, *shape)))
-
-
-def _assembled(form, basis):
-    """The vector of a form of the caller's."""
-    complex_to_real = getattr(np, "exceptions", np).ComplexWarning
-    try:
-        with warnings_as_errors(complex_to_real):
-            return asm(form, basis)
-    except (KeyError, AttributeError) as error:
-        name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))
-        if name is None:
-            raise CallbackError(f"the form of a load, form(v, w), raised {type(error).__name__}: "
-                                f"{error}") from error
-        raise CallbackError(
-            f"the form of a load uses w.{name[1] or name[2]}, which there is not: it is assembled "
-            "once, on the stress-free body, and knows w.x, w.h and, on a boundary, w.n. A load "
-            "that follows the deformation is scene.pressure, scene.moment or a Load of your own"
-        ) from error
-    except AncfError:
-        raise
-    except Exception as error:  # it is the user's: it may raise anything
-        raise CallbackError(f"the form of a load, form(v, w), fails: {type(error).__name__}: "
-                            f"{error}; it must return a real number at each point, as v[1]"
-                            ) from error
 
 
 class DeadLoad(Load):

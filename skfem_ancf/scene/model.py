@@ -14,12 +14,13 @@ from ..actions.axial import FollowerForce, LineLoad
 from ..actions.binding import bind_item
 from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
 from ..actions.energy import Energy
+from ..actions.form_load import FormLoad
 from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
                               TorsionalSpring)
 from ..actions.item import Item
 from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
 from ..actions.joints.sliders import slider
-from ..actions.loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight
+from ..actions.loads import EndMoment, Load, PointForce, Pressure, Traction, Weight
 from ..actions.obstacles import Obstacle
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support

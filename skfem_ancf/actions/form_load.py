@@ -1,0 +1,220 @@
+"""A scikit-fem LinearForm as a load, dead or not."""
+
+from __future__ import annotations
+
+import copyreg
+import logging
+import re
+import sys
+from importlib import import_module
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+from skfem.assembly import BilinearForm, FacetBasis, LinearForm
+from skfem.assembly.form.form import FormExtraParams
+from skfem.element import DiscreteField
+
+from ..beam.beam import Beam
+from ..beam.distribution import BODY, Sampled, Spread, facets_along
+from ..beam.layout import WhichBeam
+from ..core.errors import (AncfError, CallbackError, InputError, require_flag, require_slope, shown,
+                           warnings_as_errors)
+from ..core.types import Array, Place, TimeFunction
+from .density import Density, points_of
+from .item import beside
+from .loads import DeadLoad
+
+logger = logging.getLogger(__name__)
+#: Steps of differences, relative to the size of a variable.
+STEP = 1e-6
+_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
+
+
+def _form_of(module, name):
+    return attrgetter(name)(import_module(module))
+
+
+def _reduced(form):
+    """For pickle: by its name what a decorator made, since its function has the same name."""
+    module, name = form.form.__module__, form.form.__qualname__
+    named = getattr(sys.modules.get(module), name, None) is form
+    return (_form_of, (module, name)) if named else object.__reduce_ex__(form, 4)
+
+
+copyreg.pickle(LinearForm, _reduced)
+copyreg.pickle(BilinearForm, _reduced)
+
+
+class _Parameters(FormExtraParams):
+    """What a form knows as w; it notes what is asked for."""
+
+    def __getitem__(self, name):
+        vars(self).setdefault("asked", set()).add(name)
+        return super().__getitem__(name)
+
+
+class FormLoad(Density):
+    """A scikit-fem ``LinearForm`` as a load, on the body or on a place of its boundary.
+
+    It is dead if it depends on the place alone. If it uses the position ``w.r``, a field with
+    ``grad``, the deformation gradient ``w.F``, (2, 2, ...), or the time ``w.t``, 0 in statics, it
+    follows the deformation; then it has no potential for the package, and acts on elements with
+    sections. What is known by its energy is better an :class:`~skfem_ancf.Energy`.
+
+    Parameters
+    ----------
+    form
+        A ``LinearForm`` of scikit-fem, which knows ``w.x``, ``w.h``, on a boundary ``w.n``, and
+        ``w.r``, ``w.F``, ``w.t``.
+    boundary
+        A place, see :func:`skfem_ancf.mesh.places.facets_of`; None for the body.
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+    tangent
+        The ``BilinearForm`` of the derivative of the form: of u, the change of r, v and w. Without
+        it by differences.
+    scaled
+        False for what load factors do not scale.
+
+    Examples
+    --------
+    A wind that is the stronger the higher, with its derivative:
+
+    >>> import numpy as np
+    >>> from skfem import BilinearForm, LinearForm
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01, angle=np.pi / 2),
+    ...             ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> wind = LinearForm(lambda v, w: 10 * w.r[1] * v[0])
+    >>> state = Scene(beam).clamp("left").load(
+    ...     wind, tangent=BilinearForm(lambda u, v, w: 10 * u[1] * v[0])).solve_static()
+    >>> bool(0.05 < state.displacement((0, 1))[0] < 0.06)
+    True
+    """
+
+    symmetric = False
+    # of a bound one
+    _basis: Any
+
+    def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None, tangent: BilinearForm | None = None,
+                 scaled: bool = True) -> None:
+        super().__init__(beam, amplitude)
+        if not isinstance(form, LinearForm):
+            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
+                             "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
+        if tangent is not None and not isinstance(tangent, BilinearForm):
+            raise InputError("tangent must be a scikit-fem BilinearForm, of u, v and w, got "
+                             f"{shown(tangent)}")
+        self.form, self.boundary, self.tangent = form, boundary, tangent
+        self.scaled = require_flag("scaled", scaled)
+
+    def bind(self, beam: Beam) -> Any:
+        basis = (beam.exact_basis() if self.boundary is None else
+                 beam.facet_basis(self.boundary))
+        fields = [b[0] for b in basis.basis[::2]]
+        part = points_of(basis.element_dofs.T, np.asarray(basis.default_parameters()["x"]),
+                         basis.dx, np.array([f[0] for f in fields]),
+                         np.array([f.grad[0] for f in fields]), None)
+        bound = self._with(beam=beam, _parts=[part], _basis=basis)
+        P, w = bound._asked(bound._variables(np.zeros(beam.N), part))
+        if not vars(w).get("asked", set()) & {"r", "F", "t"}:
+            return DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._spread(P))._with(
+                scaled=self.scaled)
+        if not beam.has_sections:
+            raise InputError(f"a form with w.r acts on elements with sections, as "
+                             f"ElementBeamANCF(2), and not on {beam!r}")
+        if self.tangent is None:
+            logger.info("%r has no tangent=: its derivative is found by differences", self)
+        else:
+            beside(bound._require_tangent, beam.sizes)
+        return bound
+
+    def _asked(self, y):
+        """The form for each of six test functions, (6, n, np), and its parameters."""
+        w = self._fields(y)
+        return np.array([self._values(self.form.form, v, w) for v in self._tests]), w
+
+    @property
+    def _tests(self):
+        """Test functions whose value or gradient has one entry of 1, the others of 0."""
+        for k in range(6):
+            y = np.zeros((6, *self._basis.dx.shape))
+            y[k] = 1.0
+            yield _field(y)
+
+    def _fields(self, y):
+        return _Parameters({**self._basis.default_parameters(), "r": _field(y),
+                            "F": y[2:].reshape(2, 2, *y.shape[1:]), "t": self._time})
+
+    def _values(self, form, *args):
+        """What a form of the caller's returns at the points."""
+        what = f"the form of a load, form({'u, ' * (len(args) == 3)}v, w),"
+        try:
+            with warnings_as_errors(_COMPLEX):
+                found = np.empty(self._basis.dx.shape)
+                found[:] = form(*args)
+                return found
+        except (KeyError, AttributeError) as error:
+            name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))
+            if name is None:
+                raise CallbackError(f"{what} raised {type(error).__name__}: {error}") from error
+            raise CallbackError(f"{what} uses w.{name[1] or name[2]}, which there is not: it knows "
+                                "w.x, w.h, on a boundary w.n, and w.r, w.F and w.t") from error
+        except AncfError:
+            raise
+        except Exception as error:  # it is the user's: it may raise anything
+            raise CallbackError(f"{what} fails: {type(error).__name__}: {error}; it must return a "
+                                "real number at each point, as v[1]") from error
+
+    def _slope(self, y, part):
+        return -self._asked(y)[0]
+
+    def _curvature(self, y, part):
+        if self.tangent is not None:
+            w = self._fields(y)
+            return -np.array([[self._values(self.tangent.form, u, v, w) for u in self._tests]
+                              for v in self._tests])
+        steps = STEP * np.array([self.beam.size] * 2 + [1.0] * 4)
+        return np.stack([(self._slope(y + d, part) - self._slope(y - d, part)) / (2.0 * step)
+                         for step, d in zip(steps, (steps * np.eye(6))[:, :, None, None])], axis=1)
+
+    def _require_tangent(self, u, d):
+        """Raise InputError unless the tangent is the derivative of the form."""
+        part, = self._parts
+        y, dy = self._variables(u, part), self._variables(d, part)
+        dy -= self._variables(0.0 * d, part)
+        before, after = self._slope(y - dy, part), self._slope(y + dy, part)
+        slope = np.einsum("klep,lep->kep", self._curvature(y, part), dy)
+        require_slope(f"tangent of {self!r}", "the form", before - after, -2.0 * slope,
+                      1e-13 * np.max(np.abs(before)))
+
+    def spread(self, u: Array) -> Spread | None:
+        part, = self._parts
+        return self._spread(-self._slope(self._variables(u, part), part))
+
+    def _spread(self, P):
+        """How a force is spread over the body; None if it acts on derivatives."""
+        basis, f = self._basis, P[:2]
+        if np.any(P[2:]):
+            return None
+        if isinstance(basis, FacetBasis):
+            groups, stations = facets_along(self.beam.mesh, basis)
+            per_xi = f * basis.dx / basis.W
+            return Spread(stations=stations, sampled=tuple(
+                Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+        if not self.beam.across.plain:
+            return None
+        xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
+        values = (f / self.beam.across.layers[0].width).reshape(*f.shape[:2], len(xi), len(eta))
+        return Spread(sampled=(Sampled(BODY, np.arange(f.shape[1]), xi, values, eta),))
+
+    def __repr__(self):
+        name = getattr(self.form.form, "__name__", type(self.form).__name__)
+        return f"<FormLoad {name}>"
+
+
+def _field(y):
+    """A field with its gradient, of six numbers at each point."""
+    return DiscreteField(value=y[:2], grad=y[2:].reshape(2, 2, *y.shape[1:]))
