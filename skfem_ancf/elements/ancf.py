@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -11,10 +10,8 @@ from numpy.polynomial import legendre
 from ..core.errors import require_integer, require_option
 from ..core.immutable import read_only
 from ..core.quadrature import gauss_lobatto
+from ..core.types import Array
 from .base import ElementBeam, SectionFunctions
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 
 def _chebyshev(n: int) -> Array:

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
+from numpy.typing import ArrayLike
 from skfem.element import DiscreteField, Element
 
-from ..core.errors import InputError, MeshError, require_finite, shown
 from ..core.caching import ArrayKey, array_cache
+from ..core.errors import InputError, MeshError, require_finite, shown
 from ..core.immutable import Immutable
 from ..core.quadrature import gauss
+from ..core.types import Array, Rule
+from ..mesh.mapping import MappingBeam
+from ..mesh.mesh_beam import MeshBeam
 from ..mesh.nodal import nodal_derivatives, turned
 from ..mesh.reference_cell import SECTIONS, RefBeam, hermite_basis
 from .sampling import Sampling, StabilisedMode, default_sampling, missed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array, Rule
-    from ..mesh.mapping import MappingBeam
-    from ..mesh.mesh_beam import MeshBeam
 
 
 #: Degrees along the axis of the elements of the package.

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.types import Array
 from ..mesh.reference_cell import SECTIONS, hermite_basis
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
 from .sampling import Sampling, StabilisedMode
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 
 class ElementBeamCable(ElementBeam):

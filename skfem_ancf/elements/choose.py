@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from ..core.errors import InputError, require_like, require_names, require_positive
+from ..core.types import Isotropic
+from ..mesh.mesh_beam import MeshBeam
 from .ancf import ElementBeamANCF
+from .base import ElementBeam
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Isotropic
-    from .base import ElementBeam
 
 #: The order that a field of the section needs at least; 0 is the cable.
 ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_xy": 3, "S_yy": 5,

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from ..core.immutable import read_only
 from ..core.quadrature import gauss, gauss_lobatto
+from ..core.types import Array
 from ..mesh.reference_cell import hermite_basis
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 
 class Sampling(NamedTuple):

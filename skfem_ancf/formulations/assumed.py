@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.linear import stress_of
 from ..core.errors import InputError, require_finite_scalar, require_like
-from ..materials import LinearLaw
+from ..core.linear import stress_of
 from ..core.quadrature import gauss
+from ..core.types import Array
+from ..elements.base import ElementBeam
+from ..materials import LinearLaw
+from ..materials.base import Material
+from ..mesh.mesh_beam import MeshBeam
 from .base import Formulation, Integrated, Term
 from .ecm import AXIS, split_moduli
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..elements.base import ElementBeam
-    from ..materials.base import Material
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array
 
 
 class Assumed(Formulation):

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from ..core.linear import stress_of
-from ..core.errors import require_like
 from ..core.caching import ArrayKey
+from ..core.errors import require_like
 from ..core.immutable import Immutable, read_only
+from ..core.linear import stress_of
 from ..core.quadrature import gauss, lagrange, product_rule
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-
-    from ..elements.base import ElementBeam
-    from ..materials.base import Material
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array, Law, Rule
+from ..core.types import Array, Law, Rule
+from ..elements.base import ElementBeam
+from ..materials.base import Material
+from ..mesh.mesh_beam import MeshBeam
 
 COMPONENTS = ("xx", "yy", "xy")
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from ..core.errors import require_like
+from ..elements.base import ElementBeam
+from ..materials.base import Material
 from .base import Formulation, Term
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..elements.base import ElementBeam
-    from ..materials.base import Material
 
 
 class Continuum(Formulation):

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.linear import stress_of
 from ..core.errors import InputError, require_like
+from ..core.linear import stress_of
+from ..core.types import Array
+from ..elements.base import ElementBeam
 from ..materials import LinearLaw
+from ..materials.base import Material
 from .base import Formulation, Integrated, Term
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..elements.base import ElementBeam
-    from ..materials.base import Material
-    from ..core.types import Array
 
 #: The rule across the section that is the axis alone, with the weight of the whole section.
 AXIS = (np.array([0.5]), np.array([1.0]))

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from ..elements.base import ElementBeam
 from ..materials import LinearLaw
+from ..materials.base import Material
 from .base import Term
 from .ecm import AXIS, EnhancedContinuum, split_moduli
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..elements.base import ElementBeam
-    from ..materials.base import Material
 
 
 class StrainSplit(EnhancedContinuum):

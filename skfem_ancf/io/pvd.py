@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
-from ..core.errors import require_options, require_path, require_text
-from ..recovery.fields import find_fields
 from ..actions.obstacles.pictures import obstacles_of
 from ..core.archive import output_file
+from ..core.errors import require_options, require_path, require_text
+from ..core.types import StrPath
+from ..recovery.fields import find_fields
 from .vtu import require_next, save_vtu
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from pathlib import Path
-
-    from ..core.types import StrPath
 
 logger = logging.getLogger(__name__)
 

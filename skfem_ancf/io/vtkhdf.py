@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ..actions.obstacles.pictures import around, outlines
 from ..core.archive import find_h5py, new_file, put_in_place
-from ..core.errors import (FileError, InputError, require_option, require_options, require_path)
+from ..core.errors import FileError, InputError, require_option, require_options, require_path
+from ..core.types import StrPath
 from ..recovery.fields import find_fields
 from ..recovery.grids import CELL_TYPES
-from ..actions.obstacles.pictures import around, outlines
 from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from pathlib import Path
-
-    from ..core.types import StrPath
 
 #: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose
 #: writing fails, and takes the process with it.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import meshio
 import numpy as np
@@ -12,13 +13,9 @@ from ..actions.obstacles.pictures import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
                            require_option, require_path, warn)
+from ..core.types import Array, StrPath
 from ..recovery.fields import find_fields
 from ..recovery.grids import grids, in_space
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from ..core.types import Array, StrPath
 
 logger = logging.getLogger(__name__)
 

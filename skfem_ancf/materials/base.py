@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
                            require_positive, require_slope, shown)
 from ..core.immutable import Immutable, rebuilt
 from ..core.origin import ours
 from ..core.quadrature import gauss
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array, HasShear, Law
+from ..core.types import Array, HasShear, Law
 
 PLANES = ("stress", "strain")
 

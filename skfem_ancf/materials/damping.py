@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.errors import InputError, require_finite, require_not_negative, shown
 from ..core.immutable import Immutable
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 class KelvinVoigt(Immutable):

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..core.errors import InputError
 from ..core.source import primitive, source
+from ..core.types import Array, Law
 from .pointwise import PointwiseMaterial
-
-if TYPE_CHECKING:
-    from ..core.types import Array, Law
 
 
 @primitive("skfem_ancf.core.loops")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..core.types import Array
 from .base import Material
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 #: Places of the six moduli of a symmetric matrix in its nine entries, row by row.
 MODULI = 0, 1, 2, 1, 3, 4, 2, 4, 5

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
 from ..core.errors import require_positive
+from ..core.types import Array, Law
 from .base import LinearLaw, Material, hooke
-
-if TYPE_CHECKING:
-    from ..core.types import Array, Law
 
 
 class StVenantKirchhoff(Material):

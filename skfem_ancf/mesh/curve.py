@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import itertools
 import logging
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import CallbackError, MeshError, ask_array, warnings_as_errors
 from ..core.quadrature import gauss
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
+from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 

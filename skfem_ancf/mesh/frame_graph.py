@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 import scipy
@@ -13,16 +13,12 @@ from scipy.sparse.csgraph import connected_components
 from ..core.errors import (InputError, MeshError, ModelWarning, NameUnknown, ask, ask_field,
                            require_finite, require_integer, require_label, require_not_negative,
                            require_unmasked, shown, warn)
+from ..core.types import Array
+from .curve import Curve
 from .members import Axes, MeshLines, heights_of_chains
 from .mesh_beam import MeshBeam
 from .numbering import default_tags
 from .places import is_point, points_of_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from .curve import Curve
-    from ..core.types import Array
 
 #: How far from a node a point may be that names it, relative to the size of the net.
 NEAR = 1e-9

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from functools import cached_property, lru_cache
 from math import factorial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.polynomial.polynomial import polyder, polyval
+from numpy.typing import ArrayLike
 
 from ..core.errors import MeshError
+from ..core.types import Array
 from .reference_cell import hermite_basis
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
 
 #: Corrections of Newton's method that are small enough.
 CLOSE = 1e-7

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from skfem.mapping import Mapping
 
 from ..core.errors import MeshError
+from ..core.types import Array
 from .location import Inverse, with_slope
 from .nodal import nodal_derivatives, turned
 from .reference_cell import SECTIONS, hermite_basis
 from .taper import powers
-
-if TYPE_CHECKING:
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
 
 #: Powers of xi in relative heights that are round-off.
 NOTHING = 2e-14

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 
 from ..core.errors import InputError, MeshError, shown
+from ..core.types import Array
+from .curve import Curve
 from .mesh_beam import MeshBeam
 from .taper import heights_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from .curve import Curve
-    from ..core.types import Array
 
 
 def chain_of(s: Array) -> Array:

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
+from numpy.typing import ArrayLike
 from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
-from .curve import Curve, check_curvature, derivative_of
 from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_finite_scalar, require_function, require_integer, require_option,
                            require_options, require_path, require_positive, require_unmasked, shown)
+from ..core.origin import ours
+from ..core.types import Array, StrPath
 from . import files
+from .curve import Curve, check_curvature, derivative_of
 from .location import Finder
 from .mapping import MappingBeam
-from ..core.origin import ours
 from .numbering import NumberedMesh, default_tags
 from .places import as_point, is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
 from .taper import Scaled, heights_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array, StrPath
 
 EPS = float(np.finfo(float).eps)
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from math import factorial, perm
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..core.types import Array
+from ..core.types import Array
 
 
 def turned(d: Array) -> Array:

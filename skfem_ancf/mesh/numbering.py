@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import copyreg
+from collections.abc import Callable
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import ArrayLike
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D
 
 from ..core.errors import MeshError, require_option, shown
 from ..core.immutable import Immutable, read_only
+from ..core.types import Array
 from .places import satisfying
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
 
 
 # a view of an array, as which pickle takes it, has no orientation

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import numbers
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, ask, is_masked,
                            require_point, shown)
+from ..core.types import Array, Place
 from .location import Finder
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array, Place
 
 #: How far off a section a point may be that names it, relative to an element next to it.
 NEAR = 1e-6

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import comb, perm
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from skfem.element import ElementH1
-from skfem.refdom import Refdom, RefLine, RefQuad
+from skfem.refdom import RefLine, RefQuad, Refdom
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
+from ..core.types import Array
 
 
 #: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.

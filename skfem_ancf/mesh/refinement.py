@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from skfem.generic_utils import OrientedBoundary
 
-from .taper import halved as halved_heights
-from .taper import heights_of
-
-if TYPE_CHECKING:
-    from ..core.types import Array
+from ..core.types import Array
+from .taper import halved as halved_heights, heights_of
 
 
 def halved(mesh: Any, ix: Array) -> Any:

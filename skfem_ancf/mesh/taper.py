@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import MeshError, ask_array, require_function, require_positive
 from ..core.quadrature import lagrange
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
+from ..core.types import Array
 
 #: Where the heights of an element are given, and between them, where a cubic has to fit.
 PLACES, BETWEEN = np.arange(4) / 3.0, (1.0 + 2.0 * np.arange(3)) / 6.0

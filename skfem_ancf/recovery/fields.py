@@ -7,27 +7,23 @@ it has a sign, and how many components it has. A field of your own is a function
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..beam import kinematics
+from ..beam.beam import Beam
+from ..beam.points import BeamPoints
+from ..beam.strains import stress_at, stretched
 from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                            require_flag, require_integer, require_label, require_text, shown)
 from ..core.linear import first_order, step
-from ..beam import kinematics
+from ..core.types import Array
 from ..materials import LinearLaw
-from ..beam.points import BeamPoints
-from ..beam.strains import stress_at, stretched
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from ..beam.beam import Beam
-    from .recovered import Recovery
-    from ..core.types import Array
+from .recovered import Recovery
 
 COMPONENTS = ("xx", "yy", "xy")
 

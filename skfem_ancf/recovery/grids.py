@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..beam.beam import Beam
 from ..core.errors import InputError, require_flag, require_integer, require_like, shown
 from ..core.quadrature import tensor
+from ..core.types import Array
 from .fields import Values, values_on_grid
-
-if TYPE_CHECKING:
-    from ..beam.beam import Beam
-    from ..core.types import Array
 
 #: VTK's numbers of cells, by what meshio calls them.
 CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}

@@ -23,29 +23,26 @@ between two places where the section force jumps:
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebint, chebvander
 
-from ..core.quadrature import gauss
+from ..beam.beam import Beam
+from ..beam.distribution import SNAP
 from ..beam.strains import on_grid, stress_at
+from ..core.quadrature import gauss
+from ..core.types import Array, Law
 from ..formulations.ecm import EnhancedContinuum
 from ..materials import LinearLaw
-from ..sections.across import EDGE
-from .segments import Segment
 from ..mesh.refinement import by_element
+from ..sections import Layer
+from ..sections.across import EDGE
 from .section_forces import ALONG, NotRecovered, SectionForces
-from ..beam.distribution import SNAP
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..beam.beam import Beam
-    from ..core.types import Array, Law
-    from ..sections import Layer
+from .segments import Segment
 
 #: Fields that the last round changes by more than this part of the largest strain have not settled;
 #: strains below the other are round-off.

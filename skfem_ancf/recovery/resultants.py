@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..beam import kinematics
+from ..beam.beam import Beam
 from ..beam.strains import cable_axis, on_grid, stress_at
 from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
+from ..core.types import Array
 from ..mesh.mapping import cross
-from .recovered import ArcLength
+from .recovered import ArcLength, Recovery
 from .section_forces import Sections
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..beam.beam import Beam
-    from .recovered import Recovery
-    from ..core.types import Array
 
 #: Sections in an element, both ends included, where none are named.
 ALONG_ELEMENT = 9

@@ -7,25 +7,20 @@ between a node and a section gives the force and the moment in that section.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..beam.beam import Beam
+from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
 from ..core.errors import AncfError
-from ..formulations.ecm import AXIS as WHOLE
-from ..mesh.mapping import cross
 from ..core.quadrature import gauss, lagrange
+from ..core.types import Array
+from ..formulations.ecm import AXIS as WHOLE
+from ..mesh.mapping import MappingBeam, cross
 from ..sections.jumps import beside, jumps
-from ..beam.distribution import AXIS, BODY, SNAP, station_of_node
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..beam.beam import Beam
-    from ..mesh.mapping import MappingBeam
-    from ..beam.distribution import Sampled
-    from ..core.types import Array
 
 #: Points along an element for its loads.
 ALONG = 8

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
 from scipy.linalg import solve_banded
 
-from ..core.linear import angle_of, first_order, unwrapped
-from ..mesh.mapping import cross
-from .section_forces import NotRecovered, Sections
-from ..sections.jumps import beside
 from ..beam.distribution import AXIS
-
-if TYPE_CHECKING:
-    from ..core.types import Array
+from ..core.linear import angle_of, first_order, unwrapped
+from ..core.types import Array
+from ..mesh.mapping import cross
+from ..sections.jumps import beside
+from .section_forces import NotRecovered, Sections
 
 #: Rounds of steps 2 and 3, and the change of the stretch, relative to its largest, at which they
 #: end; and of those that contract slowly.

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from ..actions.forces.unscaled import Unscaled
+from ..beam.beam import Beam
+from ..beam.distribution import Sampled, station_of_node, stations_of_vector
+from ..core.types import Array
 from ..recovery.recovered import Recovery
 from ..recovery.section_forces import NotRecovered, SectionForces, viscous_forces
-from ..beam.distribution import Sampled, station_of_node, stations_of_vector
-
-if TYPE_CHECKING:
-    from ..beam.beam import Beam
-    from ..core.types import Array
 
 
 def stations(state: Any) -> list[list[float]]:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..beam.beam import Beam
 from ..core.errors import InputError, require_finite
+from ..core.types import Array
+from ..equations.system import System
 from .state import State
-
-if TYPE_CHECKING:
-    from ..beam.beam import Beam
-    from ..equations.system import System
-    from ..core.types import Array
 
 _GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths", "heights")
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..beam import kinematics
-from ..core.errors import ModelWarning, warn
+from ..beam.beam import Beam
 from ..beam.distribution import SNAP
-
-if TYPE_CHECKING:
-
-    from ..beam.beam import Beam
-    from ..core.types import Array
+from ..core.errors import ModelWarning, warn
+from ..core.types import Array
 
 #: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
 #: fibre, E (l^3 - l) / 2, has its smallest value there.

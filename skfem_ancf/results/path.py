@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..beam.layout import WhichBeam
 from ..core.errors import require_index
+from ..core.types import Array
+from ..equations.system import System
 from .state import State
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..equations.system import System
-    from ..core.types import Array
-    from ..beam.layout import WhichBeam
 
 
 @dataclass(repr=False)

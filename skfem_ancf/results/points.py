@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..beam.layout import select_member
+from ..beam.layout import WhichMember, select_member
 from ..beam.points import require_body
 from ..core.linear import first_order
-
-if TYPE_CHECKING:
-    from ..equations.system import System
-    from ..core.types import Array
-    from ..beam.layout import WhichMember
+from ..core.types import Array
+from ..equations.system import System
 
 
 class MaterialPoints:

@@ -3,42 +3,34 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..equations.linearised import linear_energy, linear_external_force, linear_force
-from ..beam.layout import select_beam, select_member
-from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..actions.eigenstrain import EigenStrain
-from ..actions.obstacles.contact import contact_of
-from ..equations.stability import verdict
-from ..recovery.fields import Values, find_field
+from ..actions.joints.base import Joint
+from ..actions.obstacles.contact import Contact, contact_of
+from ..beam.beam import Beam
+from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
+from ..beam.points import BeamPoints, require_body
+from ..beam.rigid import RigidBody
+from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..core.immutable import Immutable
 from ..core.linear import first_order, step
-from ..beam.points import require_body
+from ..core.types import Array, Place, StrPath
+from ..equations.linearised import linear_energy, linear_external_force, linear_force
+from ..equations.stability import Verdict, verdict
+from ..equations.system import System
+from ..recovery.fields import Values, find_field
+from ..recovery.recovered import Recovery
 from ..recovery.resultants import Resultants, resultants
 from ..recovery.section_forces import NotRecovered
 from .acting import recover, stations
-from .checks import check
+from .checks import Checks, check
 from .points import MaterialPoints
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
-
-    from ..beam.beam import Beam
-    from ..beam.points import BeamPoints
-    from .checks import Checks
-    from ..actions.joints.base import Joint
-    from ..actions.obstacles.contact import Contact
-    from ..recovery.recovered import Recovery
-    from ..beam.rigid import RigidBody
-    from ..equations.stability import Verdict
-    from ..equations.system import System
-    from ..core.types import Array, Place, StrPath
-    from ..beam.layout import WhichBeam, WhichMember
 
 logger = logging.getLogger(__name__)
 

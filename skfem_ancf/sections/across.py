@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial, reduce
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
@@ -13,18 +14,13 @@ from numpy.polynomial.legendre import legvander
 from ..core.errors import InputError
 from ..core.immutable import Immutable
 from ..core.quadrature import gauss
-from .section import Rectangle, asked
+from ..core.types import Array, Rule
+from ..elements.base import ElementBeam
+from ..materials import Material
+from ..mesh.mesh_beam import MeshBeam
 from .jumps import BEND, KINK, jumps
+from .section import Layer, Rectangle, Section, asked
 from .shear import shear_factor
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..core.types import Array, Rule
-    from ..elements.base import ElementBeam
-    from ..materials import Material
-    from ..mesh.mesh_beam import MeshBeam
-    from .section import Section, Layer
 
 #: Points across a layer for areas and moments.
 POINTS = 4

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
+from ..core.types import Array
 
 #: How far from its ends an element is asked for what may jump there, relative to its length.
 SIDE = 1e-7

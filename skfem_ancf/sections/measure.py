@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
 from ..core.immutable import Immutable
 from ..core.quadrature import gauss
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..core.types import Array, Rule
+from ..core.types import Array, Rule
 
 #: Points more, where the weight is no polynomial of Y.
 MORE = 4

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
 
 from ..core.quadrature import gauss
-from .measure import MORE, Measure, Weighted
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..core.types import Array, Rule
-    from .measure import Piece
+from ..core.types import Array, Rule
+from .measure import MORE, Measure, Piece, Weighted
 
 #: Least degree of the series of a width, and its points more where that is a square root.
 LEAST, ROUND = 8, 40

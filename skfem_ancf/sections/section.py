@@ -5,23 +5,20 @@ A section is a list of layers from bottom to top, each of a material and a width
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import (CallError, InputError, ask_array, require_flag, require_option,
                            require_positive, shown)
 from ..core.immutable import Immutable
+from ..core.types import Array, HasShear
 from ..materials import Material, StVenantKirchhoff
+from ..mesh.mesh_beam import MeshBeam
 from .measure import MORE, WHOLE, Piece, Uniform, Weighted
 from .moving import Moving
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..mesh.mesh_beam import MeshBeam
-    from ..core.types import Array, HasShear
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from ..core.quadrature import gauss, lagrange
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .section import Layer
+from .section import Layer
 
 #: Points in each piece of a section.
 POINTS = 24

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ..core.archive import output_file
 from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
                            require_like, require_path, require_positive, require_text, shown, warn)
-from ..core.archive import output_file
+from ..core.types import StrPath
 from .matplotlib import colormap, colour_bar, figure_class, paint, plain
 from .scenery import INK, MUTED, Scenery
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from ..core.types import StrPath
 
 SUFFIXES = (".gif", ".mp4")
 

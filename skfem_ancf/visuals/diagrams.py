@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..beam.layout import select_beam
+from ..beam.layout import WhichBeam, select_beam
 from ..core.errors import InputError, require_flag, require_like
+from ..core.types import StrPath
 from .matplotlib import figure_class, page, plain, save
 from .scenery import INK, MUTED
-
-if TYPE_CHECKING:
-    from ..core.types import StrPath
-    from ..beam.layout import WhichBeam
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..actions.obstacles.pictures import AROUND
+from ..beam.layout import WhichBeam
+from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text)
-from ..core.archive import output_file
-from ..actions.obstacles.pictures import AROUND
+from ..core.types import StrPath
 from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import StrPath
-    from ..beam.layout import WhichBeam
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..actions.obstacles.pictures import around, outlines
+from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
                            require_options, require_path, require_text)
+from ..core.types import StrPath
 from ..recovery.fields import FIELDS, find_fields
-from ..core.archive import output_file
 from ..recovery.grids import CELL_TYPES, grids, in_space
-from ..actions.obstacles.pictures import around, outlines
 from .animation import pixels
 from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery
-
-if TYPE_CHECKING:
-    from ..core.types import StrPath
 
 #: Pictures that a plotter writes.
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..actions.obstacles.pictures import around, outlines
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_positive,
                            require_unmasked, shown)
+from ..core.types import Array
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
-from ..recovery.grids import grids, in_space
-from ..actions.obstacles.pictures import around, outlines
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from ..recovery.grids import Grid
-    from ..core.types import Array
+from ..recovery.grids import Grid, grids, in_space
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
