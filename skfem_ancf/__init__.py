@@ -13,6 +13,7 @@ from .actions.loads import (DeadLoad, EndMoment, Load, PointForce, Pressure, Tra
 from .actions.obstacles import Circle, Line, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support
 from .beam.beam import Beam, reference_coordinates
+from .beam.domain import Domain
 from .beam.rigid import RigidBody
 from .core.errors import (AncfError, CallError, CallbackError, ConvergenceError, FileError,
                           InputError, MeshError, MissingExtra, ModelWarning, NameUnknown,
@@ -39,7 +40,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "HHT", "AncfError", "Beam", "Buckling", "CallError", "CallbackError", "Circle", "Clamp",
-    "Control", "ConvergenceError", "CriticalPoint", "DeadLoad", "Drag", "EigenStrain",
+    "Control", "ConvergenceError", "CriticalPoint", "DeadLoad", "Domain", "Drag", "EigenStrain",
     "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamANCFHermite",
     "ElementBeamCable", "ElementBeamPatelShabana", "EndMoment", "Energy", "EnergyMomentum",
     "FileError",

@@ -15,9 +15,9 @@ from skfem.assembly import BilinearForm, FacetBasis, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam.beam import Beam
 from ..beam.distribution import BODY, Sampled, Spread, facets_along
-from ..beam.layout import WhichBeam
+from ..beam.domain import Domain
+from ..beam.layout import WhichMember
 from ..core.errors import (AncfError, CallbackError, InputError, require_flag, require_slope, shown,
                            warnings_as_errors)
 from ..core.types import Array, Place, TimeFunction
@@ -60,7 +60,8 @@ class FormLoad(Density):
     It is dead if it depends on the place alone. If it uses the position ``w.r``, a field with
     ``grad``, the deformation gradient ``w.F``, (2, 2, ...), or the time ``w.t``, 0 in statics, it
     follows the deformation; then it has no potential for the package, and acts on elements with
-    sections. What is known by its energy is better an :class:`~skfem_ancf.Energy`.
+    sections. On a :class:`~skfem_ancf.Domain` it is dead. What is known by its energy is better an
+    :class:`~skfem_ancf.Energy`.
 
     Parameters
     ----------
@@ -94,10 +95,11 @@ class FormLoad(Density):
     """
 
     symmetric = False
+    for_domains = True
     # of a bound one
     _basis: Any
 
-    def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
+    def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichMember = None,
                  amplitude: TimeFunction = None, tangent: BilinearForm | None = None,
                  scaled: bool = True) -> None:
         super().__init__(beam, amplitude)
@@ -110,7 +112,10 @@ class FormLoad(Density):
         self.form, self.boundary, self.tangent = form, boundary, tangent
         self.scaled = require_flag("scaled", scaled)
 
-    def bind(self, beam: Beam) -> Any:
+    def bind(self, beam: Any) -> Any:
+        if isinstance(beam, Domain):
+            return DeadLoad(beam, beam.load(self.form, self.boundary), self.amplitude)._with(
+                scaled=self.scaled)
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
         fields = [b[0] for b in basis.basis[::2]]

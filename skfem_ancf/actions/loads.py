@@ -16,6 +16,7 @@ from scipy import sparse
 
 from ..beam.beam import Beam
 from ..beam.distribution import Spread, on_facets, stations_of_vector
+from ..beam.domain import Domain
 from ..beam.kinematics import locate, probe
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..beam.kinematics import direction
@@ -81,6 +82,8 @@ class Load(Item):
         Load factors scale it. False for what is there before any load.
     for_bodies : bool
         It may act on a :class:`~skfem_ancf.RigidBody` too.
+    for_domains : bool
+        It may act on a :class:`~skfem_ancf.Domain` too.
 
     Other Parameters
     ----------------
@@ -130,7 +133,7 @@ class Load(Item):
     #: Of a stress-free strain: for each pack of the beam what is given for it, an array
     #: (components, points, elements), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
     pushes: Sequence[Array] = ()
-    for_bodies = False
+    for_bodies = for_domains = False
 
     @property
     def first_order(self) -> bool:
@@ -200,12 +203,16 @@ class Load(Item):
         return f"<{type(self).__name__} on {self.beam!r}>"
 
 
-def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
+def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
     """A load on a beam, tried there: what it returns fits the beam."""
     if isinstance(beam, RigidBody) and not load.for_bodies:
         raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
                          "takes scene.gravity, point_force, follower_force, moment, springs and "
                          "joints")
+    if isinstance(beam, Domain) and ours(load) and not load.for_domains:
+        raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a domain takes "
+                         "scene.gravity, point_force, springs, joints, and scene.load(form, "
+                         "boundary) with any LinearForm")
     bound = load.bind(cast("Beam", beam))
     if not isinstance(bound, Load) or bound.beam is not beam:
         raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {shown(bound)}")
@@ -230,7 +237,7 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
                          "unless it is constant") from error
     require_entries(f"the stiffness of {load!r}", i, j, v, beam.N)
     far = np.abs(np.asarray(i) // beam.nd - np.asarray(j) // beam.nd)
-    if np.any(far > 1):
+    if np.any(far > (beam.bandwidth // beam.nd if isinstance(beam, Domain) else 1)):
         raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
                          "only neighbours of the chain may be coupled, as they are in its elements")
     beside(partial(_require_derivatives, bound), bound.beam.sizes)
@@ -282,7 +289,7 @@ class Weight(Load):
         A function of time by which the force is multiplied in a motion.
     """
 
-    for_bodies = True
+    for_bodies = for_domains = True
 
     def __init__(self, g: ArrayLike, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -294,7 +301,7 @@ class Weight(Load):
         return [self._with(beam=k) for k in which]
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        spread = None if isinstance(beam, RigidBody) else Spread(gravity=self.g)
+        spread = Spread(gravity=self.g) if isinstance(beam, Beam) else None
         return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)._with(g=self.g)
 
 
@@ -314,7 +321,7 @@ class PointForce(Load):
         A function of time by which the force is multiplied in a motion.
     """
 
-    for_bodies = True
+    for_bodies = for_domains = True
 
     def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                  amplitude: TimeFunction = None) -> None:
@@ -327,7 +334,7 @@ class PointForce(Load):
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         vector = np.zeros(beam.N)
-        if isinstance(beam, RigidBody):
+        if not isinstance(beam, Beam):
             dofs, weights = beam.probe(self.at)
             np.add.at(vector, dofs, self.total[:, None] * weights)
             return DeadLoad(beam, vector, self.amplitude)
@@ -415,13 +422,13 @@ class DeadLoad(Load):
         find out.
     """
 
-    for_bodies = True
+    for_bodies = for_domains = True
     #: Of a weight the acceleration, which acts on point masses too.
     g: Any = None
 
-    def __init__(self, beam: Beam | RigidBody, vector: ArrayLike, amplitude: TimeFunction = None,
-                 spread: Spread | None = None) -> None:
-        if not isinstance(beam, (Beam, RigidBody)):
+    def __init__(self, beam: Beam | RigidBody | Domain, vector: ArrayLike,
+                 amplitude: TimeFunction = None, spread: Spread | None = None) -> None:
+        if not isinstance(beam, (Beam, RigidBody, Domain)):
             raise InputError(f"this load acts on a Beam, got {shown(beam)}")
         super().__init__(beam, amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..beam.beam import Beam
+from ..beam.domain import Domain
 from ..beam.kinematics import locate, probe_reference
 from ..beam.kinematics import direction as direction_of, direction_weights
 from ..beam.layout import Layout, WhichMember
@@ -73,7 +75,7 @@ def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     layout
         Of the scene.
     beam
-        The beam or rigid body, its name or its number; "ground" for a point of the ground.
+        The beam, rigid body or domain, its name or its number; "ground" for a point of the ground.
     at
         The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
         mass of a rigid body; a place of a beam that is one section, as "left", for its axis there.
@@ -81,10 +83,10 @@ def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     if is_ground(beam):
         return Vector(np.array(as_point(at)))
     member = layout.beam(beam)
-    if isinstance(at, str) and not isinstance(member, RigidBody):
+    if isinstance(at, str) and isinstance(member, Beam):
         return section(layout, member, at)[0]
     dofs, weights = member.probe(at)
-    if isinstance(member, RigidBody):
+    if not isinstance(member, Beam):
         start = member.place(at)
     else:
         e, X = locate(member, at)
@@ -105,11 +107,13 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
         A place that is one section, whose position is that of its axis; or a material point (x, y),
         at which the section through it may lie inside an element. Of a cable the position is that
         of the axis, and the direction that of its tangent. Of a rigid body a point, or None for its
-        centre of mass.
+        centre of mass. Of a domain a straight boundary: the mean, and the best straight line.
     """
     if is_ground(beam):
         return point(layout, beam, place), Vector(np.array([1.0, 0.0]))
     member = layout.beam(beam)
+    if isinstance(member, Domain):
+        return _boundary(layout, member, place)
     if isinstance(member, RigidBody):
         dofs, weights = member.direction()
         return (point(layout, member, place),
@@ -126,6 +130,14 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
         return point(layout, member, place), direction
     first = layout.offset(member) + node * member.nd
     return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+
+
+def _boundary(layout, domain, boundary):
+    """Position and direction of a straight boundary of a domain."""
+    centre, along, mean, line = domain.moments(boundary)
+    used, = np.nonzero((mean != 0.0) | (line != 0.0))
+    dofs = layout.offset(domain) + 2 * used + np.array([[0], [1]])
+    return Vector(centre, dofs, mean[used]), Vector(along, dofs, line[used])
 
 
 def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
@@ -155,7 +167,7 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
     if not isinstance(at, str):
         at = as_point(at)
     for k, member in enumerate(layout.members):
-        if isinstance(member, RigidBody):
+        if not isinstance(member, Beam):
             if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
                 found.append(k)
             continue
@@ -171,7 +183,7 @@ def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
     """Of beams that have a point those whose axes are nearest to it; others if a body has it, too.
     """
     beams: list[Any] = [layout.members[k] for k in found]
-    if len(found) < 2 or isinstance(at, str) or any(isinstance(b, RigidBody) for b in beams):
+    if len(found) < 2 or isinstance(at, str) or not all(isinstance(b, Beam) for b in beams):
         return found
     where = [(b, *locate(b, at)) for b in beams]
     off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..beam.beam import Beam
+from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichBeam
-from ..beam.rigid import RigidBody, on_body
+from ..beam.rigid import on_body
 from ..core.errors import InputError, SupportError, require_finite_scalar, require_option, shown
 from ..core.types import Place
 from ..mesh.places import is_point, node_of
@@ -103,14 +105,15 @@ class Pin(Support):
 
     def expand(self, layout: Layout) -> Sequence[Item]:
         member = layout.beam(self.beam)
-        if not isinstance(member, RigidBody):
+        face = isinstance(member, Domain) and not is_point(self.boundary)
+        if face or isinstance(member, Beam):
             return (self,)
         at = tuple(map(float, member.place(self.boundary)))
         return (Hinge(("ground", layout.number(member)), at, "of a pin"),)
 
     def bind(self, layout: Layout) -> Support:
         beam, bound = layout.beam(self.beam), super().bind(layout)
-        if is_point(self.boundary):
+        if is_point(self.boundary) and isinstance(beam, Beam):
             x = np.asarray(self.boundary, dtype=float)
             axis = np.round(beam.mesh.p[:, node_of(beam.mesh, self.boundary)], 12) + 0.0
             if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
@@ -144,7 +147,7 @@ class Clamp(Item):
 
     def expand(self, layout: Layout) -> Sequence[Item]:
         k, member = layout.number(self.beam), layout.beam(self.beam)
-        if isinstance(member, RigidBody):
+        if not isinstance(member, Beam):
             return (Support(self.boundary, beam=k),)
         if member.has_sections and self.thickness == "fixed":
             return (Support(self.boundary, member.element.welded, beam=k),)

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from .beam import Beam
+from .domain import Domain
 from ..core.errors import InputError, NameUnknown, shown
 from ..core.types import Array
 from .rigid import RigidBody
@@ -16,25 +17,25 @@ from .rigid import RigidBody
 #: What :func:`select_beam` takes: a Beam, its name or its number; None for the only one.
 WhichBeam: TypeAlias = Beam | str | int | None
 
-#: The same, of beams and rigid bodies.
-WhichMember: TypeAlias = Beam | RigidBody | str | int | None
+#: The same, of beams, rigid bodies and domains.
+WhichMember: TypeAlias = Beam | RigidBody | Domain | str | int | None
 
 
 class Layout:
-    """Beams and rigid bodies, their names, and the numbers of their degrees of freedom.
+    """Beams, rigid bodies and domains, their names, and the numbers of their degrees of freedom.
 
     What acts in a scene is bound to it. The degrees of freedom of the beams come first, beam after
-    beam, then those of the rigid bodies.
+    beam, then those of the rigid bodies, then those of the domains.
 
     Parameters
     ----------
     *members
-        Beams and rigid bodies, one at least.
+        Beams, rigid bodies and domains, one at least.
 
     Attributes
     ----------
-    beams, bodies, members : tuple
-        The beams, the rigid bodies, and both: beams first, in the order of their numbers.
+    beams, bodies, domains, members : tuple
+        The beams, the rigid bodies, the domains, and all in this order, that of their numbers.
     N : int
         Number of degrees of freedom.
 
@@ -44,19 +45,21 @@ class Layout:
         If there are none, something else is among them, or two are the same or have one name.
     """
 
-    def __init__(self, *members: Beam | RigidBody) -> None:
+    def __init__(self, *members: Beam | RigidBody | Domain) -> None:
         for one in members:
-            if not isinstance(one, (Beam, RigidBody)):
-                raise InputError(f"a scene is made of Beams and RigidBodies, got {shown(one)}")
+            if not isinstance(one, (Beam, RigidBody, Domain)):
+                raise InputError("a scene is made of Beams, RigidBodies and Domains, got "
+                                 f"{shown(one)}")
         if not members:
-            raise InputError("a scene needs a Beam or a RigidBody at least, got none")
+            raise InputError("a scene needs a Beam, a RigidBody or a Domain at least, got none")
         names = [one.name for one in members if one.name is not None]
         if len(set(names)) < len(names) or len(set(map(id, members))) < len(members):
             raise InputError(f"the beams of a scene must be different, and so must their names: "
                              f"{names}")
         self.beams = tuple(b for b in members if isinstance(b, Beam))
         self.bodies = tuple(b for b in members if isinstance(b, RigidBody))
-        self.members: tuple[Any, ...] = *self.beams, *self.bodies
+        self.domains = tuple(b for b in members if isinstance(b, Domain))
+        self.members: tuple[Any, ...] = *self.beams, *self.bodies, *self.domains
         *self._first, self.N = accumulate((b.N for b in self.members), initial=0)
         self._numbers = {id(b): k for k, b in enumerate(self.members)}
 
@@ -76,14 +79,14 @@ class Layout:
         found = self._numbers.get(id(which))
         if found is not None:
             return found
-        return self._numbers[id(select_member(self.beams, self.bodies, which))]
+        return self._numbers[id(select_member(self.beams, self.members[len(self.beams):], which))]
 
     def beam(self, which: WhichMember = None) -> Any:
-        """The beam or rigid body meant by itself, a name, a number, or None for the only one."""
+        """The member meant by itself, a name, a number, or None for the only one."""
         return self.members[self.number(which)]
 
     def offset(self, which: WhichMember = None) -> int:
-        """Number of the first degree of freedom of a beam or rigid body."""
+        """Number of the first degree of freedom of a member."""
         return self._first[self.number(which)]
 
     @property
@@ -119,14 +122,14 @@ def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
                          f"them, by itself, its name or its number; got {shown(beam)}")
     if beam is None:
         raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
-    if isinstance(beam, RigidBody):
+    if isinstance(beam, (RigidBody, Domain)):
         raise InputError(f"this is asked of beams, got {shown(beam)}; beams are {known}")
     raise NameUnknown("beam", beam, known)
 
 
-def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody],
-                  which: WhichMember) -> Beam | RigidBody:
-    """As :func:`select_beam`, of beams and of rigid bodies, which are numbered behind them.
+def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody | Domain],
+                  which: WhichMember) -> Beam | RigidBody | Domain:
+    """As :func:`select_beam`, of beams and of rigid bodies and domains, numbered behind them.
 
     None is the only beam, without beams the only body.
     """
@@ -135,10 +138,9 @@ def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody],
     if which is None or not bodies:
         return select_beam(beams, which)
     members = *beams, *bodies
-    if isinstance(which, RigidBody):
-        found = [b for b in bodies if b is which]
-        if found:
-            return found[0]
-        raise NameUnknown("rigid body", which, [b.name or len(beams) + k
+    if isinstance(which, (RigidBody, Domain)):
+        if any(b is which for b in bodies):
+            return which
+        raise NameUnknown("rigid body or domain", which, [b.name or len(beams) + k
                                                 for k, b in enumerate(bodies)])
     return select_beam(members, which)  # type: ignore[arg-type]

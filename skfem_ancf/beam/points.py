@@ -17,6 +17,7 @@ from ..core.errors import (InputError, MeshError, require_finite, require_intege
 from ..core.types import Array
 from ..mesh.places import as_point
 from .beam import Beam
+from .domain import Domain, DomainPoints
 from .layout import WhichMember, select_beam, select_member
 from .rigid import RigidBody
 from .strains import strain_at
@@ -189,7 +190,7 @@ class Located:
         They were given as a single point.
     n : int
         How many.
-    parts : list of BeamPoints and BodyPoints
+    parts : list of BeamPoints, BodyPoints and DomainPoints
         Those of each beam and body that has some.
     """
 
@@ -223,11 +224,12 @@ class Located:
 class Points:
     """Finds the points of a scene: of beams and bodies with their ``slices`` of degrees of freedom.
 
-    ``lines`` are of a frame the numbers of the line of each chain of elements, beam after beam.
+    Bodies are rigid bodies and domains. ``lines`` are of a frame the numbers of the line of each
+    chain of elements, beam after beam.
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
-                 bodies: Sequence[RigidBody] = (), lines: Array | None = None) -> None:
+                 bodies: Sequence[RigidBody | Domain] = (), lines: Array | None = None) -> None:
         self.beams, self.slices, self.bodies = list(beams), slices, list(bodies)
         self._lines = lines
 
@@ -316,12 +318,15 @@ class Points:
         elif beam is None and (self.beams or len(self.bodies) > 1):
             return None
         body = select_member(self.beams, self.bodies, beam)
-        if not isinstance(body, RigidBody):
+        if not isinstance(body, (RigidBody, Domain)):
             return None
-        x = as_points(body.position if points is None else points)
+        x = as_points(body.position if points is None and isinstance(body, RigidBody) else points)
         start = np.reshape(x, (2, -1))
-        return Located(x.ndim == 1, start.shape[1],
-                       [BodyPoints(body, self._slice_of(body), None, start)])
+        return Located(x.ndim == 1, start.shape[1], [self._in_body(body, None, start)])
+
+    def _in_body(self, body, index, start):
+        kind = DomainPoints if isinstance(body, Domain) else BodyPoints
+        return kind(body, self._slice_of(body), index, start)
 
     def _slice_of(self, body):
         return self.slices[len(self.beams) + self.bodies.index(body)]
@@ -365,7 +370,7 @@ class Points:
         for body in self.bodies:
             on = body.contains(x[:, left])
             if np.any(on):
-                parts.append(BodyPoints(body, self._slice_of(body), left[on], x[:, left[on]]))
+                parts.append(self._in_body(body, left[on], x[:, left[on]]))
                 left = left[~on]
         if len(left):
             p = (float(c) for c in x[:, left[0]])

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from ..actions.joints.nodes import chain_ends
+from ..beam.domain import Domain
 from ..beam.rigid import RigidBody
 from .signature import DENSE, null_space, row_sizes, unit_rows
 
@@ -26,8 +27,9 @@ def who(members: Any, k: int) -> str:
         The number.
     """
     member = members[k]
-    if isinstance(member, RigidBody):
-        return f" of the rigid body {member.name or k}"
+    for kind, name in ((RigidBody, "rigid body"), (Domain, "domain")):
+        if isinstance(member, kind):
+            return f" of the {name} {member.name or k}"
     return "" if len(members) == 1 else f" of beam {member.name or k}"
 
 
@@ -48,9 +50,10 @@ def free_rigid_motions(constraints: Any, joints: Any,
     motions, of_joints, bodies = _motions(c, joints)
     parts = [motions[c.fixed], of_joints]
     if stiffness is not None:
-        pushed = stiffness() @ motions
-        size = row_sizes(pushed) * c.coordinate_sizes
-        parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
+        K = stiffness()
+        pushed = K @ motions
+        size, terms = (row_sizes(x) * c.coordinate_sizes for x in (pushed, abs(K) @ abs(motions)))
+        parts.append(pushed[size > 1e-9 * np.maximum(terms, size.max(initial=0.0))])
     dense = isinstance(motions, np.ndarray)
     free = null_space(unit_rows(np.concatenate(parts) if dense else sparse.vstack(parts)))
     bodies = bodies() if len(free) else []
@@ -117,6 +120,8 @@ def advice(constraints: Any) -> str:
         x = "({:.6g}, {:.6g})".format(*member.position)
         return (f"scene.clamp({x}, beam={name}) for all of a body, scene.pin({x}, beam={name}) "
                 "for a point, or springs")
+    if isinstance(member, Domain):
+        return "scene.clamp('left', domain), by the name of a boundary of its mesh"
     return "scene.clamp('left'), scene.pin('right') or, as a roller, scene.fix('right', 'r^2')"
 
 

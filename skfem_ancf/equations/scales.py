@@ -27,16 +27,18 @@ class Scales:
     @cached_property
     def energy_of_strains(self) -> float:
         """Modulus times volume, or :attr:`energy_of_bodies`."""
-        return sum(b.kernel.scale for b in self._system.beams) or self.energy_of_bodies
+        s = self._system
+        return (sum(b.kernel.scale for b in s.beams) + sum(d.scale for d in s.domains)
+                or self.energy_of_bodies)
 
     @cached_property
     def energy_of_bodies(self) -> float:
-        """What springs and loads do to rigid bodies over the scene's size; zero with beams.
+        """What springs and loads do to rigid bodies over the scene's size; zero with others.
 
         One where there are neither: a mechanism that is driven, in which no force has a unit.
         """
         s = self._system
-        if s.beams:
+        if s.beams or s.domains:
             return 0.0
         springs = abs(s.stiffness_at_rest())
         force = np.max(np.abs(s.external_force(np.zeros(s.N))))
@@ -56,10 +58,11 @@ class Scales:
         element to that over the element's length; the stiffness is that of the beam's mean section.
         """
         s = self._system
-        if not s.beams:
+        if not s.beams and not s.domains:
             return self.strain_noise
         total = sum(b.kernel.scale / float(b.mesh.lengths.sum())
                     * float(np.add.reduce(1.0 / b.mesh.lengths)) for b in s.beams)
+        total += sum(float(abs(d.matrix().diagonal()).sum()) for d in s.domains)
         return EPS * s.size * sqrt(total)
 
     @cached_property
@@ -75,8 +78,8 @@ class Scales:
         """
         s = self._system
         if not s.beams:
-            mass = sum(body.total_mass for body in s.bodies)
-            return self.energy_of_bodies / (mass * s.size**2) or 1.0
+            mass = sum(body.total_mass for body in s.members)
+            return self.energy_of_strains / (mass * s.size**2) or 1.0
         stiffness = min(b.across.bending_over_mass() for b in s.beams)
         return stiffness * (np.pi / s.size) ** 4
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from scipy import sparse
 
+from ..actions.forces.domain import DomainForce
 from ..actions.forces.system import Forces
 from ..actions.forces.kernels import add_resisting_force
 from ..actions.joints.director import UnitDirector
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from ..actions.joints.base import Joint
     from ..actions.loads import EndMoment, Load
     from ..beam.beam import Beam
+    from ..beam.domain import Domain
     from ..beam.rigid import RigidBody
     from ..core.types import Array
 
@@ -59,6 +61,8 @@ class System:
         Force elements, already bound.
     bodies
         Rigid bodies, whose degrees of freedom come behind those of the beams.
+    domains
+        Domains, whose degrees of freedom come last.
     rest_modes
         ``rest_modes(system, k)`` returns k angular frequencies above those of rigid motions about
         the reference configuration, and their shapes (k, N); modal damping asks for them.
@@ -73,7 +77,7 @@ class System:
     Attributes
     ----------
     members : list
-        Beams and rigid bodies, with ``slices`` of the degrees of freedom.
+        Beams, rigid bodies and domains, with ``slices`` of the degrees of freedom.
     constraints : Constraints
         Supports and joints.
     forces : Forces
@@ -85,24 +89,30 @@ class System:
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
                  joints: Sequence[Joint] = (), damping: Damping | None = None,
                  elements: Sequence[ForceElement] = (), bodies: Sequence[RigidBody] = (),
-                 rest_modes: Callable[[System, int], tuple[Array, Array]] | None = None) -> None:
+                 rest_modes: Callable[[System, int], tuple[Array, Array]] | None = None,
+                 domains: Sequence[Domain] = ()) -> None:
         self._given: tuple[Any, ...] = (
             tuple(beams), tuple(loads), fixed, values, tuple(joints), damping, tuple(elements),
-            tuple(bodies), rest_modes)
+            tuple(bodies), rest_modes, tuple(domains))
         self.beams, self.bodies, self.loads = list(beams), list(bodies), list(loads)
-        self.members: list[Beam | RigidBody] = [*beams, *bodies]
+        self.domains = list(domains)
+        self.members: list[Any] = [*beams, *bodies, *domains]
         ends = list(accumulate((member.N for member in self.members), initial=0))
         self.N, self.slices = ends[-1], [slice(a, b) for a, b in pairwise(ends)]
         self._index = {id(member): k for k, member in enumerate(self.members)}
-        self.size = (_extent(self.bodies) if not beams else beams[0].size if len(beams) == 1
-                     else reach([b.mesh for b in self.beams]))
+        self.size = max([0.0, *(domain.size for domain in domains)])
+        if beams or bodies:
+            self.size = max(self.size, _extent(self.bodies) if not beams else beams[0].size
+                            if len(beams) == 1 else reach([b.mesh for b in self.beams]))
         directors = [UnitDirector(body, self.of(body).start) for body in self.bodies
                      if len(np.intersect1d(fixed, self.of(body).start + np.arange(2, 4))) < 2]
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*directors, *joints],
                                        self._holding if elements or any(
-                                           map(_holds, self.loads)) else None)
-        self.forces = Forces(elements, self.N, self.bandwidth)
+                                           map(_holds, self.loads)) or any(
+                                               domain.held for domain in domains) else None)
+        self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
+                                           for domain in domains)], self.N, self.bandwidth)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         self._rest_modes = rest_modes
@@ -127,8 +137,8 @@ class System:
     def __deepcopy__(self, memo):
         return self  # it is the same equations, however many states have them
 
-    def of(self, load_or_member: Load | Beam | RigidBody) -> slice:
-        """The slice of the degrees of freedom of a beam, a rigid body, or a load's beam."""
+    def of(self, load_or_member: Load | Beam | RigidBody | Domain) -> slice:
+        """The slice of the degrees of freedom of a member, or of a load's."""
         return self.slices[self._index[id(getattr(load_or_member, "beam", load_or_member))]]
 
     # what belongs to it, made when it is asked for
@@ -137,7 +147,8 @@ class System:
     def points(self) -> Points:
         """What finds material points."""
         frame = self.constraints.frame
-        return Points(self.beams, self.slices, self.bodies, None if frame is None else frame.lines)
+        return Points(self.beams, self.slices, self.members[len(self.beams):],
+                      None if frame is None else frame.lines)
 
     @cached_property
     def backend(self) -> Backend:
@@ -283,7 +294,7 @@ class System:
     @property
     def bandwidth(self) -> int:
         """Subdiagonals of the tangent and of the mass matrix."""
-        return max(2 * b.nd for b in self.members) - 1
+        return max([2 * b.nd - 1 for b in self.members] + [d.bandwidth for d in self.domains])
 
     def new_band(self) -> BandMatrix:
         """An empty band matrix of the scene."""
@@ -299,7 +310,7 @@ class System:
                 M.add_elements(beam.mass_elements(part), s.start, beam.nd, beam.mesh.t[0, part])
         for mass in self.forces.masses:
             M.add(*mass.mass_entries())
-        for body in self.bodies:
+        for body in self.members[len(self.beams):]:
             i, j, values = body.mass_entries()
             M.add(self.of(body).start + i, self.of(body).start + j, values)
         return M

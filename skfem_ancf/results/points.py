@@ -29,7 +29,8 @@ class MaterialPoints:
 
     def _dofs(self, member):
         system = self.system
-        return system.of(select_member(system.beams, system.bodies, member))
+        return system.of(select_member(system.beams, system.members[len(system.beams):],
+                                       member))
 
     def u_of(self, beam: WhichMember) -> Array:
         """Coordinate displacements (..., n) of one beam or rigid body."""

@@ -14,6 +14,7 @@ from ..actions.eigenstrain import EigenStrain
 from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of
 from ..beam.beam import Beam
+from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
 from ..beam.rigid import RigidBody
@@ -44,7 +45,7 @@ class Reaction(NamedTuple):
         Resultant, shape (2,); of a History (nt, 2), and what follows (nt,).
     moment
         Moment about the deformed position of the support's axis point, counterclockwise; of a
-        rigid body about its centre of mass.
+        rigid body about its centre of mass, of a domain about the mean of the nodes held.
     coordinates
         The force on each fixed coordinate by name, summed over the nodes.
     """
@@ -523,7 +524,7 @@ class State(Immutable, MaterialPoints):
         if frame is not None and beam is None:
             multipliers = self.multipliers[:len(frame.equations)]
             return Reaction(*frame.reaction(boundary, self._acted, multipliers))
-        member: Any = select_member(self.beams, system.bodies, beam)
+        member: Any = select_member(self.beams, system.members[len(self.beams):], beam)
         s = system.of(member)
         nodes = np.unique(member.dofs(boundary) // member.nd)
         there = np.zeros(system.N, dtype=bool)
@@ -532,7 +533,7 @@ class State(Immutable, MaterialPoints):
         total = np.where(system.constraints.free, 0.0, self._support_force()) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
         arm = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
-        arm[:, 0] -= arm[0, 0].copy()
+        arm[:, 0] -= arm[:, 0].mean(axis=0) if isinstance(member, Domain) else arm[0, 0].copy()
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
         holds = (~system.constraints.free | touched)[s].reshape(-1, member.nd)[nodes].any(axis=0)
         names = {n: float(v) for n, v, held in zip(

@@ -25,6 +25,7 @@ from ..actions.obstacles import Obstacle
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
 from ..beam.beam import Beam
+from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
 from ..core.errors import InputError, shown
@@ -100,6 +101,11 @@ class Model:
     def bodies(self) -> tuple[RigidBody, ...]:
         """The rigid bodies."""
         return self.layout.bodies
+
+    @property
+    def domains(self) -> tuple[Domain, ...]:
+        """The domains."""
+        return self.layout.domains
 
     @property
     def N(self) -> int:
@@ -390,7 +396,7 @@ class Model:
 
     def _bare(self, beams):
         """A scene of other beams on which nothing acts that was added."""
-        return type(self)(*beams, *self.bodies)
+        return type(self)(*beams, *self.bodies, *self.domains)
 
     def _on(self, beams):
         """The same on other beams."""

@@ -14,7 +14,6 @@ from ..actions.loads import Load, PointForce, bind_load
 from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..beam.masses import projected
-from ..beam.rigid import RigidBody
 from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
                            SupportError, ask_field, require_finite, require_options, shown, warn)
 from ..core.types import Array
@@ -41,7 +40,7 @@ def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
     return System(layout.beams, loads + _weights(layout, loads, elements),
                   np.array(list(fixed), dtype=int), np.array(list(fixed.values()), dtype=float),
                   [one for one in bound if isinstance(one, Joint)], damping, elements,
-                  layout.bodies, eigen.rest_modes)
+                  layout.bodies, eigen.rest_modes, layout.domains)
 
 
 def _weights(layout, loads, elements):
@@ -52,8 +51,8 @@ def _weights(layout, loads, elements):
             for one in masses if layout.beam(one.beam) is load.beam]
 
 
-def velocity_of(member: Beam | RigidBody, v: Any) -> Array:
-    """A velocity of the degrees of freedom of a beam or rigid body, shape (N,)."""
+def velocity_of(member: Any, v: Any) -> Array:
+    """A velocity of the degrees of freedom of a member, shape (N,)."""
     if (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,):
         uniform = require_finite("v", v, (2,))
         return velocity_of(member, lambda x: np.multiply.outer(uniform, np.ones(x[0].shape)))
@@ -63,7 +62,7 @@ def velocity_of(member: Beam | RigidBody, v: Any) -> Array:
         def field(x: Array) -> Array:
             return ask_field("v(x)", function, x)
 
-        v = member.velocity_of(field) if isinstance(member, RigidBody) else projected(member, field)
+        v = projected(member, field) if isinstance(member, Beam) else member.velocity_of(field)
     return require_finite("v", v, (member.N,))
 
 

@@ -94,6 +94,8 @@ class ForceElement(Item):
     """
 
     distributed = False
+    #: It is the inner force of a member of the scene.
+    internal = False
     #: Its force may depend on velocities.
     resists = True
     along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None

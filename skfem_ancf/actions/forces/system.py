@@ -132,7 +132,7 @@ class Forces:
     def acting_rows(self) -> Array:
         """The derivatives of the places where elements act on few points, shape (k, N)."""
         return self._derivatives([one for element in self.elements if not element.distributed
-                                  for one in element.links])
+                                  and not element.internal for one in element.links])
 
     # elements that couple what is far apart
 
@@ -284,7 +284,7 @@ class Forces:
                                           - element.force(x, 0.0 * y, t))
             else:
                 found = np.array(element.stiffness(x, y, t))
-                if factor != 0.0:
+                if element.resists and factor != 0.0:
                     found = found + factor * np.asarray(element.resistance(x, y, t))
                 out[places] -= found.ravel()
 

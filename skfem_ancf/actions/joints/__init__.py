@@ -6,6 +6,7 @@ from typing import Any
 
 from ...core.errors import require_option
 from .base import Joint, bind_joint
+from .glue import Glue
 from .guides import OnCircle, OnLine
 from .hinge import Hinge
 from .motor import Motor
@@ -49,6 +50,6 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
     return JOINTS[require_option("joint", joint, JOINTS)](**options)
 
 
-__all__ = ["JOINTS", "Hinge", "Joint", "Motor", "OnCircle", "OnLine", "PlaneSection",
+__all__ = ["JOINTS", "Glue", "Hinge", "Joint", "Motor", "OnCircle", "OnLine", "PlaneSection",
            "PrescribedAngle", "PrescribedPosition", "PrescribedTurn", "Sleeve", "Slot", "Weld",
            "bind_joint", "get_joint"]

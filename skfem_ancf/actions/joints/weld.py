@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from ...beam.beam import Beam
+from ...beam.domain import Domain
 from ...beam.layout import Layout
 from ...core.errors import InputError, require_flag, require_label
 from ...core.types import Array
+from ..item import Item
 from ..places import Vector, each, is_ground, section, several
 from .base import Aligned, Joint, angle_to, equations_of, gradients, rotation
+from .glue import Glue
 
 
 class Weld(Joint):
@@ -47,6 +51,16 @@ class Weld(Joint):
         self.at = each(at, "the section of each beam", len(self.beams))
         self.equations = equations_of(("force along x", "force along y", "moment"),
                                       len(self.beams))
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        """Itself, or where a boundary of a domain is welded to what is no cable, a Glue."""
+        members = [None if is_ground(beam) else layout.beam(beam) for beam in self.beams]
+        which = [k for k, one in enumerate(members) if isinstance(one, Domain)]
+        if not which or any(isinstance(one, Beam) and not one.has_sections for one in members):
+            return (self,)
+        k = which[0]
+        return [Glue(layout.number(self.beams[k]), self.at[k], beam, at, self.name)._with(
+            _key=self._key) for n, (beam, at) in enumerate(zip(self.beams, self.at)) if n != k]
 
     def bind(self, layout: Layout) -> None:
         (self.a, d), *others = (

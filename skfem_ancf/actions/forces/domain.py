@@ -1,0 +1,57 @@
+"""The internal force of a domain in the equations of a scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..places import Vector
+from .base import ForceElement
+
+if TYPE_CHECKING:
+    from ...beam.domain import Domain
+    from ...core.types import Array
+
+
+class DomainForce(ForceElement):
+    """The residual and tangent of a :class:`~skfem_ancf.Domain`, bound.
+
+    Parameters
+    ----------
+    domain
+        Whose they are.
+    first
+        The number of its first degree of freedom in the scene.
+    """
+
+    resists = False
+    internal = True
+
+    def __init__(self, domain: Domain, first: int) -> None:
+        self.domain, self.symmetric, self.name = domain, domain.symmetric, domain.name
+        self.entries = domain.pattern
+        self.links = [Vector(np.zeros(2), first + k + np.arange(2)[:, None], 1.0)
+                      for k in range(0, domain.N, 2)]
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        return -self.domain.force(x.ravel()).reshape(x.shape)
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        if np.array_equal(x, y):
+            return self.force(x, x, t)
+        d = y - x
+        force = -self.domain.mean_force(x.ravel(), y.ravel()).reshape(x.shape)
+        return force - (self.gain(x, y, t) + np.sum(force * d)) / np.sum(d * d) * d
+
+    def potential_at(self, x: Array, t: float) -> float | None:
+        return self.domain.energy(x.ravel()) if self.symmetric else None
+
+    def gain(self, x: Array, y: Array, t: float) -> Any:
+        return self.domain.energy(y.ravel()) - self.domain.energy(x.ravel())
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        return -self.domain.stiffness(x.ravel())
+
+    def __repr__(self) -> str:
+        return repr(self.domain)
