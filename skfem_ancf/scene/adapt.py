@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..actions.joints.nodes import chain_ends
 from ..beam.beam import Beam
@@ -141,10 +139,8 @@ class _Rounds:
 
     def finer(self) -> Any:
         """The scene to compare with."""
-        raised = [self._raised(k) for k in range(len(self.scene.beams))]
-        everywhere = [np.arange(b.mesh.nelements if e is None else 0)
-                      for b, e in zip(self.scene.beams, raised)]
-        return _with_elements(refine(self.scene, everywhere)[0], raised)
+        return _changed(self.scene, [np.arange(b.mesh.nelements) for b in self.scene.beams],
+                        [self._raised(k) for k in range(len(self.scene.beams))])
 
     def done(self, errors: list[float], scene: Any) -> tuple[Refinement, ...]:
         """All that was done, with what leads to another scene from the one there is."""
@@ -180,20 +176,18 @@ class _Rounds:
             scene, solved = fine, better
         else:
             marked = _mark(self.scene, state, fine, better, split)
-            some = any(e is not None for e in raised) or any(len(m) for m in marked)
             scene, solved = self.scene, state
-            if some:
-                scene, solved = _with_elements(refine(self.scene, marked)[0], raised), None
+            if any(e is not None for e in raised) or any(len(m) for m in marked):
+                scene, solved = _changed(self.scene, marked, raised), None
         self._refinements = self.done(errors, scene)
         self.scene, self.state = scene, solved
 
 
-def _with_elements(scene, elements):
-    """The scene with beams of other elements, where they are given."""
-    if all(e is None for e in elements):
-        return scene
-    return scene.replace(beams=[b if e is None else b.replace(element=e)
-                             for b, e in zip(scene.beams, elements)])
+def _changed(scene, marked, elements):
+    """The scene with beams of other elements where they are given, else of halved ones."""
+    return scene.replace(beams=[
+        b.replace(mesh=b.mesh.refined(m)) if e is None else b.replace(element=e)
+        for b, m, e in zip(scene.beams, marked, elements)])
 
 
 def _too_few(n, estimate, tol, state):
@@ -226,7 +220,8 @@ def _solve_for_strain(scene, tol, max_elements, **options):
                 "an element of higher order", state)
         if len(errors) >= max_elements:
             raise _too_few(len(errors), estimate, tol, state)
-        scene, _ = refine(scene, _largest(errors, [len(e) for e, _ in parts]))
+        marked = _largest(errors, [len(e) for e, _ in parts])
+        scene = _changed(scene, marked, [None] * len(marked))
 
 
 def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
@@ -247,19 +242,6 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
         gap = strain - beam.strain(state.u_of(beam), X)
         out += [np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain)]
     return tuple(out)
-
-
-def refine(scene: Any, marked: Sequence[ArrayLike]) -> tuple[Any, Callable[[Array], Array]]:
-    """The scene with elements halved, and the map of displacements onto it."""
-    beams = [b.replace(mesh=b.mesh.refined(np.asarray(m, dtype=int)))
-             for b, m in zip(scene.beams, marked)]
-
-    def prolong(u):
-        parts = np.split(u, np.cumsum([b.N for b in scene.beams]))  # the last of rigid bodies
-        return np.concatenate([*(_prolong(b, m, v) for b, m, v in zip(
-            scene.beams, marked, parts)), parts[-1]])
-
-    return scene.replace(beams=beams), prolong
 
 
 def _prolong(old, marked, u):
