@@ -94,25 +94,13 @@ class Item(Immutable):
         return made
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        """What it consists of in a scene: itself by default, or one item for each of some beams.
-
-        Parameters
-        ----------
-        layout
-            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-        """
+        """What it consists of in a scene: itself by default, or one item for each of some beams."""
         return (self,)
 
     def bind(self, layout: Any) -> Any:
-        """The item on the DOFs of a scene: by default a copy.
+        """The item on the DOFs of a scene, given its :class:`~skfem_ancf.beam.layout.Layout`.
 
-        Override it where something is found there, and leave ``self`` as it is, which is bound to
-        other meshes later.
-
-        Parameters
-        ----------
-        layout
-            The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+        By default a copy. Leave ``self`` as it is, which is bound to other meshes later.
         """
         return self._thawed()
 

@@ -67,17 +67,7 @@ class Support(Item):
         return self._with(dofs=dofs + layout.offset(beam), _words=words)
 
     def hold(self, fixed: dict[int, float]) -> None:
-        """Add what it holds, once it is bound.
-
-        Parameters
-        ----------
-        fixed
-            From number of the degree of freedom to displacement; it is added to.
-
-        Raises
-        ------
-        SupportError
-            If a degree of freedom is given two displacements.
+        """Add what it holds, by number of the DOF; SupportError where two displacements are given.
         """
         for d, words in zip(self.dofs.tolist(), self._words):
             if fixed.setdefault(d, self.displacement) != self.displacement:

@@ -18,17 +18,9 @@ from ..core.source import F1, F2, I1, indices, primitive, source
 class JointTables(NamedTuple):
     """The joints of a scene.
 
-    Attributes
-    ----------
-    hk, hi, hj, hv
-        H by equation, row, column and value, both halves.
-    gk, gi
-        Equation and column of each entry of g.
-    sizes
-        What each equation is open by in a displacement of the scene's size.
-    own
-        Handle of what has joints that are not quadratic, see :mod:`skfem_ancf.core.callbacks`; 0
-        for none.
+    ``hk, hi, hj, hv`` are H by equation, row, column and value, both halves; ``gk, gi`` equation
+    and column of each entry of g; ``sizes`` what each equation is open by in a displacement of the
+    scene's size; ``own`` the handle of what has joints that are not quadratic, 0 for none.
     """
 
     hk: I1
@@ -44,20 +36,11 @@ class JointTables(NamedTuple):
 class LoadTables(NamedTuple):
     """The loads of a scene; each row of factors has those of all kinds, one behind the other.
 
-    Attributes
-    ----------
-    vectors
-        Forces of constant direction, shape (k, N).
-    moments
-        A :class:`~skfem_ancf.beam.kernels.moments.MomentPack`.
-    rows, columns, values, which
-        Forces linear in the displacement, as entries and the number of the factor.
-    pushed, pushes
-        Beams with stress-free strains, and for each such load the stresses or, of laws that are not
-        linear, the strains that are lost to it, shape (k, n); see
-        :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
-    own
-        Handle of what has loads of other kinds; 0 for none.
+    ``vectors`` are dead forces (k, N); ``rows, columns, values, which`` forces linear in the
+    displacement and the numbers of their factors; ``pushed, pushes`` beams with stress-free
+    strains, and for each such load the stresses or, of nonlinear laws, strains that are lost to it,
+    (k, n), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`; ``own`` the handle of
+    user-defined loads.
     """
 
     vectors: F2
@@ -187,20 +170,9 @@ def _of_moments(loads, factors):
 def push(loads, what, factors, u, v, out, flat, ld):
     """What stress-free strains change: internal forces become less, and their tangent.
 
-    Parameters
-    ----------
-    loads
-        :class:`LoadTables`.
-    what
-        PUSH: the force at u. PUSH_MEAN: that whose work from u to v is theirs. PUSH_TANGENT: the
-        derivative at u.
-    factors
-        Of the loads, those of stress-free strains last.
-    u, v, out
-        Displacements, and the external force, which is added to, shape (N,); of none for a tangent.
-    flat, ld
-        The tangent, which is added to, as :func:`~skfem_ancf.beam.strain_energy.evaluate_body`
-        takes it.
+    ``what`` is PUSH: the force at u; PUSH_MEAN: that whose work from u to v is theirs;
+    PUSH_TANGENT: the derivative at u, which is added to ``flat``. The external force ``out`` is
+    added to.
     """
     given, f = np.empty(loads.pushes.shape[1]), np.empty(u.size)
     clear(given)

@@ -22,27 +22,11 @@ WhichMember: TypeAlias = Beam | RigidBody | Domain | str | int | None
 
 
 class Layout:
-    """Beams, rigid bodies and domains, their names, and the numbers of their degrees of freedom.
+    """Beams, rigid bodies and domains, their names, and the numbers of their DOFs.
 
-    What acts in a scene is bound to it. The degrees of freedom of the beams come first, beam after
-    beam, then those of the rigid bodies, then those of the domains.
-
-    Parameters
-    ----------
-    *members
-        Beams, rigid bodies and domains, one at least.
-
-    Attributes
-    ----------
-    beams, bodies, domains, members : tuple
-        The beams, the rigid bodies, the domains, and all in this order, that of their numbers.
-    N : int
-        Number of degrees of freedom.
-
-    Raises
-    ------
-    InputError
-        If there are none, something else is among them, or two are the same or have one name.
+    What acts in a scene is bound to it. The N degrees of freedom (DOFs) of the beams come first,
+    beam after beam, then those of the bodies and of the domains; ``members`` are all in this order.
+    Raises InputError if there are none, or two are the same or have one name.
     """
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
@@ -67,12 +51,7 @@ class Layout:
         return Layout, self.members
 
     def number(self, which: WhichMember = None) -> int:
-        """The number of a beam or rigid body, given by itself, its name or its number.
-
-        Parameters
-        ----------
-        which
-            None for the only one.
+        """The number of a member given by itself, its name, its number, or None for the only one.
         """
         if which is None and len(self.members) == 1:
             return 0
@@ -96,15 +75,7 @@ class Layout:
 
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
-    """The beam meant by a Beam, a name, a number, or None where there is only one.
-
-    Raises
-    ------
-    NameUnknown
-        If there is no such beam.
-    InputError
-        If None is given and there are several.
-    """
+    """The beam meant by a Beam, a name, a number, or None where there is only one."""
     if beam is None and len(beams) == 1:
         return beams[0]
     found: Sequence[Beam] = ()

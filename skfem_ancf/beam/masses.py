@@ -117,13 +117,7 @@ def _of_cable(beam):
 def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
     """Rates (N,) of the degrees of freedom whose velocity is nearest to a field, in the mean.
 
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    field
-        Takes points of the reference configuration, shape (2, nelements, npoints), and returns its
-        components there.
+    The field takes points of the reference configuration, (2, nelements, npoints).
     """
     X, W = exact_rule(beam)
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd

@@ -27,15 +27,7 @@ class Body(NamedTuple):
 
 
 class FlatBody(NamedTuple):
-    """The same for compiled code, of one type, whatever the scene is.
-
-    Attributes
-    ----------
-    packs
-        Addresses of the words of the tables, see :mod:`skfem_ancf.core.words`.
-    table
-        As of the Body.
-    """
+    """The same for compiled code, of one type: the addresses of the words of the tables."""
 
     packs: I1
     table: I2
@@ -93,14 +85,9 @@ def _body(tables, numbers):
 
 
 def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float]) -> Body:
-    """The Body of what resists the rates of strains; ``body`` itself where nothing does.
+    """The Body of what resists the rates of strains, by the retardation times of the beams.
 
-    Parameters
-    ----------
-    body, beams
-        What :func:`body_of` has made of the beams; the stresses have the same places.
-    times
-        Retardation time of each beam.
+    ``body`` itself where nothing does; the stresses have the same places as there.
     """
     packs: list[StrainTables] = []
     rows, first = [], 0

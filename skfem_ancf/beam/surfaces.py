@@ -56,15 +56,9 @@ class Surface(NamedTuple):
 
 
 def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
-    """The points of a place, by sides and layers of the section.
+    """Points of a place by sides and layers of the section, so many Gauss points a facet.
 
-    Parameters
-    ----------
-    beam, place
-        A :class:`~skfem_ancf.Beam`, and a place, see :func:`skfem_ancf.mesh.places.facets_of`.
-    points
-        Number of Gauss points of a facet; of end sections that are no plain rectangles those that
-        the element needs.
+    End sections that are no plain rectangles have those that the element needs.
     """
     mesh, across, out = beam.mesh, beam.across, []
     found = np.asarray(facets_of(mesh, place))

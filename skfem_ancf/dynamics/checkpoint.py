@@ -64,9 +64,10 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
     for k, joint in enumerate(system.constraints.all_joints):
         moments = times if joint.moving else times[:1]
         found[f"joint {k}"] = np.array([joint.value(u, t) for t in moments])
-    for k, element in enumerate(system.forces.elements):
-        found[f"force element {k}"] = np.concatenate(
-            [np.ravel(x) for x in _of_element(system, element.unheld(), u, v, times)])
+    with system.forces.unheld():
+        for k, element in enumerate(system.forces.elements):
+            found[f"force element {k}"] = np.concatenate(
+                [np.ravel(x) for x in _of_element(system, element, u, v, times)])
     for k, obstacle in enumerate(system.forces.contacts.obstacles):
         x = np.concatenate([group.starts[:2] for group in obstacle.groups], axis=1)
         x = x[:, ::max(1, x.shape[1] // PLACES)]

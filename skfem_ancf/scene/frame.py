@@ -37,17 +37,7 @@ REST = "lines"
 
 
 class NodeForce(Load):
-    """A dead force on each of some ends of a beam's lines.
-
-    Parameters
-    ----------
-    ends
-        Numbers of the ends, two for each line, shape (k,).
-    value
-        The force on each, shape (2,).
-    beam, amplitude
-        As for :class:`~skfem_ancf.actions.loads.Load`.
-    """
+    """A dead force ``value`` on each of some ends of lines, which are numbered two for each."""
 
     def __init__(self, ends: Array, value: Array, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -61,17 +51,7 @@ class NodeForce(Load):
 
 
 class NodeMoment(EndMoment):
-    """A moment on a section at a node, whose angle is counted from -pi to pi.
-
-    Parameters
-    ----------
-    end
-        Number of the end, two for each line.
-    M
-        The moment, counterclockwise.
-    beam, amplitude
-        As for :class:`~skfem_ancf.actions.loads.Load`.
-    """
+    """A moment on the section at an end, whose angle is counted from -pi to pi."""
 
     def __init__(self, end: int, M: float, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -182,10 +162,6 @@ class Frame(Scene):
             for each line, in ``sections`` for each line of the group. Functions of material
             coordinates (x, y), as of a width or a modulus, take this s for x.
 
-        Returns
-        -------
-        Frame
-
         Raises
         ------
         MeshError
@@ -244,10 +220,6 @@ class Frame(Scene):
             overlap. By default those that are named in ``sections``, and those that share no line
             with another set. Names that meshio writes into files without sets, as numbers called
             "column-girder", are read if one of them is named here or in ``sections``.
-
-        Returns
-        -------
-        Frame
 
         Raises
         ------
@@ -340,11 +312,6 @@ class Frame(Scene):
         *what
             Of "x", "y" and "angle".
 
-        Returns
-        -------
-        Frame
-            Itself.
-
         Raises
         ------
         InputError
@@ -378,11 +345,6 @@ class Frame(Scene):
             factor, for motions as well.
         angle
             The rotation in radians, counterclockwise, of any size; in the same way.
-
-        Returns
-        -------
-        Frame
-            Itself.
 
         Raises
         ------
@@ -428,11 +390,6 @@ class Frame(Scene):
             Nodes, see :meth:`nodes`.
         beam, thickness
             Of a Scene; of a frame None and "free".
-
-        Returns
-        -------
-        Frame
-            Itself.
         """
         _no_beam(beam)
         require_option("thickness at the nodes of a frame", thickness, ("free",))
@@ -447,11 +404,6 @@ class Frame(Scene):
             Nodes, see :meth:`nodes`.
         beam
             Of a Scene; of a frame None.
-
-        Returns
-        -------
-        Frame
-            Itself.
         """
         _no_beam(beam)
         return self.hold(boundary, "x", "y")
@@ -472,11 +424,6 @@ class Frame(Scene):
             The beam, its name or its number, for a point between nodes.
         amplitude
             A function of time by which the force is multiplied in a motion.
-
-        Returns
-        -------
-        Frame
-            Itself.
         """
         if beam is not None:
             super().point_force(force, at, beam, amplitude)
@@ -501,11 +448,6 @@ class Frame(Scene):
             Of a Scene; of a frame None.
         amplitude
             A function of time by which the moment is multiplied in a motion.
-
-        Returns
-        -------
-        Frame
-            Itself.
 
         Raises
         ------
@@ -533,11 +475,6 @@ class Frame(Scene):
         line
             The number of the line whose tangent it is, where several meet.
 
-        Returns
-        -------
-        Frame
-            Itself.
-
         Raises
         ------
         InputError
@@ -564,11 +501,6 @@ class Frame(Scene):
             The beam, its name or its number; or the name of a set of lines of the mesh.
         amplitude
             A function of time by which the force is multiplied in a motion.
-
-        Returns
-        -------
-        Frame
-            Itself.
         """
         known = [b.name for b in self.beams]
         if not isinstance(beam, str) or beam in known or beam not in self.net.groups:

@@ -187,15 +187,7 @@ def _land(tracer, start, point, load):
 
 
 def load_between(p: Point, q: Point, x: float) -> float:
-    """The load between two points: a cubic polynomial of the arc length.
-
-    Parameters
-    ----------
-    p, q
-        Points with their tangents.
-    x
-        Part of the way, from 0 to 1.
-    """
+    """The load at a part x of the way between two points: a cubic polynomial of the arc length."""
     h = q.arc - p.arc
     a, b = p.load, h * p.rate
     c = 3 * (q.load - a) - 2 * b - h * q.rate

@@ -46,17 +46,7 @@ class Critical:
 
 
 def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critical]:
-    """The critical points between two points of a path, in order.
-
-    Parameters
-    ----------
-    tracer
-        Their :class:`~skfem_ancf.solvers.tracing.Tracer`.
-    p, q
-        Points with their tangents.
-    tol
-        As ``locate`` of :func:`~skfem_ancf.solvers.continuation.continuation`.
-    """
+    """The critical points between two points of a path with their tangents, in order."""
     out, stack = [], [(p, q, 0)]
     while stack:
         a, b, depth = stack.pop()
@@ -132,21 +122,7 @@ def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = N
              iterations: int = 4) -> tuple[tuple[Array, Array], float]:
     """The eigenvalue next to zero of the tangent stiffness over its diagonal, and its vector.
 
-    Parameters
-    ----------
-    tracer
-        The :class:`~skfem_ancf.solvers.tracing.Tracer`.
-    point
-        Where the tangent stiffness is taken.
-    start
-        A vector (N,) and multipliers (m,) to begin with, or None.
-    iterations
-        Of the inverse power method.
-
-    Returns
-    -------
-    (vector, multipliers), value
-        Shapes (N,) and (m,), and the eigenvalue.
+    By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
     """
     system = tracer.system
     tracer.factorize(point)

@@ -45,17 +45,6 @@ def heads_on(system: System, start: StaticResult, u: Array, load: float) -> bool
 
     Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
     compared with those of the tangent, but where obstacles move.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    start
-        The last equilibrium.
-    u
-        Displacement of the next one, shape (N,).
-    load
-        Its load factor.
     """
     if system.forces.contacts.moving:
         return True  # the tangent does not know where obstacles go
@@ -97,23 +86,12 @@ class Descent:
 
     The tangent is made stiffer by a multiple of the identity, of coordinates over their sizes,
     until it is positive definite and the correction no larger than a radius: a trust region by
-    Levenberg and Marquardt, see Conn, Gould, Toint: Trust-Region Methods (2000), 7.3. So it leads
-    down where directions give way, and where a rigid motion is free. Close to a minimum nothing is
-    added, and the correction is Newton's.
+    Levenberg and Marquardt, see Conn, Gould, Toint: Trust-Region Methods (2000), 7.3. Close to a
+    minimum nothing is added, and the correction is Newton's.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    stride
-        The radius at first: largest change of a coordinate in one correction over its size, which
-        is that of the scene for positions and about 1 for rotations. It is halved where corrections
-        turn back, and grows to five times that where they go on.
-
-    Attributes
-    ----------
-    turned : bool
-        A direction of negative curvature was met.
+    ``stride`` is the first radius: the largest change of a degree of freedom over its size. It is
+    halved where corrections turn back, and grows to five times that where they go on. ``turned``
+    is True once a direction of negative curvature was met.
     """
 
     def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
@@ -198,8 +176,8 @@ class Descent:
     def directions(self, count: int) -> list[tuple[Array, float]]:
         """Directions v with negative ``v . K v``, from the factors, and that number: pairs.
 
-        Eigenvectors of the inverse of K seen from the positions of the nodes, of its most negative
-        eigenvalues: those of K that are closest to zero.
+        Eigenvectors of the inverse of K on the positions of the nodes, the most negative ones
+        first.
         """
         inverse, values, Y = self._inverse_eigenvectors(count, "SA")
         return [(inverse(y), value) for y, value in zip(Y.T, values) if value < 0]
@@ -236,11 +214,6 @@ def way_down(increment: Any) -> tuple[Equilibrium | None, bool]:
     """What :func:`descend` finds, or None, and whether it met an unstable tangent.
 
     Of the strides the first that leads where the load drives the scene.
-
-    Parameters
-    ----------
-    increment
-        The load step that has lost its stability.
     """
     system, start, level = increment.system, increment.start, increment.level
     options = increment.options._replace(most=DESCENT, watched=False)
@@ -267,19 +240,9 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
             descent: Descent) -> Equilibrium:
     """A stable equilibrium at a load where the path from the last one has lost its stability.
 
-    Corrections of :class:`Descent` from the last stable equilibrium; where they come to rest at an
-    unstable point, the lowest direction leads on, towards the last stable equilibrium, or where it
-    points to neither side, to that of the lower potential.
-
-    Parameters
-    ----------
-    increment
-        The load step.
-    iterate
-        A function of displacement and multipliers, a pair: the equilibrium that corrections of
-        the descent find from there.
-    descent
-        A :class:`Descent`.
+    Corrections of :class:`Descent` from the last stable equilibrium, by ``iterate``; where they
+    come to rest at an unstable point, the lowest direction leads on, towards the last stable
+    equilibrium, or where it points to neither side, to that of the lower potential.
     """
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers

@@ -30,33 +30,13 @@ REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as rea
 
 
 def modes(system: System, state: State, k: int) -> Modes:
-    """The k lowest natural frequencies about a state, prestress and joints included.
+    """The k lowest natural frequencies about a state, with the smallest real part of ``lambda``.
 
     The eigenvalues of ``K x = lambda M x`` are found as ``1 / (lambda + s)``, the largest first, s
     a small shift: of ``(K + s M)^-1 M``, with solutions refined by strains instead of assembled
     stiffnesses, and at last as quotients of sums of squares of strains. So the low ones, of
     bending, are accurate although the largest are ``(L / h)^4`` times as large. With loads that
     have no potential K is not symmetric, and its eigenvalues may be complex.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    state
-        A State of it.
-    k
-        How many; those with the smallest real part of ``lambda``.
-
-    Returns
-    -------
-    Modes
-
-    Raises
-    ------
-    InputError
-        If k is out of range.
-    SupportError
-        If joints are not independent in this state.
     """
     with system.forces.contacts.lent(state.memory):
         return _modes(system, state, k)
@@ -86,19 +66,9 @@ def _modes(system, state, k):
 
 
 def rest_modes(system: System, k: int) -> tuple[Array, Array]:
-    """Angular frequencies and shapes about the reference configuration, rigid motions left out.
+    """The k lowest angular frequencies (k,) and shapes (k, N) about the reference configuration.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    k
-        How many.
-
-    Returns
-    -------
-    frequencies, shapes
-        Shapes (k,) and (k, N).
+    Rigid motions are left out.
     """
     rigid = len(system.constraints.free_rigid_motions())
     found = modes(system, State(system, np.zeros(system.N), load=0.0), rigid + k)
@@ -282,27 +252,8 @@ def buckling(system: System, k: int) -> Buckling:
     at which the mean strain before buckling is not below one are left out. With loads that have no
     potential K_s is not symmetric, and only real factors, of divergence, are found.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    k
-        How many.
-
-    Returns
-    -------
-    Buckling
-
-    Raises
-    ------
-    InputError
-        If k is out of range, the loads do not buckle the beam, it touches an obstacle before,
-        springs are tight before any load, or push or pull on one side only of where it buckles.
-
-    Warns
-    -----
-    ModelWarning
-        Where springs become stiffer or softer before it buckles.
+    Raises InputError if the loads do not buckle the beam, it touches an obstacle before, springs
+    are tight before any load, or push or pull on one side only of where it buckles.
     """
     system.constraints.require_supports()
     zero, none = np.zeros(system.N), np.zeros(system.constraints.m)

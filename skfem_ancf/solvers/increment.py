@@ -79,23 +79,9 @@ class Options(NamedTuple):
 
 
 class Increment:
-    """The way from the last equilibrium to a load level.
+    """The way from the last equilibrium, a :class:`StaticResult`, to a load level from 0 to 1.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    start
-        The last equilibrium, a :class:`StaticResult`.
-    level
-        From 0 to 1.
-    options
-        :class:`Options`.
-
-    Attributes
-    ----------
-    record : LoadStep
-        Takes the iterations of all that is tried.
+    ``record``, a LoadStep, takes the iterations of all that is tried.
     """
 
     def __init__(self, system: System, start: StaticResult, level: float,
@@ -176,20 +162,11 @@ class Increment:
 
     def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
                 backend: Any = None, wary: bool = False) -> Equilibrium:
-        """Iterate to equilibrium; raises StepFailed.
+        """Iterate to equilibrium from ``begin``, by default the last one; raises StepFailed.
 
-        Parameters
-        ----------
-        begin
-            Displacement and multipliers to begin with; those of the last equilibrium by default.
-        options
-            In place of those of the increment.
-        solver
-            What solves the linear systems, as a :class:`~skfem_ancf.solvers.descent.Descent`.
-        backend
-            That of other laws.
-        wary
-            End where the third correction is not smaller than the first.
+        ``solver`` solves the linear systems, as a :class:`~skfem_ancf.solvers.descent.Descent`;
+        ``backend`` is that of other laws; ``wary`` ends where the third correction is not smaller
+        than the first.
         """
         system, options = self.system, options or self.options
         u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
@@ -282,17 +259,8 @@ class Increment:
 
 def rules_of(system: System, method: str, tol: float, max_iterations: int,
              wary: int = 0) -> Rules:
-    """When an iteration of a system has converged.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    method, tol, max_iterations
-        As for :func:`~skfem_ancf.solvers.newton.solve_static`.
-    wary
-        When it ends because corrections do not get smaller, as in
-        :class:`~skfem_ancf.solvers.iteration.Rules`.
+    """When an iteration of a system has converged; ``wary`` as in
+    :class:`~skfem_ancf.solvers.iteration.Rules`.
     """
     scales = system.scales
     # the residual sums the noise of all degrees of freedom, the work that of the strains

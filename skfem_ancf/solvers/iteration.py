@@ -114,15 +114,7 @@ class Work(NamedTuple):
 
 
 def workspace_for_iterations(e: Equations, m: int) -> Work:
-    """The :class:`Work` of a scene.
-
-    Parameters
-    ----------
-    e
-        :class:`~skfem_ancf.equations.Equations`.
-    m
-        Number of multipliers.
-    """
+    """The :class:`Work` of a scene with m multipliers."""
     N = e.free.size
     R, du, before, scale, load, push = np.empty((6, N))
     return Work(R, du, before, scale, load, push, np.zeros(m), np.zeros(m))
@@ -130,21 +122,9 @@ def workspace_for_iterations(e: Equations, m: int) -> Work:
 
 @source
 def equilibrium(e, target, rules, x, w, record):
-    """Iterate to equilibrium from x, in place.
+    """Iterate to equilibrium from x, in place; returns how it ends, and the linear systems solved.
 
-    Parameters
-    ----------
-    e
-        :class:`~skfem_ancf.equations.Equations`.
-    target, rules, x, w
-        As above.
-    record
-        Takes the residuals of each iteration, shape (iterations + 1, 2).
-
-    Returns
-    -------
-    status, number
-        How it ends, and the number of linear systems solved.
+    ``record`` takes the residuals of each iteration, shape (iterations + 1, 2).
     """
     N, m = x.u.size, x.multipliers.size
     clear(w.dm)

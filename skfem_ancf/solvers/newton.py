@@ -129,23 +129,8 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
 class Search:
     """What strategies ask: the scene, where to start, and ways to look for an equilibrium.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u, memory
-        The displacement to start from, shape (N,), and what is left behind there at obstacles,
-        (n,); or None.
-    steps
-        Rules of the load steps, :class:`Steps`.
-    stable, progress
-        As for :func:`solve_static`.
-
-    Other Parameters
-    ----------------
-    method, route, start
-        "mixed" or "newton", the :class:`Route`, and the result it begins with; those of the search
-        by default.
+    ``u`` and ``memory`` are the displacement to start from, (N,), and what is left behind there at
+    obstacles, (n,), or None; ``steps`` are rules of load steps.
 
     Attributes
     ----------
@@ -276,17 +261,7 @@ class Search:
 
     def load_steps(self, method: str, route: Route | None = None,
                    start: StaticResult | None = None, **changes: Any) -> StaticResult:
-        """The equilibrium at the end of a route.
-
-        Parameters
-        ----------
-        method
-            "mixed" or "newton".
-        route, start
-            The route, and the result it begins with; those of the search by default.
-        **changes
-            Of the rules of load steps.
-        """
+        """The equilibrium at the end of a route, with ``changes`` of the rules of load steps."""
         rules = self.rules._replace(method=method, **changes)
         return self._load_steps(route or self.route, start, rules)
 
@@ -313,14 +288,7 @@ class Search:
                 route: Route | None = None) -> StaticResult:
         """The equilibrium that corrections of bounded size lead down to under the full load.
 
-        Parameters
-        ----------
-        method
-            "mixed" or "newton".
-        eased
-            First without friction; bodies stick from where they have come to rest.
-        route
-            Its end is where to; that of the search by default.
+        ``eased``: first without friction; bodies stick from where they have come to rest.
         """
         route, system = route or self.route, self.system
         if (not (system.symmetric or self.held_by_loads or self.rubs)

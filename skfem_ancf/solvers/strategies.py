@@ -13,15 +13,10 @@ from typing import Any, NamedTuple
 
 
 class Strategy(NamedTuple):
-    """A way to look for an equilibrium.
+    """A way to look for an equilibrium: its name in messages, and a function.
 
-    Attributes
-    ----------
-    name
-        What messages call it.
-    run
-        Function of a :class:`~skfem_ancf.solvers.newton.Search` that returns a result, or None
-        where it does not apply; it raises where it fails.
+    ``run`` takes a :class:`~skfem_ancf.solvers.newton.Search` and returns a result, or None where
+    it does not apply; it raises where it fails.
     """
 
     name: str

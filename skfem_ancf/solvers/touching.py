@@ -44,15 +44,7 @@ TIMES, HALVED = 4, 2
 
 
 def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
-    """Points of each group that lie on an obstacle, or near it; None if they are few, or press.
-
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene.
-    u, t
-        Displacement, shape (N,), and time.
-    """
+    """Points of each group that lie on an obstacle, or near it; None if they are few, or press."""
     flags, most, pressed = [], 0.0, 0.0
     for (_, group), _, gap in contacts.look(u, t):
         flags.append(gap < NEAR * group.height)
@@ -64,15 +56,7 @@ def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
 
 @contextmanager
 def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
-    """For the time of it points are held by obstacles, and there is no friction.
-
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene.
-    flags
-        Points of each group, shape (n,).
-    """
+    """For the time of it flagged points of groups are held by obstacles, without friction."""
     memory = contacts.tables.memory
     before = memory.copy()
     try:
@@ -87,15 +71,7 @@ def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
 
 
 def soft(contacts: Contacts, u: Array, t: float) -> Array:
-    """The firmness with which the mean pressure presses all points in, shape (groups,).
-
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene.
-    u, t
-        Displacement, shape (N,), and time of a body that they hold.
-    """
+    """The firmness with which the mean pressure presses all points in, shape (groups,)."""
     out = contacts.firmness.copy()
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
         deep = np.maximum(-gap, 0.0)
@@ -108,14 +84,7 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
 def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
     """The firmness that leaves the body on the obstacles, shape (groups,); not less than it is.
 
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene.
-    u, t
-        Displacement, shape (N,), and time.
-    energy
-        Strain energy, with that of the penetration.
+    ``energy`` is the strain energy, with that of the penetration.
     """
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
@@ -131,24 +100,11 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
 def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
                    failed: type[Exception]) -> Any:
-    """An equilibrium in contact.
+    """An equilibrium in contact at the time t, from a displacement and its time.
 
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene, with the memory of the begin of the load step; with that of its
-        end if they had to be harder.
-    start
-        Displacement at the begin of the load step, shape (N,), and its time.
-    t
-        The time at the end.
-    solve
-        Function of what has been found, or None for the begin, and of whether a start is wanted
-        only; it returns what it finds, the displacement first.
-    energy
-        Strain energy of a displacement at the end.
-    failed
-        The exception of ``solve``.
+    The obstacles have the memory of the begin of the load step; at its end that of its end, if
+    they had to be harder. ``solve`` is a function of what has been found, or None for the begin,
+    and of whether a start is wanted only; it raises ``failed``.
     """
     flags, before = lies_near(contacts, *start), contacts.tables.memory.copy()
     climb = _Climb(contacts, start, t, solve, energy, failed)

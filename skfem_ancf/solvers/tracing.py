@@ -63,22 +63,7 @@ class Point:
 
 
 class Tracer:
-    """Corrector and tangent of the equilibrium path of a system.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    tol, max_iterations
-        As for :func:`continuation`.
-
-    Other Parameters
-    ----------------
-    start, point
-        Points of the path.
-    ds, load
-        Distance along the tangent, and load factor.
-    """
+    """Corrector and tangent of the equilibrium path of a system."""
 
     def __init__(self, system: System, tol: float, max_iterations: int) -> None:
         self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
@@ -167,17 +152,7 @@ class Tracer:
         return self._correct(start, first, increment, ds)
 
     def at_load(self, start: Point, load: float, guess: tuple[Array, Array]) -> Point:
-        """The point at a load near another one.
-
-        Parameters
-        ----------
-        start
-            The other point.
-        load
-            Load factor.
-        guess
-            Change of displacement (N,) and multipliers (m,) from there.
-        """
+        """The point at a load near another one; ``guess`` are changes (N,) and (m,) from there."""
         first = guess[0], guess[1], load - start.load
         return self._correct(start, first, lambda step, dl, dR, dF: 0.0, np.inf)
 

@@ -127,13 +127,6 @@ class Sweep:
         ----------
         path
             Name of the file, which ends with .npz.
-
-        Raises
-        ------
-        InputError
-            If parameters are neither numbers nor texts.
-        FileError
-            If it cannot be written.
         """
         path = require_path("path", path, (".npz",))
         require_plain(self.parameters)

@@ -13,10 +13,7 @@ WHAT = ("displacement", "position")
 class Probes(NamedTuple):
     """A measure of the scene: it is solved, then read.
 
-    Attributes
-    ----------
-    named
-        By name pairs (what, at), triples (what, at, beam) or functions of the State.
+    ``named`` has by name pairs (what, at), triples (what, at, beam) or functions of the State.
     """
 
     named: dict[str, Any]

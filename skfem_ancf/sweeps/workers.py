@@ -29,17 +29,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 class Task(NamedTuple):
-    """A member, from its parameters to what is measured.
-
-    Attributes
-    ----------
-    build
-        From the parameters to a scene.
-    measure
-        From the scene to a number, an array or a dict of them.
-    share
-        Members that a process computes, about.
-    """
+    """A member, from its parameters to what is measured; ``share`` members a process, about."""
 
     build: Callable[..., Any]
     measure: Callable[[Any], Any]

@@ -42,21 +42,12 @@ NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), 
 class Group(NamedTuple):
     """The points of one beam that may touch one obstacle, those of an element side by side.
 
-    Attributes
-    ----------
-    first, weights, slopes
-        First degree of freedom of the element of each point, (n,), weights of its pairs of degrees
-        of freedom, (pairs, n), and those of the slope of the axis; (0, n) with sections.
-    areas, offsets, starts
-        Area, distance from the axis, (n,), and place and slope without displacement, (4, n).
-    elements, points
-        How many elements, and points of each.
-    depth, height
-        How deep a way from one state to the next may cut the obstacle; the beam's height.
-    numbers
-        By the numbers of :mod:`skfem_ancf.actions.contact.tables`, shape (9,).
-    firmest
-        How many times as stiff it is made at most where it is too soft.
+    ``first`` is the first DOF of the element of each point, (n,); ``weights`` and ``slopes`` those
+    of pairs of DOFs in its place and in the slope of the axis, (pairs, n), none with sections;
+    ``areas`` and ``offsets`` from the axis (n,); ``starts`` place and slope without displacement,
+    (4, n). A way from one state to the next may cut the obstacle by ``depth``; ``height`` is that
+    of the beam; ``numbers`` are those of :mod:`skfem_ancf.actions.contact.tables`, (9,); the
+    obstacle is made ``firmest`` times as stiff at most where it is too soft.
     """
 
     first: Any
@@ -74,26 +65,16 @@ class Group(NamedTuple):
 
 
 class Contacts:
-    """The obstacles of a scene.
+    """The obstacles of a scene: those force elements that have ``groups``.
 
-    Places are seen from the middle of the bodies, in tables and memory: far from the origin of the
-    scene's coordinates friction would feel their round-off. Arguments of its methods are
-    displacements and velocities ``u, v``, shape (N,), and the time ``t``, in statics the load
-    factor.
-
-    Parameters
-    ----------
-    elements
-        Force elements, bound: those with ``groups`` are obstacles.
+    Places are seen from ``origin``, the middle of the bodies, in tables and memory: far from the
+    origin of the coordinates friction would feel their round-off. Arguments are displacements and
+    velocities ``u, v``, shape (N,), and the time ``t``, in statics the load factor.
 
     Attributes
     ----------
     obstacles, groups
-        These, and pairs of the number of an obstacle and a :class:`Group`.
-    origin
-        From where places are seen, shape (2,).
-    tables
-        A :class:`~skfem_ancf.actions.contact.tables.ContactTables`.
+        The obstacles, and pairs of the number of one and a :class:`Group`.
     moving, own, anchored, augmented
         True if an obstacle moves, has a shape of the caller's, friction, or takes the augmented
         Lagrangian.
@@ -311,7 +292,7 @@ class Contacts:
     def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
         """Of each group its number of obstacle and :class:`Group`, points and gaps.
 
-        Points (2, n) are seen from the origin; gaps have the shape (n,).
+        Points (2, n) are seen from the origin; gaps are (n,).
         """
         self._place(t)
         out = []

@@ -205,13 +205,7 @@ def _between(u, v, t, s):
 
 
 def middle_of(group: Any) -> Array:
-    """Place of the middle of each element; then weights, and how much they differ from these.
-
-    Parameters
-    ----------
-    group
-        Its points.
-    """
+    """Place of the middle of each element; then weights, and how much they differ from these."""
     n, m = group.elements, group.points
     each = group.weights.reshape(-1, n, m)
     mean, half = each.mean(axis=2), len(group.weights) // 2

@@ -49,25 +49,15 @@ SLOTS = 2
 
 
 class Question(NamedTuple):
-    """What is asked of all pairs.
+    """What is asked of all pairs, at a time ``t`` or over a ``span`` of time about it.
 
-    Attributes
-    ----------
-    what
-        FORCE: the mean force from u to v. RESISTING: that of friction and damping at u by the
-        velocity v. TANGENT: the derivative of FORCE by the end of the mean, twice unless there is
-        no span, to a band. DAMPED_TANGENT: that of RESISTING by velocities times the factor,
-        and by places. ALONG: the derivative of the work of FORCE at u along a direction v to
-        ``out[0]``, and the largest way of an element along it, in lengths of elements, into
-        ``out[1]``. SETTLE: anchors follow after a step from u to v, whose friction and augmented
-        pressures add their work to ``out[0]``. AUGMENT: multipliers of points at u are updated, and
-        the number of those that change is added to ``out[0]``.
-    t, span
-        A time, and for a mean how long it is about it; zero at u alone.
-    factor
-        Of derivatives by velocities.
-    ld, top
-        Layout of the band.
+    ``what`` is FORCE: the mean force from u to v. RESISTING: that of friction and damping at u by
+    the velocity v. TANGENT: the derivative of FORCE by the end of the mean, twice unless there is
+    no span, to a band of the layout ``ld, top``. DAMPED_TANGENT: that of RESISTING by velocities
+    times ``factor``, and by places. ALONG: the derivative of the work of FORCE at u along v to
+    ``out[0]``, and the largest way of an element, in lengths of elements, into ``out[1]``. SETTLE:
+    anchors follow after a step from u to v; the work of friction and of augmented pressures is
+    added to ``out[0]``. AUGMENT: multipliers at u are updated; how many change is added there.
     """
 
     what: int
@@ -79,28 +69,15 @@ class Question(NamedTuple):
 
 
 class ContactTables(NamedTuple):
-    """The obstacles of a scene.
+    """The obstacles of a scene, as ``number`` pairs.
 
-    Attributes
-    ----------
-    number
-        Of pairs; 0 for a scene without obstacles.
-    ints, floats
-        Headers of the pairs and degrees of freedom; numbers of points and shapes.
-    poses
-        Of each obstacle, at the time asked last.
-    memory
-        What steps leave behind.
-    cache
-        Projections of points at the displacements that were asked last.
-    counts
-        Elements searched, points projected, and the slot of the cache that each pair used last.
-    moving, own
-        Whether poses depend on time; handle of what knows them, and shapes of the caller's.
-    lasting
-        Sum of what is kept from step to step: ANCHORS, PRESSURES.
-    address
-        That of the compiled function; 0 in NumPy.
+    ``ints`` and ``floats`` are headers of the pairs and DOFs, and numbers of points and shapes;
+    ``poses`` those of obstacles at the time asked last; ``memory`` what steps leave behind;
+    ``cache`` projections of points at the displacements asked last; ``counts`` elements searched,
+    points projected, and the slot of the cache that each pair used last. ``moving`` says whether
+    poses depend on time, ``own`` is the handle of what knows them, and shapes of the caller's.
+    ``lasting`` is the sum of what is kept from step to step: ANCHORS, PRESSURES. ``address`` is
+    that of the compiled function, 0 in NumPy.
     """
 
     number: int

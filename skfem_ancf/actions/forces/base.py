@@ -158,10 +158,6 @@ class ForceElement(Item):
         """Derivative of the force by the velocities, as :meth:`stiffness`."""
         return derivative(lambda w: self.force(x, w, t), v)
 
-    def unheld(self) -> ForceElement:
-        """Itself as it is at the start of a motion: without what it has kept of one."""
-        return self
-
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
         """Rows, columns and values (k,) that it adds to the mass matrix; None for none."""
         return None
@@ -256,7 +252,7 @@ def try_force(bound: Any, sizes: Any = None) -> None:
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
                          "symmetric: it has no potential. Say so in its class: symmetric = False")
     if bound.potential_at(y, 0.0) is not None:
-        _require_potential(bound, y)
+        beside(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
 
 
 def _require_derivatives(bound, x, u, d):
@@ -270,19 +266,12 @@ def _require_derivatives(bound, x, u, d):
                       2.0 * slope, 1e-12 * np.abs(now).max())
 
 
-def _require_potential(bound, x):
+def _require_potential(bound, x, u, d):
     """Raise InputError unless the force without velocities is minus the slope of the potential."""
-    step, zero = STEP * max(1.0, float(np.abs(x).max())), np.zeros_like(x)
-    units = step * np.eye(x.size).reshape(-1, *x.shape)
+    x, d = x + u.reshape(x.shape), d.reshape(x.shape)
     for t in (0.0, ASIDE):
-        slope = [(bound.potential_at(x + d, t) - bound.potential_at(x - d, t)) / (2.0 * step)
-                 for d in units]
-        slope = require_finite(f"the slope of potential(x) of {bound!r}", slope, (x.size,))
-        noise = 1e-15 * abs(bound.potential_at(x, t)) / step
-        force = np.ravel(bound.force(x, zero, t))
-        if not np.allclose(-slope, force, rtol=0.0, atol=1e-3 * np.abs(force).max() + 10.0 * noise):
-            raise InputError(
-                f"potential(x) of {bound!r} does not fit its force: at x = {shown(x.tolist())} and "
-                f"t = {t:g} the force is {shown(force.tolist())}, minus the slope of the potential "
-                f"{shown((-slope).tolist())}. Without potential(x), as for a force that depends on "
-                "time, the energy balance is that of the scheme")
+        now, before, after = (bound.potential_at(x + s * d, t) for s in (0.0, -1.0, 1.0))
+        work = 2.0 * np.sum(bound.force(x, 0.0 * x, t) * d)
+        require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)", after - before, -work,
+                      1e-12 * abs(now), ". Without potential(x), as for a force that depends on "
+                      "time, the energy balance is that of the scheme")

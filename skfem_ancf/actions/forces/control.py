@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
-from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -155,24 +154,13 @@ class Control(ForceElement):
         return ask_array("law(t = {:g})", (2,), lambda t: self.law(t, **values), float(t))
 
     def sample(self, x: Array, v: Array, t: float, first: bool) -> None:
-        """Ask the law and hold its value, if it is time to.
-
-        Parameters
-        ----------
-        first
-            A motion begins: what was held before is forgotten.
-        """
+        """Ask the law and hold its value, if it is time to; ``first`` forgets what was held."""
         if self.dt is None:
             return
         if first:
             self._held.clear()
         if not self._held or t >= self._held[-1][0] + (1.0 - ROUND_OFF) * self.dt:
             self._held.append((float(t), self.ask(x, v, t)))
-
-    def unheld(self) -> Control:
-        other = copy(self)
-        vars(other)["_held"] = []
-        return other
 
     @property
     def held(self) -> Array:

@@ -47,24 +47,18 @@ class ForceTables(NamedTuple):
 
     Attributes
     ----------
-    start
-        The vectors in the stress-free state, all numbers of them.
-    at, of, weight
-        Which of them grows with which coordinate, and how.
-    number, ends
-        Of elements of the kinds above, and where the kinds begin and end among them.
-    numbers
-        Their numbers, those of one name side by side, shape (5 n,).
+    start, at, of, weight
+        The vectors in the reference configuration, and which grows with which DOF, and how.
+    number, ends, numbers
+        Elements of the kinds above, where kinds begin and end among them, and their numbers (5 n,).
     size
         Of the derivative by the vectors: 16 n, and what user-defined elements have.
     band_at, band_of, band_weight
         Where in the tangent's band each derivative goes.
     row_at, row_of
         Where it goes between the rows of elements that couple what is far apart.
-    own
-        Handle of what has user-defined elements; 0 for none.
-    contacts
-        The obstacles, a :class:`~skfem_ancf.actions.contact.tables.ContactTables`.
+    own, contacts
+        Handle of what has user-defined elements, 0 for none; the obstacles.
     address
         That of the compiled :func:`of_kinds`; 0 in NumPy.
     """

@@ -22,15 +22,8 @@ STEP = 1e-6
 class Law:
     """A force, or moment, as a function of one number, with its potential.
 
-    Parameters
-    ----------
-    name
-        What messages call it, as "k".
-    given
-        A function of the elongation that returns the force; or that and its potential, which is
-        else the integral of the force from zero.
-    of
-        What it is a function of, in words.
+    ``given`` is a function of the elongation that returns the force; or that and its potential,
+    which is else the integral of the force from zero. ``name`` and ``of`` are for messages.
 
     Examples
     --------

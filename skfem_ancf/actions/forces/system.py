@@ -22,19 +22,11 @@ KINDS = 4
 
 
 class Forces:
-    """The force elements of a scene, bound; its DOFs, and subdiagonals of its band.
+    """The force elements of a scene, bound; ``own`` are those that are no tables.
 
-    Attributes
-    ----------
-    elements, own
-        All, and those that are no tables.
-    far, symmetric, resists
-        True if one couples DOFs that are not in the band; if all have symmetric derivatives; if
-        velocities may cause a force.
-    masses
-        Those that add to the mass.
-    contacts
-        The obstacles, a :class:`~skfem_ancf.actions.contact.contacts.Contacts`.
+    ``far``: one couples DOFs that are not in the band. ``symmetric``: all have symmetric
+    derivatives. ``resists``: velocities may cause a force. ``masses`` add to the mass, ``contacts``
+    are the obstacles.
     """
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:

@@ -278,15 +278,7 @@ def angle_to(d: ArrayLike, e: ArrayLike) -> float:
 
 
 class Aligned:
-    """``(Q e) x d``, zero where a plane vector d has the direction of another one e, turned by Q.
-
-    Parameters
-    ----------
-    d, e
-        Vectors.
-    Q
-        Matrix, shape (2, 2).
-    """
+    """``(Q e) x d``, zero where a vector d has the direction of another one e turned by Q."""
 
     def __init__(self, d: Vector, e: Vector, Q: Array) -> None:
         self.d, self.e, self.Q = d, e, Q

@@ -27,37 +27,30 @@ class Nodes(Joint):
     the first beam. At each node the first rigid end, or else the first, leads the others: the
     equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the direction g of a section,
     seen from that of the stress-free state, as in :class:`~skfem_ancf.actions.joints.Weld`; then
-    those of what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader, with what
-    it is displaced by. Unknowns of the nodes take the place of the multipliers where the linear
-    systems are solved, see :mod:`skfem_ancf.equations.condensation`.
+    those of what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader. Unknowns of
+    the nodes take the place of the multipliers where the linear systems are solved, see
+    :mod:`skfem_ancf.equations.condensation`.
 
     Parameters
     ----------
-    nodes
-        The node of each end, shape (ends,).
-    hinged
-        Whether the end may turn against its node, shape (ends,).
+    nodes, hinged
+        The node of each end, and whether it may turn against that, shape (ends,).
     held
         Whether the positions along x and y and the rotation of each node are held, (number, 3).
-    net
-        The :class:`~skfem_ancf.mesh.frame_graph.Net` that has the nodes.
-    lines
-        Number of the line of each chain, shape (ends / 2,).
+    net, lines
+        The graph that has the nodes, and the number of the line of each chain, (ends / 2,).
     settled
-        What held nodes are displaced by,
-        :class:`~skfem_ancf.actions.joints.settlements.Settlements`.
+        What held nodes are displaced by.
 
     Attributes
     ----------
-    leader
-        The end that leads at the node of each end, shape (ends,).
-    followers, turned
-        Ends that follow the position of another; those that follow its rotation, too.
+    leader, followers, turned
+        The end that leads at the node of each end; ends that follow, and those that turn with it.
     held_x, held_y, held_angle
         Leading ends that are held.
     positions, directions, weights
-        Coordinates of each end's position, (ends, 2), those of the direction of its section, (2,
-        ends, n), and their weights, (ends, n): zero where a beam has less of them.
+        DOFs of each end's position, (ends, 2), and of the direction of its section, (2, ends, n),
+        with weights, (ends, n): zero where a beam has less of them.
     """
 
     constant = False

@@ -118,13 +118,7 @@ class PrescribedAngle(Joint):
 
 
 class Turned:
-    """The integral of an angular velocity from the time 0, as a function of time.
-
-    Parameters
-    ----------
-    speed
-        The angular velocity: a number, or a function of time.
-    """
+    """The integral of an angular velocity, a number or a function, from the time 0."""
 
     def __init__(self, speed: float | Callable[[float], float]) -> None:
         self.speed = require_function("speed", speed, "of time that returns radians per time") if (

@@ -114,13 +114,7 @@ class Sleeve(Joint):
         return not -BEYOND <= s <= self.axis.beam.mesh.nelements + BEYOND
 
     def distance(self, u: Array) -> float:
-        """Where the point is: the length of the stress-free axis from its left end.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        """
+        """Where the point is: the length of the stress-free axis from its left end."""
         return self.axis.length(self._parameter(np.asarray(u)))
 
     def lost(self, u: Array) -> str:

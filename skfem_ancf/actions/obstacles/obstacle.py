@@ -131,7 +131,7 @@ class Obstacle(ForceElement):
         return self.position is not None or self.angle is not None
 
     def pose(self, t: float, rates: bool = True) -> Array:
-        """Where it is: displacement, cosine and sine, pivot, velocities, when; shape (10,).
+        """Where it is: displacement, cosine and sine, pivot, velocities, time; shape (10,).
 
         Parameters
         ----------
