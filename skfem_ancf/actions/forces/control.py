@@ -153,12 +153,10 @@ class Control(ForceElement):
             return ask_number("law(t = {:g})", lambda t: self.law(t, **values), float(t))
         return ask_array("law(t = {:g})", (2,), lambda t: self.law(t, **values), float(t))
 
-    def sample(self, x: Array, v: Array, t: float, first: bool) -> None:
-        """Ask the law and hold its value, if it is time to; ``first`` forgets what was held."""
+    def sample(self, x: Array, v: Array, t: float) -> None:
+        """Ask the law and hold its value, if it is time to."""
         if self.dt is None:
             return
-        if first:
-            self._held.clear()
         if not self._held or t >= self._held[-1][0] + (1.0 - ROUND_OFF) * self.dt:
             self._held.append((float(t), self.ask(x, v, t)))
 

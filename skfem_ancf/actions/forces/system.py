@@ -191,12 +191,14 @@ class Forces:
                 control.hold(values)
 
     def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
-        """Ask sampled controls whose time it is."""
+        """Ask sampled controls whose time it is; at first what they held is forgotten."""
         y, w = self.vectors(tables, u), np.empty(self.rows)
         vectors_of(tables, v, 0.0, w)
         for element, (rows, _) in zip(self.own, self._slices):
             if isinstance(element, Control):
-                element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t, first)
+                if first:
+                    element.hold(())
+                element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t)
 
     def rows_of(self, element: ForceElement) -> Array:
         """Where the parts of an element are among all, in its own order; shape (n,)."""
