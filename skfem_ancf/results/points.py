@@ -14,8 +14,23 @@ from ..equations.system import System
 class MaterialPoints:
     """What a solution knows of material points by its degrees of freedom alone.
 
-    A point is named by its place (x, y) in the reference configuration. Arrays of a motion and of a
-    path have the instants, or the points of the path, as their first axis.
+    Arrays of a motion and of a path have the instants, or the points of the path, as their first
+    axis.
+
+    Other Parameters
+    ----------------
+    point
+        A material point by its place (x, y) in the reference configuration, shape (2,); or many: a
+        list of points, or an array (2, n) whose columns are points; of displacement, position and
+        velocity also a RigidBody for its centre of mass.
+    beam
+        The beam or rigid body, its name or its number; found for each point if it is not given.
+    line
+        The number of the line, of a frame; found for each point if it is not given. A point that is
+        in several lines or beams is one of that whose axis is nearest, here as in all loads and
+        probes; of the first of them if several are as near, as at a node.
+    body
+        A RigidBody, its name or its number.
     """
 
     system: System
@@ -37,24 +52,7 @@ class MaterialPoints:
         return self.u[..., self._dofs(beam)]
 
     def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Displacement of material points.
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,); or many: a list of points, or an array (2, n) whose columns are
-            points; a RigidBody for its centre of mass.
-        beam
-            The beam or rigid body, its name or its number; found for each point if it is not given.
-        line
-            The number of the line, of a frame; found for each point if it is not given. A point
-            that is in several lines or beams is one of that whose axis is nearest, here as in all
-            loads and readings; of the first of them if several are as near, as at a node.
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 2), or (..., 2, n) for many points.
+        """Displacement of material points, (..., 2) or (..., 2, n).
 
         Raises
         ------
@@ -64,38 +62,16 @@ class MaterialPoints:
         return first_order(self.system.points.find(point, beam, line).displacement(self._places))
 
     def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Position of material points, (..., 2) or (..., 2, n).
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam, line
-            As for :meth:`displacement`.
-        """
+        """Position of material points, (..., 2) or (..., 2, n)."""
         at = self.system.points.find(point, beam, line)
         return at.start + first_order(at.displacement(self._places))
 
     def velocity(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Velocity of material points, (..., 2) or (..., 2, n); zero where there is no motion.
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam, line
-            As for :meth:`displacement`.
-        """
+        """Velocity of material points, (..., 2) or (..., 2, n); zero where there is no motion."""
         return self.system.points.find(point, beam, line).velocity(self.u, self.v)
 
     def angular_velocity(self, body: WhichMember) -> Any:
-        """The angular velocity (...) of a rigid body, counterclockwise; zero without motion.
-
-        Parameters
-        ----------
-        body
-            The RigidBody, its name or its number.
-        """
+        """The angular velocity (...) of a rigid body, counterclockwise; zero without motion."""
         found = require_body(self.system, body)
         s = self.system.of(found)
         return found.angular_velocity(self.u[..., s], self.v[..., s])

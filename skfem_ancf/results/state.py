@@ -98,6 +98,16 @@ class State(Immutable, MaterialPoints):
         mode that which vibrates. All that is asked is of first order in the difference: strain,
         stress, section forces, rotations, reactions; the strain energy of second order. None of a
         state of large displacements.
+
+    Other Parameters
+    ----------------
+    recover
+        The recovered field, see :mod:`skfem_ancf.recovery.recovered`, where there is one
+        (:attr:`recovered`); False for that of the element at the point.
+    field
+        A field of :data:`skfem_ancf.recovery.fields.FIELDS`, by its name, or a function or Field.
+    filename, options
+        The file, and options of the function that is named.
     """
 
     system: System
@@ -271,13 +281,7 @@ class State(Immutable, MaterialPoints):
     # at material points
 
     def angle(self, body: WhichMember) -> float:
-        """The angle of a rigid body, in radians, no more than pi from that of the start.
-
-        Parameters
-        ----------
-        body
-            The RigidBody, its name or its number.
-        """
+        """The angle of a rigid body, in radians, no more than pi from that of the start."""
         found = require_body(self.system, body)
         return float(first_order(found.angle_at(self._places_of(found))))
 
@@ -286,16 +290,6 @@ class State(Immutable, MaterialPoints):
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
         Of a linear solution the linear strain.
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam, line
-            As for :meth:`displacement`.
-        recover
-            The recovered field, see :mod:`skfem_ancf.recovery.recovered`, where there is one
-            (:attr:`recovered`); False for the strain of the element at the point.
 
         Raises
         ------
@@ -311,31 +305,13 @@ class State(Immutable, MaterialPoints):
 
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
-        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n).
-
-        Parameters
-        ----------
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam, recover, line
-            As for :meth:`strain`.
-        """
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n)."""
         return self._at_points(lambda v: v.S, point, beam, recover, line)
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
         """Any field at material points, () or (n,); vectors and tensors have their components
         first.
-
-        Parameters
-        ----------
-        field
-            A name of :data:`skfem_ancf.recovery.fields.FIELDS`, as "von_mises", or a function or
-            Field of your own.
-        point
-            One point, shape (2,), or many, as for :meth:`displacement`.
-        beam, recover, line
-            As for :meth:`strain`.
 
         Examples
         --------
@@ -367,9 +343,7 @@ class State(Immutable, MaterialPoints):
         Parameters
         ----------
         beam, part
-            One of the beams, and points numbered by its coordinates alone.
-        recover
-            As for :meth:`strain`.
+            One of the beams, and points numbered by its degrees of freedom alone.
         """
         return Values(part, self._places_of(beam), partial(self.recovery, beam) if recover else
                       None, self._eigenstrains(beam))
@@ -433,14 +407,9 @@ class State(Immutable, MaterialPoints):
         at
             Points through which the sections go: one, shape (2,), or many, shape (2, n) or a list;
             None for nine sections in each element, and both sides of forces between nodes.
-        beam
-            The beam, its name or its number, in a scene of several; found from ``at``.
         recover
             From the equilibrium of the body, exact up to the iteration of the solution, where it
             can be had (:attr:`recovered`); False for the stress of the elements, integrated.
-        line
-            The number of the line, of a frame; found from ``at`` if it is not given: a section is
-            one of the line whose axis is nearest to the point. Without ``at`` all sections of it.
 
         Raises
         ------
@@ -569,68 +538,31 @@ class State(Immutable, MaterialPoints):
     def save(self, filename: StrPath, **options: Any) -> Path:
         """Write the deformed body for ParaView, as :func:`skfem_ancf.io.vtu.save_vtu`; returns the
         file.
-
-        Parameters
-        ----------
-        filename
-            Path that ends with .vtu.
-        **options
-            Those of that function.
         """
         from ..io.vtu import save_vtu
 
         return save_vtu(self, filename, **options)
 
     def to_pyvista(self, **options: Any) -> Any:
-        """The body as a grid of pyvista; see :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
-
-        Parameters
-        ----------
-        **options
-            Those of that function.
-        """
+        """The body as a grid of pyvista; see :func:`skfem_ancf.visuals.pyvista.to_pyvista`."""
         from ..visuals.pyvista import to_pyvista
 
         return to_pyvista(self, **options)
 
     def view(self, field: Any = "eps_yy", **options: Any) -> Any:
-        """Put the body into a plotter of pyvista; see :func:`skfem_ancf.visuals.pyvista.view`.
-
-        Parameters
-        ----------
-        field
-            What it is coloured by.
-        **options
-            Those of that function.
-        """
+        """Put the body into a plotter of pyvista; see :func:`skfem_ancf.visuals.pyvista.view`."""
         from ..visuals.pyvista import view
 
         return view(self, field, **options)
 
     def plot_resultants(self, beam: WhichBeam = None, **options: Any) -> Any:
-        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`.
-
-        Parameters
-        ----------
-        beam
-            The beam, its name or its number.
-        **options
-            Those of that function.
-        """
+        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`."""
         from ..visuals.diagrams import plot_resultants
 
         return plot_resultants(self, beam, **options)
 
     def plot(self, field: str = "eps_yy", **options: Any) -> Any:
-        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`.
-
-        Parameters
-        ----------
-        field
-            What it is coloured by.
-        **options
-            Those of that function.
-        """
+        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""
         from ..visuals.matplotlib import plot_state
 
         return plot_state(self, field, **options)
