@@ -11,7 +11,6 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 from skfem.element import DiscreteField, Element
 
-from ..core.caching import ArrayKey, array_cache
 from ..core.errors import InputError, MeshError, require_finite, shown
 from ..core.immutable import Immutable
 from ..core.quadrature import gauss
@@ -51,38 +50,10 @@ class SectionFunctions:
         self._dP = require_finite("derivatives", derivatives, (None, None))
         self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2.0
         self.degree, self.number = self._dP.shape
-        self._key = ArrayKey(self._dP)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, SectionFunctions) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
 
     def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
         """P_k and its derivative at eta in [-1/2, 1/2]; of all k, shape (n,) + eta.shape."""
         return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])
-
-
-def _unit_functions(along: tuple[int, int], section: SectionFunctions, factors: Array, X: Array
-                    ) -> Array:
-    """Those of :meth:`ElementBeam._unit`."""
-    axis, of_node, number = factors
-    out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
-    of_axis, of_section = axis >= 0, axis < 0
-    for d in (0, 1):
-        out[d, of_axis] = hermite_basis(along[0], X[0], d)[axis[of_axis]]
-    if np.any(of_section):
-        S, dS = (hermite_basis(along[1], X[0], d)[of_node[of_section]] for d in (0, 1))
-        P, dP = (values[number[of_section]] for values in section(X[1] - 0.5))
-        out[:, of_section] = S * P, dS * P, S * dP
-    out.flags.writeable = False
-    return out
-
-
-#: The same, kept for few points, which elements of many meshes share.
-_kept_functions = array_cache(256)(_unit_functions)
-KEPT_POINTS = 512
 
 
 class ElementBeam(Immutable, Element):
@@ -216,9 +187,16 @@ class ElementBeam(Immutable, Element):
 
     def _unit(self, X: Array, i: Any = slice(None)) -> Array:
         """Functions of height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
-        few = np.ndim(X) == 2 and np.shape(X)[1] <= KEPT_POINTS
-        functions = _kept_functions if few else _unit_functions
-        return functions(self._along, self.section, self._factors[:3, i], X)
+        axis, of_node, number = self._factors[:3, i]
+        out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
+        of_axis, of_section = axis >= 0, axis < 0
+        for d in (0, 1):
+            out[d, of_axis] = hermite_basis(self._along[0], X[0], d)[axis[of_axis]]
+        if np.any(of_section):
+            S, dS = (hermite_basis(self._along[1], X[0], d)[of_node[of_section]] for d in (0, 1))
+            P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
+            out[:, of_section] = S * P, dS * P, S * dP
+        return out
 
     def local(self, X: Array, h: float | Array, i: int | slice = slice(None),
               rate: float | Array = 0.0) -> tuple[Array, Array, Array, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import logging
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -127,42 +127,29 @@ class Curve:
 
     def moved(self, A: Array, shift: Array) -> Curve:
         """The curve ``A r(s) + shift``."""
-        return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
+        return Curve(partial(_moved, self, A, shift), partial(_moved, self.rate, A, np.zeros(2)),
+                     self.ends)
 
 
-class _Moved:
-    """``A f(s) + shift`` for a function f of parameters."""
-
-    def __init__(self, function, A, shift):
-        self.function, self.A, self.shift = function, A, shift
-
-    def __call__(self, s):
-        return self.A @ self.function(s) + self.shift[:, None]
+def _moved(function, A, shift, s):
+    return A @ function(s) + shift[:, None]
 
 
-class _ComplexStep:
+def _complex_step(r, s):
     """The derivative of a function of parameters that takes complex ones."""
-
-    def __init__(self, r):
-        self.r = r
-
-    def __call__(self, s):
-        return np.imag(np.asarray(_components(self.r(s + 1e-30j), s))) / 1e-30
+    return np.imag(np.asarray(_components(r(s + 1e-30j), s))) / 1e-30
 
 
-class _Differences:
-    """The derivative of a function of parameters on [s0, s1] by differences."""
-
-    def __init__(self, r, s0, s1):
-        self.r, self.ends = r, (s0, s1)
-
-    def __call__(self, s):
-        return _differences(lambda s: _on_curve("r(s)", self.r, s), s, *self.ends)
+def _differences(r, s0, s1, s):
+    """The derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
+    at, weights, d = _stencil(s, s0, s1)
+    values, = _each(partial(_on_curve, "r(s)", r), at)
+    return np.einsum("is,jis->js", weights, values) / d
 
 
 def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[Array], Array]:
     """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
-    differences, complex_step = _Differences(r, s0, s1), _ComplexStep(r)
+    differences, complex_step = partial(_differences, r, s0, s1), partial(_complex_step, r)
     try:
         probe = s0 + (s1 - s0) * TRIED
         with warnings_as_errors():  # among them: the imaginary part is discarded
@@ -187,13 +174,6 @@ def _each(function, *parameters):
 def _angles(a, b):
     """The angles from vectors to others, both (2, ...)."""
     return np.arctan2(a[0] * b[1] - a[1] * b[0], np.sum(a * b, axis=0))
-
-
-def _differences(r, s, s0, s1):
-    """Derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
-    at, weights, d = _stencil(s, s0, s1)
-    values, = _each(r, at)
-    return np.einsum("is,jis->js", weights, values) / d
 
 
 def _turning(d, near, weights, step):

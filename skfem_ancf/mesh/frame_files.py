@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from ..core.errors import (FileError, InputError, MeshError, require_finite, require_names,
                            require_path, shown)
-from ..core.types import Array
 from .frame_graph import Net
 
 #: Kinds of cells of meshio that are lines: the ends first, then what is between them in order.
@@ -73,7 +73,8 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
             k = int(inside[np.argmax(off)])
             raise MeshError(f"the point {k} of the mesh is at z = {points[k, 2]:.9g}: a frame lies "
                             "in the plane z = 0")
-    curves = {k: _Polynomial(points[cell, :2].T) for k, cell in enumerate(lines) if len(cell) > 2}
+    curves = {k: partial(_polynomial, points[cell, :2].T) for k, cell in enumerate(lines)
+              if len(cell) > 2}
     first = dict(zip(blocks, np.cumsum([0] + [len(b.data) for b in blocks.values()])))
     wanted = [*named, *([] if groups is None else [groups] if isinstance(groups, str) else groups)]
     sets, nodes, lost = _names(mesh, {k: cell_number[first[k]:first[k] + len(block.data)]
@@ -221,14 +222,9 @@ def _numbered(mesh, wanted):
     return sets
 
 
-class _Polynomial:
-    """The polynomial through two ends, at s = 0 and 1, and points evenly between them."""
-
-    def __init__(self, points: Array) -> None:
-        self.points = points[:, [0, *range(2, points.shape[1]), 1]]
-
-    def __call__(self, s: Array) -> Array:
-        n = self.points.shape[1]
-        t, k = (n - 1) * np.asarray(s)[..., None], np.arange(n)
-        weights = [np.prod((t - k[k != i]) / (i - k[k != i]), axis=-1) for i in k]
-        return np.tensordot(self.points, weights, 1)
+def _polynomial(points, s):
+    """The polynomial through two ends, at s = 0 and 1, and points (2, n - 2) evenly between."""
+    n = points.shape[1]
+    t, k = (n - 1) * np.asarray(s)[..., None], np.arange(n)
+    weights = [np.prod((t - k[k != i]) / (i - k[k != i]), axis=-1) for i in k]
+    return np.tensordot(points[:, [0, *range(2, n), 1]], weights, 1)

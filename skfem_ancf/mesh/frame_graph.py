@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -176,7 +177,7 @@ class Net:
                                 "give a smaller tol=")
             shift = (self.points - places)[:, self.given[:, k]]
             if np.any(shift):
-                self.curves[k] = _Moved(curve, shift)
+                self.curves[k] = partial(_moved, curve, shift)
 
     @property
     def size(self) -> float:
@@ -348,13 +349,8 @@ def _warn_of(pairs, apart, what):
         warn(f"the points {i} and {j}, {d:.3g} apart{more}, {what}", ModelWarning)
 
 
-class _Moved:
+def _moved(curve, shift, s):
     """A curve whose ends are moved, and what is between them in proportion."""
-
-    def __init__(self, curve: Callable[[Array], Any], shift: Array) -> None:
-        self.curve, self.shift = curve, shift
-
-    def __call__(self, s: Array) -> Any:
-        x, y = self.curve(s)
-        (ax, bx), (ay, by) = self.shift
-        return x + (1.0 - s) * ax + s * bx, y + (1.0 - s) * ay + s * by
+    x, y = curve(s)
+    (ax, bx), (ay, by) = shift
+    return x + (1.0 - s) * ax + s * bx, y + (1.0 - s) * ay + s * by

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from .numbering import NumberedMesh, default_tags
 from .places import as_point, is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
-from .taper import Scaled, heights_of
+from .taper import heights_of, scaled
 
 EPS = float(np.finfo(float).eps)
 
@@ -541,7 +541,7 @@ class MeshBeam(NumberedMesh):
                        p_XY=None if self.p_XY is None else rotation @ self.p_XY / scale,
                        lengths=scale * self.lengths, height=scale * self.height,
                        heights=None if self.heights is None else scale * self.heights,
-                       taper=None if self.taper is None else Scaled(self.taper, scale))
+                       taper=None if self.taper is None else partial(scaled, self.taper, scale))
 
     def translated(self, diffs: ArrayLike) -> MeshBeam:
         """The mesh moved by a vector, shape (2,)."""

@@ -19,14 +19,9 @@ PLACES, BETWEEN = np.arange(4) / 3.0, (1.0 + 2.0 * np.arange(3)) / 6.0
 FITS = 0.02
 
 
-class Scaled:
-    """A function of a parameter times a number."""
-
-    def __init__(self, function: Callable[[Array], Any], factor: float) -> None:
-        self.function, self.factor = function, factor
-
-    def __call__(self, s: Array) -> Any:
-        return self.factor * np.asarray(self.function(s))
+def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
+    """A function of parameters (n,) times a number."""
+    return factor * np.asarray(function(s))
 
 
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:

@@ -380,17 +380,6 @@ class Recovery:
                          np.searchsorted(cuts, place, side="right")) - 1
         return np.clip(found, 0, len(self.segments) - 1)
 
-    def fields(self, X: Array, tind: Array | None = None) -> tuple[Array, Array, Array]:
-        """Strain (eps_xx, eps_yy, 2 eps_xy), stress (S_xx, S_yy, S_xy), (3, ne, np), and angle of
-        the fibres (ne, np), at reference points (2, np) or (2, ne, np) of the elements ``tind``
-        (ne,).
-        """
-        e = np.arange(self.beam.mesh.nelements) if tind is None else np.asarray(tind)
-        shape = (len(e), X.shape[-1])
-        X = np.array([np.broadcast_to(x, shape).ravel() for x in X])
-        values = self.at(np.repeat(e, shape[1]), X).reshape((7,) + shape)
-        return values[:3], values[3:6], values[6]
-
     def at(self, e: Array, X: Array, rows: slice = slice(7)) -> Array:
         """Rows of strain, stress and angle (7 in all) at reference points X (2, n) of elements;
         (rows, n).

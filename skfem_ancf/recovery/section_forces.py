@@ -340,11 +340,3 @@ def _moments(q, force):
     """Moments (ne,) of element vectors on the coordinates but r, (ne, nb, 2) both."""
     q, force = (np.moveaxis(x[:, 1:], -1, 0) for x in (q, force))
     return np.sum(cross(q, force), axis=-1)
-
-
-def viscous_forces(beam: Beam, u: Array, v: Array, time: float) -> Array:
-    """Forces of the elements of a beam that resist the rate of the strain, shape (ne, nb, 2).
-
-    They are those of a displacement ``u`` (N,), its rate ``v`` (N,) and a retardation time.
-    """
-    return beam.kernel.viscous_forces(u, v, time)

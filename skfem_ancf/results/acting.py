@@ -12,7 +12,7 @@ from ..beam.beam import Beam
 from ..beam.distribution import Sampled, station_of_node, stations_of_vector
 from ..core.types import Array
 from ..recovery.recovered import Recovery
-from ..recovery.section_forces import NotRecovered, SectionForces, viscous_forces
+from ..recovery.section_forces import NotRecovered, SectionForces
 
 
 def stations(state: Any) -> list[list[float]]:
@@ -98,7 +98,7 @@ def recover(state: Any, number: int, at: list[float], u: Array,
                 + system.modal_damping.acceleration(state.v))[s]
         time = system.retardation[number]
         if state.t is not None and time:
-            viscous = viscous_forces(beam, state.u[s], state.v[s], time)
+            viscous = beam.kernel.viscous_forces(state.u[s], state.v[s], time)
         with np.errstate(all="ignore"):
             return Recovery(SectionForces(beam, u, loads, [*at, *places], acceleration, sampled,
                                           viscous), u)

@@ -86,20 +86,8 @@ def warn_of(state: Any) -> None:
         warn(text, ModelWarning)
     for beam in state.beams:
         u = state.u_of(beam)
-        if not _is_moderate(beam, u):
-            for text in _findings(beam, shortest(beam, u), turning(beam, u)):
-                warn(f"{text} (state.checks has the numbers)", ModelWarning)
-
-
-def _is_moderate(beam, u):
-    """True if the tangents of the nodes tell that nothing can be out of range.
-
-    The largest curvature of an element is seldom more than twice its mean.
-    """
-    turn = turning(beam, u)
-    stretch = np.min(np.abs(tangents(beam, u) / tangents(beam, 0.0)))
-    fibres = turn * beam.mesh.height / np.min(beam.mesh.lengths)
-    return turn < turning_limit(beam) and stretch - fibres > 1.1 * COMPRESSED
+        for text in _findings(beam, kinematics.shortest(beam, u), turning(beam, u)):
+            warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
 
 def _kinks(state):
@@ -132,9 +120,7 @@ def _kinks(state):
 
 
 def _kink(beam, u, force, sides):
-    """Angle of the kink under a force on the elements at both sides, the length over which bending
-    rounds it off, and that of the elements; None where they follow.
-    """
+    """Angle of a kink, the length that bending spreads it over, that of the elements; or None."""
     t = beam.mesh.t
     r = (beam.mesh.p.T + u.reshape(-1, beam.nd // 2, 2)[:, 0])[t[:, sides]]
     chord = (r[1] - r[0]) / np.hypot(*(r[1] - r[0]).T)[:, None]
@@ -153,13 +139,13 @@ def _kink(beam, u, force, sides):
 def _findings(beam, stretch, turn):
     who = "" if beam.name is None else f" of beam {beam.name!r}"
     out = []
-    if stretch < COMPRESSED and beam.has_sections and _is_linear(beam):
+    if stretch < COMPRESSED and beam.has_sections and beam.kernel.linear:
         out.append(f"a fibre{who} is compressed to {stretch:.3g} of its length; below "
                    f"{COMPRESSED:.3g} St. Venant-Kirchhoff resists less and less: use NeoHookean, "
                    "or a smaller load")
     if not beam.has_sections and stretch <= 0.0:
         out.append(f"the sections{who} overlap: the axis is bent to a radius below half the height")
-    limit = turning_limit(beam)
+    limit = TURNING.get(beam.element.axis_degree, TURNING_SMOOTH)
     if turn > limit:
         out.append(f"the mesh{who} is too coarse for the curvature found: the axis turns by "
                    f"{turn:.3g} rad over one element, where {limit:g} is the limit: use more "
@@ -175,15 +161,8 @@ def _linear_findings(beam, u, base):
         f"order of the square of that; beyond {SMALL:g} rad use solve_static()"]
 
 
-def _is_linear(beam):
-    return beam.kernel.linear
-
-
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
-    """Largest angle by which the axis turns over an element, by its tangents at the nodes.
-
-    For a displacement (N,), linear about a base if there is one.
-    """
+    """Largest angle by which the axis turns over an element, by its tangents at the nodes."""
     left, right = beam.mesh.t
     if base is not None:
         turns = _turns(beam, u, base)
@@ -202,13 +181,3 @@ def _turns(beam, u, base=None):
 def tangents(beam: Beam, u: Array | float) -> Array:
     """The axis' derivative r_X at the nodes, as complex numbers, for a displacement (N,) or 0."""
     return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
-
-
-def turning_limit(beam: Beam) -> float:
-    """The angle by which the axis may turn over one element."""
-    return TURNING.get(beam.element.axis_degree, TURNING_SMOOTH)
-
-
-def shortest(beam: Beam, u: Array) -> float:
-    """Smallest stretch of the fibres along the axis at the integration points."""
-    return kinematics.shortest(beam, u)

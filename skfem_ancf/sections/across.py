@@ -234,9 +234,6 @@ class Across(Immutable):
             Of the body whose sections have their height between nodes too, see
             :meth:`~skfem_ancf.mesh.mapping.MappingBeam.full_volume`.
         """
-        if self.simple and self.uniform and tind is not None:
-            size = layer.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
-            return size * self.density(layer, X, tind) if times == "density" else size
         mapping = self.mesh.mapping()
         of_cell = (mapping.full_volume if full else mapping.detDF)(X, tind)
         return self.breadth(layer, X, tind, whole, times) * W * of_cell
@@ -382,8 +379,6 @@ class Across(Immutable):
         It is asked for a width of 1 and the largest height, and is proportional to the width.
         """
         first = self.layers[0]
-        if self.simple:
-            return formulation.stabilisation(self.mesh, self.element, first.material, first.width)
         K = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
         if K is None:
             return None

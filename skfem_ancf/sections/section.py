@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -301,7 +302,7 @@ class Layers(Section):
                 raise InputError(f"{self!r} has thicknesses that stay, and does not fill a tapered "
                                  "mesh: give one layer the thickness None, by which it takes what "
                                  "the others leave, or use a mesh of constant height")
-            return [layer_of(law, width, Moving(_Layer(given, k), mesh.height))
+            return [layer_of(law, width, Moving(partial(_layer, given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
         if abs(tops[-1] - mesh.height) > FILLS * mesh.height:
@@ -320,17 +321,12 @@ class Layers(Section):
             for thickness, _, _ in self.parts) + ">"
 
 
-class _Layer:
-    """Where one of layers is, at heights (..., 1); of those one has the thickness None."""
-
-    def __init__(self, given, number):
-        self.given, self.number = given, number
-
-    def __call__(self, h):
-        k, rest = self.number, self.given.index(None)
-        low = sum(self.given[:k]) / h if k <= rest else 1.0 - sum(self.given[k:]) / h
-        high = sum(self.given[:k + 1]) / h if k < rest else 1.0 - sum(self.given[k + 1:]) / h
-        return [Piece(low, high, 1.0)]
+def _layer(given, k, h):
+    """Where layer k is, at heights (..., 1); one of the thicknesses that are given is None."""
+    rest = given.index(None)
+    low = sum(given[:k]) / h if k <= rest else 1.0 - sum(given[k:]) / h
+    high = sum(given[:k + 1]) / h if k < rest else 1.0 - sum(given[k + 1:]) / h
+    return [Piece(low, high, 1.0)]
 
 
 class Numbers(Section):
@@ -420,11 +416,11 @@ class Profile(Section):
         if name == "rectangle":
             return [Piece(0.0, 1.0, width)]
         if name in ("circle", "tube"):
-            outer = _Chord(h, 0.5)
+            outer = partial(_chord, h, 0.0)
             if name == "circle":
                 return [Piece(0.0, 1.0, outer)]
             a = thickness
-            return [Piece(0.0, a, outer), Piece(a, 1.0 - a, _Chord(h, 0.5, 0.5 - a)),
+            return [Piece(0.0, a, outer), Piece(a, 1.0 - a, partial(_chord, h, 0.5 - a)),
                     Piece(1.0 - a, 1.0, outer)]
         web = 2.0 * s["wall"] if name == "box" else s["web"]
         flange = Piece(1.0 - thickness, 1.0, width)
@@ -451,13 +447,8 @@ class Profile(Section):
         return f"Section.profile({self.name!r}{', scaled=True' * self.scaled}{sizes})"
 
 
-class _Chord:
-    """The width of a circle at eta, less that of a smaller one; radii in heights h."""
-
-    def __init__(self, h, *radii):
-        self.h, self.radii = h, radii
-
-    def __call__(self, eta):
-        first, *less = (2.0 * self.h * np.sqrt(np.maximum(r * r - (eta - 0.5) ** 2, 0.0))
-                        for r in self.radii)
-        return first - sum(less)
+def _chord(h, inner, eta):
+    """The width at eta of a circle of height h, less that of a radius in heights h."""
+    outer, inner = (2.0 * h * np.sqrt(np.maximum(r * r - (eta - 0.5) ** 2, 0.0))
+                    for r in (0.5, inner))
+    return outer - inner
