@@ -36,14 +36,9 @@ def require_degree(degree: object) -> int:
 
 
 class SectionFunctions:
-    """Polynomials P_k(eta), P_k(0) = 0, given by their derivatives in the Legendre basis.
+    """Polynomials P_k(eta), P_k(0) = 0, by Legendre coefficients (degree, n) of P_k'.
 
     The section function of a beam is ``h^m P_k(Y / h)`` for an m-th derivative.
-
-    Parameters
-    ----------
-    derivatives
-        Legendre coefficients of P_k' on [-1/2, 1/2], shape (degree, n).
     """
 
     def __init__(self, derivatives: ArrayLike) -> None:

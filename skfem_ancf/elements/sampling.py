@@ -17,16 +17,10 @@ from ..mesh.reference_cell import hermite_basis
 class Sampling(NamedTuple):
     """Where the formulation "assumed" evaluates the strain along an element.
 
-    Attributes
-    ----------
-    points
-        Number of Gauss points of the integration.
-    samples
-        For a strain component ("xx", "yy" or "xy") the places xi in [0, 1]; those not named are
-        evaluated at the points of integration.
-    volume
-        Number of Gauss points for the volumetric part of a law in plane strain, where all
-        ``points`` would lock as nu goes to 1/2; 0 to leave it with the rest.
+    ``points`` is the number of Gauss points of the integration. ``samples`` has for a strain
+    component "xx", "yy" or "xy" the places xi in [0, 1]; others are evaluated at the points of
+    integration. ``volume`` is the number of Gauss points for the volumetric part of a law in plane
+    strain, where all ``points`` would lock as nu goes to 1/2; 0 to leave it with the rest.
     """
 
     points: int
@@ -41,15 +35,9 @@ class Sampling(NamedTuple):
 class StabilisedMode(NamedTuple):
     """A mode that the samples miss, stabilised by ``1/2 k L |c|^2``, L the length of the element.
 
-    Attributes
-    ----------
-    weights
-        c of the degrees of freedom of an element of length 1, (2 nodal_dofs,): a derivative along X
-        of a field, zero where that is linear in X.
-    size
-        k in units of E I over the square of the length that ``per`` names.
-    per
-        "element" or "beam" for its length; "" for none, where c is a curvature.
+    ``weights`` (2 nodal_dofs,) give c, a derivative along X of a field, from the degrees of freedom
+    of an element of length 1. ``size`` is k in units of E I over the square of the length of what
+    ``per`` names, "element" or "beam"; "" for none, where c is a curvature.
     """
 
     weights: Array
@@ -58,27 +46,19 @@ class StabilisedMode(NamedTuple):
 
 
 def default_sampling(p: int, s: int) -> Sampling:
-    """The samples that leave an element something to bend with, found by counting.
+    """The samples of axes of degree ``p`` and sections of degree ``s`` along X, found by counting.
 
-    Each element of a chain adds a node: (p + 1) / 2 vectors of the axis and (s + 1) / 2 of a
-    section slope, p + s + 2 numbers. When nothing stretches, shears or gets thinner each sample
-    takes one of them; of those at the nodes neighbours share one. If none is left the element
-    locks; fewer samples miss modes, see :func:`missed`, to be stabilised.
+    Each element of a chain adds a node: p + s + 2 numbers. When nothing stretches, shears or gets
+    thinner each sample takes one of them; of those at the nodes neighbours share one. If none is
+    left the element locks; fewer samples miss modes, see :func:`missed`, to be stabilised.
 
     * eps_xx, of degree 2 (p - 1), vanishes best at p - 1 Gauss points.
-    * eps_yy vanishes at the nodes, where the slope is a degree of freedom, and between them best
-      at the s Gauss-Lobatto points, zeros of the mode of the slope that eps_xx misses.
+    * eps_yy vanishes at the nodes, and between them best at the s Gauss-Lobatto points, zeros of
+      the mode of the slope that eps_xx misses.
     * eps_xy: sections as rich as the axis follow it at (s + 3) / 2 Gauss-Lobatto points, others at
       the points of eps_xx.
 
     Linear sections, p = 3 and s = 1, have 1 of 6 left, p = s = 3 has 2 of 8, p = s = 5 1 of 12.
-    Sections of degree 7 and more that keep enough points to resist each mode have none left; what
-    they do not meet between the samples is as small as the error of polynomials of their degree.
-
-    Parameters
-    ----------
-    p, s
-        Degrees of the axis and of the sections along X, odd.
     """
     few = (s + 3) // 2
     if s < p:
@@ -96,11 +76,7 @@ def _lobatto(n: int) -> tuple[float, ...]:
 
 @lru_cache(64)
 def missed(m: int, n: int) -> list[Array]:
-    """What n Gauss points of the slope of a field with m derivatives at each node miss.
-
-    Combinations of those of an element of length 1, each of shape (2 m,): the coefficients of the
-    Legendre polynomials of degree n to 2 m - 2 in the slope.
-    """
+    """What n Gauss points of a slope miss, of a field with m derivatives at nodes, (2 m,) each."""
     x, w = gauss(2 * m)
     out = []
     for degree in range(n, 2 * m - 1):

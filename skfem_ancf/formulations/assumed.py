@@ -87,10 +87,7 @@ class Assumed(Formulation):
     @staticmethod
     def _volumetric_apart(whole: Term, element: ElementBeam, material: Material
                           ) -> list[Term] | None:
-        """The term in two, the volumetric one with one point along the axis; None if it has none.
-
-        The rest alone is positive in every sampled strain: one point adds no zero modes.
-        """
+        """The term in two, the volumetric one with few points along the axis; or None."""
         volume = element.sampling.volume
         laws = material.volumetric_split(material.shear_factor(element)) if volume else None
         if laws is None:

@@ -19,11 +19,7 @@ AXIS = (np.array([0.5]), np.array([1.0]))
 
 
 def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[Array, Array]:
-    """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D, (3, 3) both.
-
-    Raises InputError, with the ``name`` of the formulation, unless the stress is linear in the
-    strain.
-    """
+    """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D, (3, 3) both."""
     require_like("material", material, "Material", "law")
     law = material.law(material.shear_factor(element))
     if not isinstance(law, LinearLaw):

@@ -29,18 +29,11 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 class BodyFields(NamedTuple):
     """The body of a state on points: the arguments of a ``meshio.Mesh``.
 
-    Attributes
-    ----------
-    points
-        Positions, shape (n, 3); elements do not share points.
-    cells
-        For each beam its cell type and its cells, as rows of point numbers; of each rigid body its
-        outline.
-    point_data
-        Fields by name, shape (n,) or (n, 3): vectors have a third component of zero, tensors
-        are (xx, yy, xy).
-    cell_data
-        ``beam`` and ``element``: the numbers of both, one array for each beam.
+    ``points`` have the shape (n, 3); elements do not share points. ``cells`` has for each beam its
+    cell type and its cells, as rows of point numbers; of each rigid body its outline.
+    ``point_data`` has fields by name, (n,) or (n, 3): vectors with a third component of zero,
+    tensors as (xx, yy, xy). ``cell_data`` has the numbers ``beam`` and ``element``, one array for
+    each beam.
     """
 
     points: np.ndarray
@@ -81,9 +74,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 
 
 def _values(field, grid, lenient):
-    """A field as meshio takes it; not a number where there is none, and, unless it was asked for,
-    where a law does not say it.
-    """
+    """A field as meshio takes it; not a number where there is none, or where a law has none."""
     n = grid.x.shape[1]
     if field.name == "displacement":
         return in_space(grid.u)
@@ -176,9 +167,7 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
 
 
 def save_obstacles(walls: list[Array], path: Path, dtype: Any = np.float64) -> None:
-    """Write the outlines of obstacles, ends (m, 2, 2) of their straight pieces, into a file beside
-    that of the body, if there are any.
-    """
+    """Write the outlines of obstacles, (m, 2, 2) each, into a file beside that of the body."""
     if not walls:
         return
     points = in_space(np.concatenate(walls).reshape(-1, 2).T)

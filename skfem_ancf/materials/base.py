@@ -306,10 +306,10 @@ def _require_derivatives(law, material):
 
 
 class OverriddenLaw:
-    """The law of a subclass that overrides ``stress``, with what it inherits made to fit.
+    """The law of a subclass that overrides ``stress``.
 
-    The energy is ``int_0^1 strain . stress(x strain) dx`` by eight Gauss points, and the moduli
-    are the complex step of the stress, where they are those of the class it was derived from.
+    The energy is ``int_0^1 strain . stress(x strain) dx`` by eight Gauss points, the moduli are the
+    complex step of the stress, where they are those of the class it was derived from.
     """
 
     def __init__(self, material: Material) -> None:

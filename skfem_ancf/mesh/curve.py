@@ -44,15 +44,7 @@ def _on_curve(what, function, s):
 
 
 class Curve:
-    """A plane curve r(s) with its derivative.
-
-    Parameters
-    ----------
-    r, derivative
-        Functions of parameters (n,) that return (2, n).
-    ends
-        The parameters between which they are defined.
-    """
+    """A plane curve r(s) on ``ends`` with its derivative: functions of (n,) that return (2, n)."""
 
     def __init__(self, r: Callable[[Array], Any], derivative: Callable[[Array], Any],
                  ends: tuple[float, float]) -> None:
@@ -91,17 +83,11 @@ class Curve:
         return np.hypot(*d) @ w * (b - a)
 
     def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Positions, unit tangents, lengths, turning and curvature for nodes at parameters (n,).
+        """Positions, unit tangents, lengths and turning for nodes at parameters (n,).
 
-        Positions and tangents are those of :meth:`nodes`, lengths those of the elements, the
-        turning that of :meth:`turning`, and the curvature that of each sixteenth of the elements,
-        (16 n - 16,).
-
-        Raises
-        ------
-        MeshError
-            If the curve stands still, its derivative is not that of r between two nodes, or its
-            direction jumps at a node inside.
+        And the curvature of each sixteenth of the elements, (16 n - 16,). Raises MeshError if the
+        curve stands still, its derivative is not that of r between two nodes, or its direction
+        jumps at a node.
         """
         a, step = s[:-1], np.diff(s)
         beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
@@ -200,11 +186,7 @@ def _gauss_points(a, step):
 
 
 def _require_no_kink(s, p, beside):
-    """Raise MeshError if the direction of a curve jumps at a node inside.
-
-    The angle between chords to both sides of a node falls with their length where the curve is
-    smooth; at a kink it stays. Given are its points there (2, n), and beside them (2, 4, n).
-    """
+    """Raise MeshError if the direction of a curve jumps at a node inside."""
     chords = (beside - p[:, None]) * np.sign(ASIDE)[:, None]
     wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
     # far from the origin chords that short have the direction of round-off
@@ -229,8 +211,7 @@ def _lagrange_derivatives():
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
     """Raise MeshError where the radius of curvature of the curve is below h/2.
 
-    ``bent`` is the curvature of sixteenths of the elements (16 n - 16,), ``s`` are the parameters
-    of the nodes, and ``height`` is that of the section, or the largest of each element (n - 1,).
+    ``bent`` is the curvature of sixteenths of the elements, ``s`` are the parameters of the nodes.
     """
     height = np.broadcast_to(height, len(s) - 1).repeat(16)
     k = int(np.argmax(bent * height))

@@ -34,15 +34,7 @@ def save_npz(mesh: Any, path: Path) -> None:
 
 
 def load_npz(cls: Any, path: Path, kinds: dict[str, Any]) -> Any:
-    """A mesh that :func:`save_npz` saved, of a class or of that of its kind.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read.
-    MeshError
-        If it holds no mesh of a beam.
-    """
+    """A mesh that :func:`save_npz` saved, of a class or of that of its kind."""
     try:
         data = archive.read(path)
         missing = sorted(set(NEEDED) - data.keys())

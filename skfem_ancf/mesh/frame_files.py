@@ -25,9 +25,8 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     Parameters
     ----------
     mesh
-        A ``meshio.Mesh``, or a file that meshio reads: Gmsh's ``.msh``, ``.vtu`` and others. Cells
-        "line" are straight, "line3", "line4", ... are polynomials through their points, "vertex"
-        gives names to nodes.
+        A ``meshio.Mesh``, or a file that meshio reads. Cells "line" are straight, "line3", "line4",
+        ... are polynomials through their points, "vertex" gives names to nodes.
     groups
         Names of the sets of lines that are beams. By default those in ``named``, and those that
         share no line with another set.
@@ -35,15 +34,6 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
         Names that are asked for elsewhere.
     tol
         As for :class:`Net`.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read.
-    MeshError
-        If it holds no lines, cells of other kinds, or points off the plane z = 0.
-    NameUnknown
-        If there is no set of a name.
     """
     mesh = _mesh_of(mesh)
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
@@ -110,8 +100,7 @@ def _mesh_of(mesh):
 def _require_sets_of_abaqus(path):
     """Raise MeshError for element sets of a file of Abaqus that meshio 5 takes for others.
 
-    It counts the names at ``*ELEMENT`` as if each block had one of its own, and keeps one block of
-    a name; sets of sets it takes for blocks in their order.
+    It counts the names at ``*ELEMENT`` as if each block had one of its own.
     """
     blocks, sets, keyword = [], [], ""
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -136,10 +125,7 @@ def _require_sets_of_abaqus(path):
 
 
 def _ends_first(points, cell):
-    """The points of a line: both ends, then what is between them, as in all formats but Abaqus.
-
-    Its quadratic lines are end, middle, end: of three points those farthest apart are the ends.
-    """
+    """The points of a line, its ends first: of three points those farthest apart."""
     if len(cell) != 3:
         return cell
     a, b, c = points[cell]
@@ -153,10 +139,7 @@ def _ends_first(points, cell):
 
 
 def _names(mesh, blocks, used, wanted):
-    """Lines and nodes by name, from cell sets, point sets, and physical groups of Gmsh.
-
-    And by name a point that is no end of a line.
-    """
+    """Lines and nodes by name, and by name a point that is no end of a line."""
     sets = {name: parts for name, parts in mesh.cell_sets.items()
             if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
     groups, found = {}, dict[str, list[Any]]()
@@ -203,8 +186,7 @@ def _entries(name, part, n):
 def _numbered(mesh, wanted):
     """Cell sets that a file has as numbers: physical groups, or what meshio writes of names.
 
-    Into formats without names it writes data called "a-b", which are 0 in the set a, 1 in b. Other
-    programs have such names, too: they are sets where one of them is wanted.
+    Into formats without names it writes data called "a-b", which are 0 in the set a, 1 in b.
     """
     sets = {}
     names = {int(number): name for name, (number, _) in mesh.field_data.items()}

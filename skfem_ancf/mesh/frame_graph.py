@@ -31,28 +31,24 @@ PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a
 
 
 class Net:
-    """Points, lines between them, and names for both.
+    """Points, lines between them, and names for both: the graph of a frame.
 
     Parameters
     ----------
-    points
-        Pairs (x, y): a list, or an array of shape (n, 2).
-    lines
-        Pairs of numbers of the points that each line joins: a list, or an array of shape (m, 2).
-    groups
-        Numbers of lines by name.
-    nodes
-        Numbers of points by name.
+    points, lines
+        Pairs (x, y), and pairs of numbers of points: lists, or arrays of shapes (n, 2) and (m, 2).
+    groups, nodes
+        Numbers of lines and of points by name.
     curves
         By the number of a line a function of parameters s (k,), from 0 to 1, that returns points
         (2, k) of its axis.
     tol
-        How far apart points may be that are one node; by default 1e-5 of the size of the net, and
+        How far apart points may be that are one node; by default 1e-5 of the size of the graph, and
         1e-3 of its longest line at most.
     beams
         Names of the groups that are beams, which share no line; all of them by default.
     lost
-        By name points that a mesh has in it and the net has not.
+        By name points that a mesh has in it and the graph has not.
 
     Attributes
     ----------
@@ -65,12 +61,6 @@ class Net:
         Numbers of the lines that have a length, shape (k,): they join different nodes.
     same
         The node that each point is, the first of the points there, shape (n,).
-    groups, nodes : dict
-        Numbers of lines and of points by name.
-    beams
-        Names of the groups that are beams.
-    curves : dict
-        Functions by number of line.
     """
 
     def __init__(self, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
@@ -190,11 +180,6 @@ class Net:
         A place is the name of nodes, or of lines for their ends, the number of a node, a point as a
         tuple (x, y), a function of the points x (2, n) that returns n truth values, an array of
         numbers, an array of points (k, 2), or a list of these.
-
-        Raises
-        ------
-        NameUnknown, MeshError, InputError
-            If a name is not known, there is no node at the place, or it is no place.
         """
         return np.unique(self.same[self.points_at(place)])
 
@@ -252,9 +237,8 @@ class Net:
     def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
         """A mesh with a chain of elements for each of some lines (k,), in their order.
 
-        ``elements`` (m,) says how many each of all lines is divided into; ``height`` is a number, a
-        function of parameters s (n,) from 0 to 1 along each line that returns heights (n,), or a
-        list with one of these for each of the lines.
+        ``elements`` (m,) says how many each of all lines is divided into; ``height`` is that of
+        :func:`~.members.heights_of_chains`.
         """
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])

@@ -38,12 +38,8 @@ def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
 class Inverse:
     """The map from the body to the reference cell, by polynomials of xi.
 
-    Parameters
-    ----------
-    axis, director
-        Hermite coefficients of the axis and of the director of the largest height, (2, n, ne).
-    height, heights
-        The largest height; coefficients (4, ne) of heights relative to it, None where constant.
+    ``axis`` and ``director``, that of the largest height, are Hermite coefficients (2, n, ne);
+    ``heights`` coefficients (4, ne) of heights over the largest, None where it is constant.
     """
 
     def __init__(self, axis: Array, director: Array, height: float, heights: Array | None) -> None:
@@ -96,13 +92,7 @@ def _cross(a, b):
 
 
 class Finder:
-    """Finds the elements of one mesh that hold points, many at once.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    """
+    """Finds the elements of one :class:`~skfem_ancf.MeshBeam` that hold points, many at once."""
 
     def __init__(self, mesh: Any) -> None:
         self.mesh, self.mapping = mesh, mesh.mapping()

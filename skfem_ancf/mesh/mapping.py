@@ -128,10 +128,7 @@ class MappingBeam(Mapping):
                            np.asarray(xi))
 
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
-        """The height of the section and its derivative by xi; numbers where it is constant.
-
-        At places xi of shape (npoints,) or (nelements, npoints).
-        """
+        """The height of the section and its derivative by xi; numbers where it is constant."""
         g, rate = self._relative(xi, tind)
         return self.mesh.height * g, self.mesh.height * rate
 
@@ -180,8 +177,7 @@ class MappingBeam(Mapping):
     def full_volume(self, X: Array, tind: Array | None = None) -> Array:
         """The determinant of :meth:`DF` with directors of length 1, (nelements, npoints).
 
-        Those that are interpolated between nodes are shorter: halfway between two that differ by
-        an angle theta by the factor cos(theta / 2). Bodies weigh what their height says.
+        Those that are interpolated between nodes are shorter; bodies weigh what their height says.
         """
         if self.mesh.is_straight:
             return self.detDF(X, tind)
@@ -196,10 +192,7 @@ class MappingBeam(Mapping):
         return self._sum(director, self._director(X[0], 1)) / self.mesh.height
 
     def frame(self, X: Array, tind: Array | None = None) -> Array:
-        """The beam's own frame: ``frame[:, 0]`` the axis tangent, ``frame[:, 1]`` its normal.
-
-        Orthonormal, (2, 2, nelements, npoints), the same across a section.
-        """
+        """The tangent ``frame[:, 0]`` of the axis and its normal, (2, 2, nelements, npoints)."""
         if self._constant is not None:
             x, y = self._constant[:, 0] / self.mesh.lengths
             return self._everywhere(np.array([[x, -y], [y, x]]), X, tind)
@@ -208,10 +201,7 @@ class MappingBeam(Mapping):
         return np.array([[x, -y], [y, x]])
 
     def in_frame(self, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-        """Derivatives of xi and eta along the axis (``rates[0]``) and across it, and the frame.
-
-        Both of shape (2, 2, nelements, npoints).
-        """
+        """Derivatives of xi and eta along and across the axis, and the frame, (2, 2, ...) each."""
         frame = self.frame(X, tind)
         return np.einsum("kiep,ijep->jkep", self.invDF(X, tind), frame), frame
 
@@ -232,10 +222,10 @@ class MappingBeam(Mapping):
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
              xi: ArrayLike = 0.5) -> Array:
-        """The reference points of points x of the body, by Newton's method; outside the cell too.
+        """The reference points of points x, both (2, nelements, npoints), by Newton's method from
+        ``xi``.
 
-        Both are of shape (2, nelements, npoints); NaN where no such point was found after
-        ``max_iterations`` corrections from ``xi``, of any shape that fits (nelements, npoints).
+        They may be outside the cell; NaN where there is none after ``max_iterations`` corrections.
         """
         return self.inverse(x, slice(None) if tind is None else tind, xi, max_iterations)
 
@@ -249,10 +239,7 @@ class MappingBeam(Mapping):
         return tind, np.argmax(m.t2f[:, tind] == find, axis=0)
 
     def facet_points(self, X: Array, find: Array | None = None) -> tuple[Array, Array]:
-        """Elements (nf,) and reference points (2, nf, np) of points of facets ``find``, or all.
-
-        ``X`` are points along the facets, shape (1, np) or (1, nf, np), in [0, 1].
-        """
+        """Elements (nf,) and reference points (2, nf, np) of points of facets, (1, np)."""
         tind, local = self._facet_elements(find)
         s = np.broadcast_to(X[0], (len(tind), X.shape[-1]))
         points = np.empty((2,) + s.shape)
@@ -273,11 +260,7 @@ class MappingBeam(Mapping):
         return np.hypot(*np.where((local % 2 == 0)[:, None], J[:, 0], J[:, 1]))
 
     def normals(self, X: Array, tind: Array, find: Array, t2f: Array) -> Array:
-        """Unit normals of facets ``find`` (nf,), outward from elements ``tind`` (nf,): (2, nf, np).
-
-        ``X`` are reference points on the facets, (2, nf, np), and ``t2f`` the facets of all
-        elements.
-        """
+        """Unit normals of facets (nf,), outward from elements ``tind`` (nf,): (2, nf, np)."""
         local = np.argmax(t2f[:, tind] == find, axis=0)
         reference = self.mesh.elem.refdom.normals[local].T
         n = np.einsum("ijkl,ik->jkl", self.invDF(X, tind), reference)

@@ -37,8 +37,7 @@ class MeshLines(MeshBeam):
 class Heights:
     """The height of chains, for parameters from 2 k to 2 k + 1 on chain k.
 
-    ``given`` holds for each chain, or for all of them, a number or a function of parameters (n,)
-    from 0 to 1 that returns heights (n,).
+    ``given`` has for each chain, or once for all, a number or a function of parameters from 0 to 1.
     """
 
     def __init__(self, given: Sequence[float | Callable[[Array], Any]]) -> None:
@@ -64,10 +63,9 @@ def _values(height, s):
 
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
-    """Largest height, heights in the elements and their function, as :func:`~.taper.heights_of`.
+    """As :func:`~.taper.heights_of`, of a number, a function, or a list with one for each chain.
 
-    Of a positive number, a function of parameters (n,) from 0 to 1, or a list with one of these for
-    each chain, whose ``numbers`` messages name; ``s`` runs from 2 k to 2 k + 1 along chain k.
+    Functions take parameters (n,) from 0 to 1; messages name chains by their ``numbers``.
     """
     chain = chain_of(s)
     own = s - 2.0 * chain
@@ -88,11 +86,10 @@ def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
 
 
 class Axes:
-    """The axes of the chains of a mesh, that of chain k for parameters from 2 k to 2 k + 1.
+    """The axes of chains, a Curve for parameters from 2 k to 2 k + 1 of chain k.
 
-    What a mesh asks of a :class:`~skfem_ancf.mesh.curve.Curve`. ``arcs`` has the curve of a chain,
-    for parameters from 0 to 1, by its number; others are straight, from ``start`` by ``way``, (2,
-    chains).
+    ``arcs`` has the curves of chains by number; others are straight, from ``start`` by ``way``, (2,
+    k).
     """
 
     def __init__(self, arcs: Mapping[int, Curve], start: Array, way: Array) -> None:

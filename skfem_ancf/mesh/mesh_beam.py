@@ -679,8 +679,7 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     """What tolerances of places are relative to: how far bodies reach, or move.
 
     The diagonal of the box round all nodes, but not less than the longest line, as one that is
-    curled may be drawn straight, and not more than all lines together, as some may lie far apart.
-    What is of forces and strains goes by lengths: there all lines add up.
+    curled may be drawn straight, and not more than all lines together.
 
     Examples
     --------

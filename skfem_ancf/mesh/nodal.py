@@ -18,10 +18,9 @@ def turned(d: Array) -> Array:
 def nodal_derivatives(mesh: Any, most: int) -> list[Array]:
     """Position of the axis at the nodes, and ``most`` derivatives by the arc length, all (2, n).
 
-    Position, tangent and curvature are those of the mesh. A node takes the others of the polynomial
-    of degree 8 that has these three at the node and at its two neighbours in the chain, at an end
-    at the next two (of degree 5 where a chain is one element): they are those of the curve but for
-    the error of that interpolation, of order 9 in the position. Those of a straight mesh are zero.
+    Position, tangent and curvature are those of the mesh, the others of the polynomial of degree 8
+    that has these at the node and at its two neighbours: they have an error of order 9 in the
+    position.
     """
     known = [mesh.p, mesh.p_X]
     if most > 1 and mesh.p_XY is not None:

@@ -111,21 +111,10 @@ class NumberedMesh(Immutable, Mesh2D):
 
     def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
                           normal: ArrayLike | None = None) -> Array:
-        """The facets for whose middle a function is true.
+        """The facets (k,) for whose middle a function of points (2, n) is true.
 
-        Parameters
-        ----------
-        test
-            Takes points x (2, n), returns n truth values.
-        boundaries_only
-            No sections between two elements.
-        normal
-            Direction, shape (2,), of the side that the facets are given; None for no side.
-
-        Returns
-        -------
-        ndarray
-            Numbers of facets, shape (k,); an ``OrientedBoundary`` with ``normal``.
+        With ``boundaries_only`` no sections between two elements. With the direction ``normal``
+        (2,) of the side that the facets are given it is an ``OrientedBoundary``.
         """
         middle, mapping = np.array([[0.5]]), self._mapping()
         facets = satisfying(test, mapping.G(middle)[:, :, 0])

@@ -52,10 +52,7 @@ def is_place(place: object) -> bool:
 
 
 def as_point(point: Any, mesh: Any = None) -> Array:
-    """A material point as an array (2,): two coordinates, or with a mesh the name of a section.
-
-    Raises MeshError for anything else.
-    """
+    """A material point as an array (2,): two coordinates, or with a mesh the name of a section."""
     if isinstance(point, str) and mesh is not None and point in (mesh.boundaries or {}):
         return mesh.p[:, node_of(mesh, point)]
     return require_point(point)
@@ -143,11 +140,7 @@ def node_of(mesh: Any, place: Place) -> int:
 
 
 def section_at(mesh: Any, point: ArrayLike) -> int:
-    """The node on whose section a material point (2,) lies.
-
-    It may be off by 1e-6 of the shorter element next to it. Raises MeshError if there is none, or
-    more than one.
-    """
+    """The node on whose section a material point (2,) lies; else a MeshError."""
     x = as_point(point, mesh)
     d = x[:, None] - mesh.p
     Y = np.sum(d * mesh.p_Y, axis=0) / np.sum(mesh.p_Y**2, axis=0)

@@ -88,11 +88,9 @@ def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
 def _hermite_coefficients(m: int, derivative: int) -> Array:
     """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
 
-    Shape (2 m, n + 1 - derivative): Bernstein coefficients times binomials. The function whose
-    k-th derivative at 0 is 1 and whose others vanish has ``binom(i, k) (n - k)! / n!``, i < m; the
-    one at 1 is its mirror image. All are of one sign: nothing cancels, at no degree (Farouki and
-    Rajan, "On the numerical condition of polynomials in Bernstein form", Computer Aided Geometric
-    Design 4, 1987). The differences that derivatives are made of are taken of integers.
+    Bernstein coefficients times binomials, (2 m, n + 1 - derivative): all of one sign, so that
+    nothing cancels (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein
+    form", Computer Aided Geometric Design 4, 1987).
     """
     n = 2 * m - 1
     left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]

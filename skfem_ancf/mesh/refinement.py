@@ -13,8 +13,7 @@ from .taper import halved as halved_heights, heights_of
 
 
 def halved(mesh: Any, ix: Array) -> Any:
-    """The mesh with elements ``ix`` (k,), increasing, halved; new nodes on the curve, names kept.
-    """
+    """The mesh with elements ``ix`` (k,) halved; new nodes on the curve, names kept."""
     marked = np.zeros(mesh.nelements, dtype=bool)
     marked[ix] = True
     new = _midpoints(mesh, ix)
@@ -51,11 +50,10 @@ def halved(mesh: Any, ix: Array) -> Any:
 
 
 def by_element(mesh: Any, at: Array) -> Any:
-    """A curved mesh of elements apart, whose sections turn as their axis beside some nodes.
+    """A curved mesh of elements apart, whose sections turn as their axis beside nodes ``at`` (k,).
 
     Where sections are cubic along the elements, or of a higher degree, one rate of turning at a
-    node serves both sides: at a jump of the curvature it is that of neither. ``at`` (k,) are the
-    numbers of the elements that begin at these nodes.
+    node serves both sides: at a jump of the curvature it is that of neither.
     """
     mesh, n, node = mesh.with_sections("cubic"), mesh.nelements, mesh.t.T.ravel()
     fields: dict[str, Any] = {name: getattr(mesh, name)[:, node]

@@ -25,15 +25,10 @@ def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
 
 
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
-    """Largest height, heights in the elements and their function, from a number or a function.
+    """Largest height, heights (4, ne) in the elements and their function; None of a number.
 
-    The latter two are None for a number; heights are of shape (4, nelements). ``s`` are the
-    parameters of the nodes, ``t`` the nodes of the elements.
-
-    Raises
-    ------
-    InputError, MeshError
-        If a height is not positive, or the function is no cubic in an element.
+    ``s`` are the parameters of the nodes, ``t`` the nodes of the elements. Raises MeshError if the
+    function is no cubic in an element.
     """
     if not callable(height):
         return require_positive("height", height), None, None
