@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
-from skfem import Basis, ElementVector, asm, condense, solve
+from skfem import (Basis, BilinearForm, ElementVector, Functional, LinearForm, asm, condense,
+                   enforce, solve)
+from skfem.helpers import dot
+from skfem.utils import mpc
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NeoHookean,
-                        Scene, StVenantKirchhoff, forms, reference_coordinates)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam,
+                        NeoHookean, Scene, StVenantKirchhoff, forms, reference_coordinates)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
 
@@ -114,5 +117,102 @@ def test_a_basis_or_coordinates_of_another_kind():
         for r in (dict(), dict(r=q[:-1]), dict(r=basis.interpolate(q)), dict(r=q, k=1.0)):
             with pytest.raises(InputError, match="r=q, a vector of 24 numbers"):
                 asm(form, basis, **r)
-    with pytest.raises(InputError, match="as a whole"):
-        own.tangent.form(None, None, None)
+    inside = LinearForm(lambda v, w: own.internal_force(v, w))
+    for r in (dict(), dict(r=q)):
+        with pytest.raises(InputError, match="position with its degrees of freedom"):
+            asm(inside, basis, **r)
+    with pytest.raises(InputError, match="of another basis"):
+        asm(inside, basis, r=forms.position(Basis(mesh, ElementVector(element)), q))
+    with pytest.raises(InputError, match="of one basis"):
+        asm(own.tangent, basis, Basis(mesh, ElementVector(element)), r=q)
+
+
+# composed with what is scikit-fem's
+
+SHORT = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.05), ElementBeamANCF(2),
+             StVenantKirchhoff(2e8, 0.3), 0.05)
+
+
+def test_forms_inside_of_forms():
+    """A beam on a bedding under a wind, by one form: the sum of what each alone gives."""
+    own, basis = forms.of(SHORT), Basis(SHORT.mesh, ElementVector(SHORT.element))
+    q = coordinates(SHORT)
+    stiff = BilinearForm(lambda u, v, w: 3e5 * dot(u, v))
+    wind = LinearForm(lambda v, w: 1e4 * dot(w.r, v))
+    half = Functional(lambda w: 1.5e5 * dot(w.r, w.r))
+
+    @LinearForm
+    def residual(v, w):
+        return 2.0 * own.internal_force(v, w) + wind.form(v, w)
+
+    @BilinearForm
+    def tangent(u, v, w):
+        return own.tangent(u, v, w) + stiff.form(u, v, w)
+
+    @Functional
+    def energy(w):
+        return own.energy(w) + half.form(w)
+
+    r = forms.position(basis, q)
+    assert close(asm(residual, basis, r=r),
+                 2.0 * asm(own.internal_force, basis, r=q) + asm(wind, basis, r=q), 1e-13)
+    assert close(asm(tangent, basis, r=r).toarray(),
+                 (asm(own.tangent, basis, r=r) + asm(stiff, basis)).toarray(), 1e-13)
+    assert asm(energy, basis, r=r) == pytest.approx(
+        asm(own.energy, basis, r=q) + asm(half, basis, r=q), rel=1e-13)
+
+
+def test_bases_of_some_elements_add_up_to_all():
+    own, element = forms.of(SHORT), ElementVector(SHORT.element)
+    q, whole = coordinates(SHORT), Basis(SHORT.mesh, element)
+    parts = [Basis(SHORT.mesh, element, elements=e) for e in ([0, 2], [1, 3])]
+    for form in own:
+        both, one = asm(form, parts, r=q), asm(form, whole, r=q)
+        for a, b in ((both, one), (sum(asm(form, part, r=q) for part in parts), one)):
+            assert abs(a - b).max() <= 1e-13 * abs(b).max()
+    # a softer half: inside of a form, on its elements alone
+    half = LinearForm(lambda v, w: 0.5 * own.internal_force(v, w))
+    assert close(asm(half, parts[1], r=forms.position(parts[1], q)),
+                 0.5 * asm(own.internal_force, parts[1], r=q), 1e-13)
+
+
+@pytest.mark.parametrize("how", [condense, enforce, mpc])
+def test_newton_with_the_utilities_of_scikit_fem(how):
+    """A cantilever whose end rolls, or is held as high as its middle, which feels nothing of it."""
+    own, basis = forms.of(SHORT), Basis(SHORT.mesh, ElementVector(SHORT.element))
+    weight = LinearForm(lambda v, w: -2e4 * v[1])
+    clamped = SHORT.dofs("left", ["r", "r_Y0", "r_Y1"])
+    end, middle = basis.get_dofs("right").all(["r^2"]), SHORT.dofs((0.5, 0.0), ["r^2"])
+    held, T = np.append(clamped, end), np.append(np.zeros(len(clamped)), 1.0)[:, None]
+    options = dict(S=held, M=middle, T=T) if how is mpc else dict(D=held)
+    load, q = asm(weight, basis), reference_coordinates(basis)
+    for _ in range(20):
+        residual = load - asm(own.internal_force, basis, r=q)
+        dq = solve(*how(asm(own.tangent, basis, r=q), residual, **options))
+        q += dq
+    assert np.abs(dq).max() < 1e-9
+    scene, u = Scene(SHORT).clamp("left").load(weight), q - SHORT.q0
+    scene.fix("right", "r^2", u[middle[0]] if how is mpc else 0.0)
+    assert set(scene.free) == set(range(basis.N)) - set(held)
+    assert np.allclose(u, scene.solve_static().u, rtol=0, atol=1e-8)
+
+
+def test_beside_a_nonlinear_form_that_jax_differentiates():
+    pytest.importorskip("jax")
+    from skfem.autodiff import NonlinearForm
+    from skfem.autodiff.helpers import ddot, grad, mul, transpose
+
+    beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], 0.2), ElementBeamANCF(1),
+                StVenantKirchhoff(2.0, 0.3, shear_correction=1.0), 0.4, "continuum")
+    own, q = forms.of(beam), coordinates(beam)
+
+    @NonlinearForm(hessian=True)
+    def strain(r, w):
+        F = grad(r)
+        E = 0.5 * (mul(transpose(F), F) - np.eye(2)[:, :, None, None])
+        lame = 2.0 * 0.3 / (1 - 0.3**2), 2.0 / (2 * 1.3)
+        return 0.4 * (0.5 * lame[0] * (E[0, 0] + E[1, 1])**2 + lame[1] * ddot(E, E))
+
+    K, f = strain.assemble(beam.basis, x=q)
+    assert close(-asm(own.internal_force, beam.basis, r=q), f)  # it is a right-hand side
+    assert close((asm(own.tangent, beam.basis, r=q) + K).toarray(), 2.0 * K.toarray())

@@ -29,12 +29,13 @@ In all of them the strain is that of Green and Lagrange in the beam's frame, ``(
 with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's law.
 """
 
-from .weak import (BeamBilinearForm, BeamForms, BeamLinearForm, EnergyForm, ModuliForm, StressForm,
-                   deformation_gradient, energy, gravity, green_lagrange, internal_force, mass, of,
+from .own import BeamForms, Position, of, position
+from .weak import (BeamBilinearForm, BeamLinearForm, EnergyForm, ModuliForm, StressForm,
+                   deformation_gradient, energy, gravity, green_lagrange, internal_force, mass,
                    pressure, strain_variation, tangent, textbook, textbook_energy,
                    textbook_internal_force, textbook_tangent, traction)
 
 __all__ = ["BeamBilinearForm", "BeamForms", "BeamLinearForm", "EnergyForm", "ModuliForm",
-           "StressForm", "deformation_gradient", "energy", "gravity", "green_lagrange",
-           "internal_force", "mass", "of", "pressure", "strain_variation", "tangent", "textbook",
-           "textbook_energy", "textbook_internal_force", "textbook_tangent", "traction"]
+           "Position", "StressForm", "deformation_gradient", "energy", "gravity", "green_lagrange",
+           "internal_force", "mass", "of", "position", "pressure", "strain_variation", "tangent",
+           "textbook", "textbook_energy", "textbook_internal_force", "textbook_tangent", "traction"]

@@ -2,15 +2,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
+from skfem.assembly import BilinearForm, Form, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
-from skfem.element import DiscreteField
 from skfem.helpers import dot
 
-from ..core.errors import (InputError, ask_field, require_finite, require_like, require_positive)
+from ..core.errors import ask_field, require_finite, require_like, require_positive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -212,7 +211,7 @@ class ModuliForm(BeamBilinearForm):
         A = np.moveaxis(A.reshape(4, 4, ne, -1), (2, 3), (0, 1))
         AB = A @ B.transpose(0, 2, 3, 1)  # (ne, np, 4, nq)
         K = B.reshape(ne, nq, -1) @ AB.reshape(ne, -1, nq)  # rows v, columns u
-        return _scattered(K, ubasis)
+        return scattered(K, ubasis)
 
 
 def _gradient_table(basis):
@@ -221,7 +220,7 @@ def _gradient_table(basis):
                                             (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
 
 
-def _scattered(K, basis):
+def scattered(K, basis):
     """Element matrices (ne, nq, nq), rows of v and columns of u, as scikit-fem's COO data."""
     nq, dofs = basis.Nbfun, basis.element_dofs
     rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
@@ -373,100 +372,3 @@ def pressure(width: float | Array = 1.0) -> BilinearForm:
         return -width * (along[1] * v[0] - along[0] * v[1])
 
     return follower
-
-
-# a beam's own forms
-
-
-class BeamForms(NamedTuple):
-    """The forms of one beam; :func:`of` makes them."""
-
-    energy: Functional
-    internal_force: LinearForm
-    tangent: BilinearForm
-
-
-def of(beam: Any) -> BeamForms:
-    """The weak forms of a beam's own formulation, whatever it is.
-
-    They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that
-    :class:`~skfem_ancf.Scene` solves with, stabilisation included, for stock ``asm(form, basis,
-    r=q)``. The formulation has its own quadrature: that of the basis does not matter.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`. A ``Basis`` of ``ElementVector(element)`` on its mesh, or a
-        part of it, takes the forms.
-
-    Raises
-    ------
-    InputError
-        When assembled, if the basis is not one of the beam, or ``r`` is not the vector of its
-        coordinates.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skfem import Basis, ElementVector, asm
-    >>> from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
-    ...                         reference_coordinates)
-    >>> mesh, element = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1), ElementBeamANCF(2)
-    >>> own = forms.of(Beam(mesh, element, StVenantKirchhoff(E=2.1e11, nu=0.3), width=0.1))
-    >>> basis = Basis(mesh, ElementVector(element))
-    >>> asm(own.tangent, basis, r=reference_coordinates(basis)).shape
-    (24, 24)
-    """
-    require_like("beam", beam, "Beam", "facet_basis")
-    return BeamForms(_OwnEnergy(beam), _OwnForce(beam), _OwnTangent(beam))
-
-
-class _Own:
-    """A form whose element contributions come from the kernel of a beam."""
-
-    def __init__(self, beam):
-        super().__init__(self._named)
-        self.beam = beam
-
-    def _named(self, *_):
-        raise InputError("the form of a beam's own formulation is assembled as a whole: "
-                         "asm(form, basis, r=q)")
-
-    def _displacement(self, basis, r=None, idx=None, **other):
-        """The displacement, and the elements of the basis; ``idx`` is scikit-fem's."""
-        mesh, element = self.beam.mesh, self.beam.element
-        other_element = getattr(basis.elem, "elem", None)
-        same = (isinstance(basis, CellBasis) and basis.N == self.beam.N
-                and type(other_element) is type(element)
-                and np.array_equal(other_element.doflocs, element.doflocs)
-                and np.array_equal(basis.mesh.p, mesh.p) and basis.mesh.height == mesh.height
-                and np.array_equal(basis.mesh.heights, mesh.heights))
-        if not same:
-            raise InputError(f"this is a form of {self.beam!r}: assemble it on "
-                             f"Basis(beam.mesh, ElementVector(beam.element)), not on {basis!r}")
-        if other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,):
-            raise InputError(f"pass the degrees of freedom as r=q, a vector of {basis.N} numbers, "
-                             f"and nothing else; got r of shape {np.shape(r)}"
-                             + (f" and {sorted(other)}" if other else ""))
-        u = np.asarray(r, dtype=np.float64) - self.beam.q0
-        return u, slice(None) if basis.tind is None else basis.tind
-
-
-class _OwnEnergy(_Own, Functional):
-    def elemental(self, v, **kwargs):
-        u, tind = self._displacement(v, **kwargs)
-        return self.beam.kernel.energies(u)[tind]
-
-
-class _OwnForce(_Own, LinearForm):
-    def _assemble(self, ubasis, vbasis=None, **kwargs):
-        u, tind = self._displacement(ubasis, **kwargs)
-        data = self.beam.kernel.forces(u)[tind].reshape(-1, ubasis.Nbfun).T
-        dofs = ubasis.element_dofs
-        return np.array([dofs.ravel()]), data.ravel(), (ubasis.N,), (ubasis.Nbfun,)
-
-
-class _OwnTangent(_Own, BilinearForm):
-    def _assemble(self, ubasis, vbasis=None, **kwargs):
-        u, tind = self._displacement(ubasis, **kwargs)
-        return _scattered(self.beam.kernel.tangents(u)[tind], ubasis)

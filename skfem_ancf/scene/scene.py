@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from skfem.assembly import Basis
 
 from ..actions.loads import Load
 from ..beam.beam import Beam
@@ -22,6 +23,7 @@ from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
 from ..dynamics.sensors import Sensor, locate
+from ..equations.matrices import Matrices, matrices_of
 from ..equations.system import System
 from ..results.arguments import configuration, displacement
 from ..results.modes import Buckling, Modes
@@ -86,6 +88,59 @@ class Scene(Model):
             if self._system is None:
                 self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
             return self._system
+
+    @property
+    def free(self) -> Array:
+        """Numbers of the degrees of freedom that no support fixes: of what solvers change."""
+        return np.flatnonzero(self.system.constraints.free)
+
+    def basis(self, beam: WhichBeam = None) -> Basis:
+        """The scikit-fem ``Basis`` of the position field of a beam.
+
+        Its quadrature is exact for products of two functions. Degree of freedom k of it is number
+        ``scene.layout.offset(beam) + k`` of the scene. The position in a State is
+        ``basis.interpolate(q)`` with ``q = state.q`` of a scene of one beam.
+
+        Parameters
+        ----------
+        beam
+            The beam, its name or its number; None for the only one.
+        """
+        return select_beam(self.beams, beam).exact_basis()
+
+    def matrices(self, state: State | None = None) -> Matrices:
+        """Mass, damping, tangent stiffness, force and constraints in a state, as SciPy's sparse.
+
+        Parameters
+        ----------
+        state
+            A State of this scene, also one of :meth:`state`; None for the reference configuration
+            without loads.
+
+        Returns
+        -------
+        Matrices
+            A named tuple ``M, D, K, force, J``, of all degrees of freedom: solvers take those that
+            are :attr:`free`.
+
+        Examples
+        --------
+        The lowest frequencies, by SciPy alone:
+
+        >>> import numpy as np
+        >>> from scipy.sparse.linalg import eigsh
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.1),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.1))
+        >>> M, D, K, force, J = scene.clamp("left").matrices()
+        >>> K, M = (A[scene.free][:, scene.free] for A in (K, M))
+        >>> squares = eigsh(K.tocsc(), k=2, M=M.tocsc(), sigma=0.0)[0]
+        >>> bool(np.allclose(np.sqrt(squares), scene.modes(2).frequencies))
+        True
+        """
+        with self._lock:
+            state = self.state(load=0.0) if state is None else state
+            return matrices_of(self.system, configuration(self.system, state))
 
     def _on(self, beams):
         scene = super()._on(beams)
