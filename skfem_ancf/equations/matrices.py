@@ -13,7 +13,7 @@ from ..core.types import Array
 from .strain_tangent import load_stiffness
 
 
-class Matrices(NamedTuple):
+class SceneMatrices(NamedTuple):
     """The equations of a scene, linearised in a state.
 
     ``M u'' + D u' + K u + J^T l = force`` holds for changes of displacement u and multipliers l
@@ -43,8 +43,8 @@ class Matrices(NamedTuple):
     J: Any
 
 
-def matrices_of(system: Any, state: Any) -> Matrices:
-    """The Matrices of a :class:`~skfem_ancf.equations.system.System` in a State of it."""
+def matrices_of(system: Any, state: Any) -> SceneMatrices:
+    """The SceneMatrices of a :class:`~skfem_ancf.equations.system.System` in a State of it."""
     u, v, t, tables = np.array(state.u), state.v, state.t, system.backend.tables
     time = state.load if t is None else t
     K = load_stiffness(system, u, state.load, t) + system.constraints.curvature(
@@ -71,7 +71,7 @@ def matrices_of(system: Any, state: Any) -> Matrices:
     force = state.load * system.external_force(u, t) - system.internal_force(u, t, state.load)
     if system.damped:
         force = force - system.damping_force(u, v, t)
-    return Matrices(M, sparse.csr_array(D), sparse.csr_array(K), force,
+    return SceneMatrices(M, sparse.csr_array(D), sparse.csr_array(K), force,
                     system.constraints.sparse_jacobian(u, time))
 
 

@@ -23,7 +23,7 @@ from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
 from ..dynamics.sensors import Sensor, locate
-from ..equations.matrices import Matrices, matrices_of
+from ..equations.matrices import SceneMatrices, matrices_of
 from ..equations.system import System
 from ..results.arguments import configuration, displacement
 from ..results.modes import Buckling, Modes
@@ -108,7 +108,7 @@ class Scene(Model):
         """
         return select_beam(self.beams, beam).exact_basis()
 
-    def matrices(self, state: State | None = None) -> Matrices:
+    def matrices(self, state: State | None = None) -> SceneMatrices:
         """Mass, damping, tangent stiffness, force and constraints in a state, as SciPy's sparse.
 
         Parameters
@@ -119,7 +119,7 @@ class Scene(Model):
 
         Returns
         -------
-        Matrices
+        SceneMatrices
             A named tuple ``M, D, K, force, J``, of all degrees of freedom: solvers take those that
             are :attr:`free`.
 
