@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from ..beam.strain_energy import body_tangent
+from ..core.errors import InputError
 from ..core.linalg import BandMatrix
 from ..core.types import Array
 from .strain_tangent import load_stiffness
@@ -49,7 +50,7 @@ def matrices_of(system: Any, state: Any) -> SceneMatrices:
     time = state.load if t is None else t
     K = load_stiffness(system, u, state.load, t) + system.constraints.curvature(
         u, time, state.multipliers)
-    D, M = sparse.csr_array((system.N, system.N)), None
+    D = sparse.csr_array((system.N, system.N))
     for beam, s in zip(system.beams, system.slices):
         dofs = s.start + beam.nd * beam.mesh.t[0][:, None] + np.arange(2 * beam.nd)
         i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
@@ -63,11 +64,13 @@ def matrices_of(system: Any, state: Any) -> SceneMatrices:
         i, j, k = system.forces.entries(forces, time, u, v, 0.0)
         K = K + _square(system, i, j, k)
         D = D + _square(system, i, j, system.forces.entries(forces, time, u, v, 1.0)[2] - k)
-    if all(layer.density is not None for beam in system.beams for layer in beam.across.layers):
+    try:
         M = sparse.csr_array(system.mass.tocsc())
-        D = D + system.damping.mass * M
+    except InputError:  # no density
+        M = None
+    if system.damping:
         modes = sparse.csr_array(system.modal_damping.rows)
-        D = D + modes.T @ modes
+        D = D + system.damping.mass * M + modes.T @ modes
     force = state.load * system.external_force(u, t) - system.internal_force(u, t, state.load)
     if system.damped:
         force = force - system.damping_force(u, v, t)

@@ -220,7 +220,7 @@ def _gradient_table(basis):
                                             (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
 
 
-def scattered(K, basis):
+def scattered(K: Array, basis: Any) -> tuple[Any, Array, tuple[int, int], tuple[int, int]]:
     """Element matrices (ne, nq, nq), rows of v and columns of u, as scikit-fem's COO data."""
     nq, dofs = basis.Nbfun, basis.element_dofs
     rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
