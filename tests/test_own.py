@@ -7,7 +7,7 @@ from skfem_ancf import Beam, ElementBeamANCF, InputError, MeshBeam, Scene, StVen
 from skfem_ancf.elements import ElementBeam
 from skfem_ancf.elements.base import SectionFunctions
 from skfem_ancf.actions.joints import Joint
-from skfem_ancf.actions.joints.base import point
+from skfem_ancf.actions.forces import point
 from skfem_ancf.actions.loads import Load
 from skfem_ancf.materials import Material
 from skfem_ancf.materials.base import hooke

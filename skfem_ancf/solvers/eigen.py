@@ -266,7 +266,7 @@ def buckling(system: System, k: int) -> Buckling:
     if not Ks.nnz or not abs(Ks).max() > 0.0:
         raise InputError("no positive load factor: the loads do not stress the beam")
     symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
-    theta, X = (_geometric if symmetric else _follower)(tangent, Ks, k)
+    theta, X = _buckled(tangent, Ks, k, symmetric)
     # mean strain before buckling over that of the strain energy of a strain of one
     strain = np.sqrt(max(float(du @ tangent.internal(stress)), 0.0)) * np.finfo(float).eps
     good = theta < -strain / system.scales.strain_noise
@@ -326,39 +326,30 @@ _FLUTTER = (
     "states under load, beyond the critical load modes.flutter is True")
 
 
-def _geometric(tangent, Ks, k):
-    """The lowest eigenvalues ``-1 / factor`` of ``K_s x = theta K_0 x``, and columns x."""
+def _buckled(tangent, Ks, k, symmetric):
+    """The lowest real eigenvalues ``-1 / factor`` of ``K_s x = theta K_0 x``, and columns x."""
     inverse, n = Inverse(tangent), Ks.shape[0]
-    if n <= 100 or 2 * k > n - tangent.size[1]:
-        theta, X = scipy.linalg.eig(inverse.solve(np.eye(n)) @ Ks)
-        return theta.real, _real(X)
-    start = inverse.solve(Ks @ np.random.default_rng(0).standard_normal(n))
 
     def operator(f):
         return LinearOperator(Ks.shape, f, dtype=float)
 
-    try:
-        _, X = eigsh(Ks, k=k, M=operator(tangent.multiply), Minv=operator(inverse.solve),
-                     which="SA", v0=start, maxiter=200)
-    except ArpackNoConvergence as failure:  # there are not as many negative ones
-        X = failure.eigenvectors
-        if not X.shape[1]:
-            return np.zeros(0), X
-    Y = inverse.solve(Ks @ X)
-    theta, V = scipy.linalg.eigh(Y.T @ (Ks @ Y), Y.T @ (Ks @ X))
-    return theta, Y @ V
-
-
-def _follower(tangent, Ks, k):
-    """As :func:`_geometric` where K_s is not symmetric: only what is real."""
-    inverse, n = Inverse(tangent), Ks.shape[0]
-    if n <= DENSE or 2 * k > n - tangent.size[1]:
+    start = inverse.solve(Ks @ np.random.default_rng(0).standard_normal(n))
+    if n <= (100 if symmetric else DENSE) or 2 * k > n - tangent.size[1]:
         theta, X = scipy.linalg.eig(inverse.solve(np.eye(n)) @ Ks)
+    elif symmetric:
+        try:
+            _, X = eigsh(Ks, k=k, M=operator(tangent.multiply), Minv=operator(inverse.solve),
+                         which="SA", v0=start, maxiter=200)
+        except ArpackNoConvergence as failure:  # there are not as many negative ones
+            X = failure.eigenvectors
+            if not X.shape[1]:
+                return np.zeros(0), X
+        Y = inverse.solve(Ks @ X)
+        theta, V = scipy.linalg.eigh(Y.T @ (Ks @ Y), Y.T @ (Ks @ X))
+        X = Y @ V
     else:
-        start = inverse.solve(Ks @ np.random.default_rng(0).standard_normal(n))
-        theta, X = eigs(LinearOperator(Ks.shape, lambda x: inverse.solve(Ks @ x), dtype=float),
-                        k=k + 2, which="SR", v0=start)
-    real = np.abs(theta.imag) <= REAL * np.abs(theta)
+        theta, X = eigs(operator(lambda x: inverse.solve(Ks @ x)), k=k + 2, which="SR", v0=start)
+    real = symmetric | (np.abs(theta.imag) <= REAL * np.abs(theta))
     return theta[real].real, _real(X[:, real])
 
 

@@ -176,6 +176,3 @@ class _Climb:
                 continue
             if last:
                 return found, True
-
-
-__all__ = ["firm", "found_touching", "held", "lies_near", "soft"]

@@ -15,10 +15,9 @@ from ...core.errors import (InputError, ask_array, ask_number, require_function,
                             require_positive, shown)
 from ...core.types import Array
 from ...mesh.places import is_point
-from ..places import Vector, is_ground, named_place, section
+from ..places import GROUND, Vector, is_ground, named_place, point, section
 from .base import ForceElement, differences
 from .kernels import turned, turning
-from .springs import end_of
 
 KINDS = ("force", "moment")
 #: Part of the time between two samples that is round-off.
@@ -111,20 +110,18 @@ class Control(ForceElement):
         self._starts = [d.start for d in directions]
         return [*ends, *places, *directions]
 
+    def _place(self, layout, place, where_none_is=None):
+        """A beam or body, and the place of it."""
+        named = isinstance(place, RigidBody) or (
+            isinstance(place, (tuple, list)) and not is_point(place))
+        return named_place(layout, place if named or self.beam is None else (self.beam, place),
+                           where_none_is)
+
     def _point(self, layout, place):
-        if self.beam is not None and is_point(place):
-            place = (self.beam, place)
-        return end_of(layout, place)
+        return point(layout, *self._place(layout, place, GROUND))
 
     def _section(self, layout, place):
-        if isinstance(place, RigidBody):
-            which, at = place, None
-        elif isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
-            which, at = place
-        elif is_point(place) and self.beam is None:
-            which, at = named_place(layout, place)
-        else:
-            which, at = self.beam, place
+        which, at = self._place(layout, place)
         if is_ground(which):
             raise InputError("the ground does not turn: leave other= out for a moment from there")
         return section(layout, which, at)[1]

@@ -46,6 +46,3 @@ class Turns:
         if not self.number:
             return np.zeros((len(u), 0))
         return np.unwrap(np.vstack([last, self.angles(u)]), axis=0)[1:]
-
-
-__all__ = ["Turns"]

@@ -15,7 +15,7 @@ from ...core.origin import ours
 from ...core.types import Array
 from ...mesh.places import is_point
 from ..item import Item, beside, require_entries
-from ..places import Vector, point, section
+from ..places import Vector
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
@@ -301,7 +301,3 @@ class Aligned:
         columns = np.broadcast_to(self.e.dofs[None, None], values.shape).ravel()
         values = -factor * values.ravel()
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
-
-
-__all__ = ["Aligned", "Joint", "Vector", "angle_to", "bind_joint", "equations_of", "gradients",
-           "point", "require_derivatives", "rotation", "section"]

@@ -337,14 +337,7 @@ def _repeated(x, w, pieces):
 
 
 def _options(options):
-    if "slip_speed" in options:
-        warn("slip_speed= has no effect any more, leave it out: in a motion points stick "
-                      "as they do in statics", DeprecationWarning)
-        options = {name: x for name, x in options.items() if name != "slip_speed"}
     for name in options:
         require_option("option of an obstacle", name, KNOWN)
     return {name: None if options.get(name) is None else require_positive(name, options[name])
             for name in KNOWN[-2:]}
-
-
-__all__ = ["Obstacle"]

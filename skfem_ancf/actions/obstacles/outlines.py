@@ -49,6 +49,3 @@ def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Arra
         share = values[one] / (values[one] - values[other])
         ends.append(points[:, one] + share * (points[:, other] - points[:, one]))
     return np.concatenate(ends, axis=1), np.column_stack([rows, rows + len(rows)])
-
-
-__all__ = ["circle", "clipped", "contour"]

@@ -32,6 +32,3 @@ def outlines(state: Any, box: Array) -> list[Array]:
         points, pieces = one.outline(box, state.load if state.t is None else state.t)
         out.append(points.T[pieces])
     return out
-
-
-__all__ = ["around", "obstacles_of", "outlines"]

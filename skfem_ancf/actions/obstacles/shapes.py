@@ -417,6 +417,3 @@ class SignedDistance(Shape):
 
     def __repr__(self) -> str:
         return f"<SignedDistance {getattr(self.f, '__name__', 'function')}>"
-
-
-__all__ = ["Circle", "Line", "Polygon", "Shape", "SignedDistance"]
