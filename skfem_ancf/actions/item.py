@@ -23,8 +23,8 @@ class Item(Immutable):
     """What acts in a scene: base class of loads, supports, joints, force elements, and of yours.
 
     An item is described without a mesh. :meth:`skfem_ancf.Scene.add` keeps a copy of it and binds
-    another to the degrees of freedom (DOFs) of the scene; on another mesh, as for
-    ``solve_static(adapt=...)``, it is bound again. A class of your own defines what it has of
+    another to the degrees of freedom (DOFs) of the scene, and again on another mesh, as for
+    ``solve_static(adapt=...)``. A custom class defines what it has of
 
     * ``energy(u, t)``: its potential energy, a number,
     * ``force(u, v, t)``: the force that it exerts on the DOFs, shape (N,); by default minus the
@@ -36,12 +36,11 @@ class Item(Immutable):
     * ``mass()``: what it adds to the mass matrix, (N, N), between DOFs of one node.
 
     Here u and v are the displacement and the velocity of all DOFs of the scene, shape (N,), and t
-    is the time, in statics the load factor. It then works in statics, stability, continuation,
-    modes, motions by every scheme, sweeps and pictures. Derivatives by differences take complex
-    steps, to round-off, where the functions take complex arrays.
+    is the time, in statics the load factor. Derivatives by differences take complex steps, to
+    round-off, where the functions take complex arrays.
 
     :class:`~skfem_ancf.actions.loads.Load`, :class:`~skfem_ancf.actions.joints.Joint` and
-    :class:`~skfem_ancf.actions.forces.ForceElement` are items with hooks of their own: for what is
+    :class:`~skfem_ancf.actions.forces.ForceElement` are other kinds of items: for what is
     scaled with the loads, for sparse constraints, and for forces on few points.
 
     Attributes

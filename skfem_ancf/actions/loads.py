@@ -52,14 +52,11 @@ class Amplitude:
 class Load(Item):
     """Base class: a force on the coordinates of one beam as a function of their displacement.
 
-    A load of your own is a subclass, given to a scene by :meth:`skfem_ancf.Scene.add`. It defines
+    A custom load, for :meth:`skfem_ancf.Scene.add`, is a subclass. It defines
 
-    * :meth:`force`, and :meth:`stiffness` if the force depends on the displacement: then it sets
-      ``constant = False``,
-    * :meth:`potential`, if it has one and energies are asked for; else, and if its stiffness is
-      not symmetric, it sets ``symmetric = False``,
-    * :meth:`bind`, if it computes something of the beam: what it needs to act on another mesh,
-      as ``solve_static(adapt=...)`` wants.
+    * :meth:`force`, and :meth:`stiffness` and ``constant = False`` if that depends on
+    displacements, * :meth:`potential`, or ``symmetric = False`` if its stiffness is not symmetric,
+    * :meth:`bind`, if it computes something of the beam, as it needs to act on another mesh.
 
     Parameters
     ----------

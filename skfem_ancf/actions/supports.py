@@ -36,13 +36,6 @@ class Support(Item):
         load.
     beam
         The beam, its name or its number, in a scene of several.
-
-    Raises
-    ------
-    NameUnknown
-        If a name is not known; the message lists the known ones.
-    SupportError
-        If a degree of freedom is given two displacements.
     """
 
     # of a bound one: numbers of the degrees of freedom in the scene, and their names

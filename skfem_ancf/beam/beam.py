@@ -85,7 +85,7 @@ class Beam(Immutable):
         What messages and multi-beam scenes call the beam.
     compiled
         Use the kernels compiled by Numba, if it is installed and they apply; the results agree to
-        round-off. The environment variable ``SKFEM_ANCF_COMPILED=0`` leaves Numba out everywhere.
+        round-off. ``SKFEM_ANCF_COMPILED=0`` in the environment leaves Numba out everywhere.
     fields, tolerance
         For the element "auto": names of section fields that will be looked at, and the relative
         error that the beam theory may have.
@@ -102,13 +102,6 @@ class Beam(Immutable):
         Reference points, (2, npoints) or (2, nelements, npoints).
     tind
         Elements, shape (nelements,), or None for all.
-
-    Raises
-    ------
-    InputError
-        If an argument is of the wrong kind or out of range.
-    NameUnknown
-        If the formulation is not known.
 
     Examples
     --------
@@ -156,11 +149,6 @@ class Beam(Immutable):
 
     def replace(self, **changes: Any) -> Beam:
         """The same beam with some arguments of its constructor changed, as ``width=...``.
-
-        Raises
-        ------
-        NameUnknown
-            If an argument is not known.
 
         Examples
         --------
@@ -268,11 +256,6 @@ class Beam(Immutable):
             :func:`skfem_ancf.mesh.places.facets_of`.
         names
             Their names, as ``"r^1"``, or without component, as ``"r"``; None for all.
-
-        Raises
-        ------
-        NameUnknown
-            If a name is not known; the message lists the known ones.
         """
         facets = np.unique(facets_of(self.mesh, boundary))
         if facets[-1] >= self.mesh.p.shape[1]:  # sections have the numbers of their nodes

@@ -54,11 +54,6 @@ class RigidBody(Immutable):
     u, v
         Displacement of the degrees of freedom and its rate, shape (4,) or (..., 4).
 
-    Raises
-    ------
-    InputError
-        If a number is not finite, or mass or inertia are not positive.
-
     References
     ----------
     Garcia de Jalon, Bayo: "Kinematic and dynamic simulation of multibody systems", Springer (1994),
@@ -202,17 +197,9 @@ class RigidBody(Immutable):
         return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
 
     def probe(self, at: Any) -> tuple[Array, Array]:
-        """Numbers and weights of the degrees of freedom in the position of a material point.
+        """Numbers and weights (2, 3) of the degrees of freedom in the position of a material point.
 
-        Parameters
-        ----------
-        at
-            Its place (x, y) at the start; None for the centre of mass.
-
-        Returns
-        -------
-        dofs, weights
-            Shape (2, 3) both: ``sum(q[dofs] * weights, axis=1)`` is the position.
+        ``sum(q[dofs] * weights, axis=1)`` is the position; None is the centre of mass.
         """
         a, b = self.local(self.place(at))
         return np.array([[0, 2, 3], [1, 3, 2]]), np.array([[1.0, a, -b], [1.0, a, b]])

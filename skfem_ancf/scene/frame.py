@@ -162,17 +162,9 @@ class Frame(Scene):
             for each line, in ``sections`` for each line of the group. Functions of material
             coordinates (x, y), as of a width or a modulus, take this s for x.
 
-        Raises
-        ------
-        MeshError
-            If a line joins an unknown point, has no length, or is there twice; if a point is in
-            no line, or two are at one place with ``tol=0``.
-        InputError
-            If an argument is of the wrong kind.
-
         Examples
         --------
-        A portal with haunches, whose girder is of constant height in the middle:
+        A portal with haunches:
 
         >>> import numpy as np
         >>> from skfem_ancf import Frame, StVenantKirchhoff
@@ -185,15 +177,6 @@ class Frame(Scene):
         >>> state = hall.clamp([0, 3]).line_load((0, -1e5), beam="girder").solve_static()
         >>> round(float(hall.rotations(state)[1]), 5)
         -0.00188
-
-        An arch:
-
-        >>> arch = Frame.from_lines([(-1, 0), (1, 0)], [(0, 1)], elements=8, height=0.01, width=0.1,
-        ...                         curves={0: lambda s: np.array([-np.cos(np.pi * s),
-        ...                                                        np.sin(np.pi * s)])},
-        ...                         material=StVenantKirchhoff(E=2e11, nu=0.3))
-        >>> round(float(arch.beams[0].mesh.lengths.sum()), 6)
-        3.141593
         """
         require_options("Frame.from_lines", beam, ("points", "lines", "groups", "nodes", "hinges",
                                                    "curves", "elements", "sections", "tol", *BEAM))
@@ -220,13 +203,6 @@ class Frame(Scene):
             overlap. By default those that are named in ``sections``, and those that share no line
             with another set. Names that meshio writes into files without sets, as numbers called
             "column-girder", are read if one of them is named here or in ``sections``.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        MeshError
-            If it holds no lines, or cells of other kinds, or as for :meth:`from_lines`.
 
         Examples
         --------
@@ -311,11 +287,6 @@ class Frame(Scene):
             Nodes, see :meth:`nodes`.
         *what
             Of "x", "y" and "angle".
-
-        Raises
-        ------
-        InputError
-            If the rotation is held of a node at which all lines are hinged.
         """
         return self._hold(place, require_names("what is held", list(what), HELD))
 
@@ -345,11 +316,6 @@ class Frame(Scene):
             factor, for motions as well.
         angle
             The rotation in radians, counterclockwise, of any size; in the same way.
-
-        Raises
-        ------
-        InputError
-            If nothing is given, or the rotation of a node at which all lines are hinged.
 
         Examples
         --------
@@ -448,11 +414,6 @@ class Frame(Scene):
             Of a Scene; of a frame None.
         amplitude
             A function of time by which the moment is multiplied in a motion.
-
-        Raises
-        ------
-        InputError
-            If all lines are hinged at one of the nodes.
         """
         _no_beam(beam)
         M = require_finite_scalar("M", M)
@@ -474,11 +435,6 @@ class Frame(Scene):
             As for :meth:`Scene.follower_force`.
         line
             The number of the line whose tangent it is, where several meet.
-
-        Raises
-        ------
-        InputError
-            If the axes of several lines are nearest to the point and none is named.
         """
         points = self.system.points
         if line is not None:

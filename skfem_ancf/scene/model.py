@@ -175,23 +175,13 @@ class Model:
         return bound
 
     def add(self, item: Item) -> Self:
-        """Add a load, a support, a joint, a force element, or an item of your own.
+        """Add a load, a support, a joint, a force element, or a custom item.
 
         Parameters
         ----------
         item
             An :class:`~skfem_ancf.Item`. The scene keeps it as it is now, and binds a copy to its
             beams; on another mesh, as for ``solve_static(adapt=...)``, it is bound again.
-
-        Returns
-        -------
-        Scene
-            Itself. Ask a State or History for the force of a joint with ``joint_force(item)``.
-
-        Raises
-        ------
-        InputError
-            If it is none, or does not keep to the protocol.
 
         Examples
         --------
@@ -257,11 +247,6 @@ class Model:
         **options
             Arguments of the joint's class, where it is given by its name.
 
-        Returns
-        -------
-        Joint
-            Ask a State or History for its force with ``joint_force(joint)``.
-
         Raises
         ------
         NameUnknown
@@ -283,16 +268,6 @@ class Model:
             mass.
         name
             What messages call the joint.
-
-        Returns
-        -------
-        Joint
-            A :class:`~skfem_ancf.Hinge`.
-
-        Raises
-        ------
-        InputError
-            If a place is of no beam and no body, or of several.
 
         Examples
         --------
@@ -320,11 +295,6 @@ class Model:
             What messages call the joint.
         apart
             Allow that the points are apart in the stress-free state: the weld draws them together.
-
-        Returns
-        -------
-        Joint
-            A :class:`~skfem_ancf.Weld`.
         """
         return self.joint(Weld(*joined(self.layout, places), name, apart))
 
@@ -347,19 +317,6 @@ class Model:
             carries a moment.
         name
             What messages call the joint.
-
-        Returns
-        -------
-        Joint
-            A :class:`~skfem_ancf.Sleeve`, whose ``distance(state.u)`` says where along the axis
-            the point is, or a :class:`~skfem_ancf.Slot`.
-
-        Raises
-        ------
-        InputError
-            If the point is not on the axis.
-        ConvergenceError
-            When solving, if the point leaves the beam at an end.
         """
         return self.joint(slider(self.layout, at, on, direction, angle, name))
 

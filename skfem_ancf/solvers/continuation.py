@@ -34,11 +34,10 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     """Follow the equilibrium path from the stress-free state or from a bifurcation point.
 
     Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
-    displacement over the size of the scene, with the load factor as an unknown, so that the path
-    may turn in load and in displacement. Where loads move no node, as heat between walls, the
-    strain that their forces could cause counts in it, too. Steps become shorter where the path or
-    its load turns and where iterations multiply. The geometric part of the tangent uses the carried
-    stress, as in :func:`~skfem_ancf.solvers.newton.solve_static`.
+    displacement over the size of the scene, with the load factor as an unknown. Where loads move no
+    node, as heat between walls, the strain that their forces could cause counts in it, too. Steps
+    become shorter where the path or its load turns and where iterations multiply. The geometric
+    part of the tangent uses the independent stress of the mixed iteration.
 
     Where the load turns, or the number of negative eigenvalues of the tangent stiffness changes,
     the limit or bifurcation point is solved for within its step.
@@ -75,13 +74,6 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     Returns
     -------
     points, critical : list of Point, list of Critical
-
-    Raises
-    ------
-    InputError
-        If an argument is out of range.
-    ConvergenceError
-        If the arc length falls below ``1e-6 ds``; ``state`` is the two lists so far.
 
     References
     ----------

@@ -77,9 +77,9 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
         Displacement to start from, shape (N,); the stress-free state by default. Load steps lead
         from it to the equilibrium under the full load, whatever holds it in its place.
     method
-        "auto": the strategies in order. "mixed": the geometric part of the tangent uses a stress
-        that is carried from one iterate to the next by its linearisation. "newton": it uses the
-        stress of the strain. The solution is the same.
+        "auto": the strategies in order. "mixed": the geometric part of the tangent uses an
+        independent stress, which follows its linearisation. "newton": it uses the stress of the
+        strain. The solution is the same.
     tol
         Relative error of a correction in the energy norm.
     max_iterations
@@ -95,10 +95,6 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
         :func:`~skfem_ancf.solvers.descent.descend`. False takes any.
     memory
         What load steps had left behind at obstacles, at the displacement ``u``; shape (n,).
-
-    Returns
-    -------
-    StaticResult
 
     Raises
     ------

@@ -63,11 +63,6 @@ def sweep(build: Callable[..., Any],
     progress
         Show a bar: True, False, or None: on a terminal, after a second, if tqdm is installed.
 
-    Returns
-    -------
-    Sweep
-        Arrays by name, in the order of the parameters.
-
     Raises
     ------
     InputError
@@ -80,13 +75,6 @@ def sweep(build: Callable[..., Any],
         If all members fail.
     Interrupted
         By Ctrl-C; its ``state`` is the Sweep so far, and the file holds it too.
-
-    Warns
-    -----
-    SweepWarning
-        If members fail.
-    CheckpointWarning
-        If the file cannot be written any more: the results are in what is returned.
 
     Examples
     --------
@@ -103,12 +91,6 @@ def sweep(build: Callable[..., Any],
     >>> result = sweep(build, {"E": [1e9, 2e9, 4e9, 8e9]}, tip)
     >>> EI = result["E"] * 0.01**4 / 12
     >>> bool(np.allclose(result["value"], -0.01 / (3 * EI), rtol=1e-4))
-    True
-
-    The same, by saying what is read:
-
-    >>> again = sweep(build, {"E": [1e9, 2e9, 4e9, 8e9]}, ("displacement", (1, 0)))
-    >>> bool(np.allclose(again["value"][:, 1], result["value"], rtol=1e-9))
     True
     """
     require_function("build", build, "of the parameters that returns a scene")

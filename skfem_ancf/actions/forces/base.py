@@ -37,13 +37,11 @@ class Part(NamedTuple):
 class ForceElement(Item):
     """A force on points and sections of beams, of their places, velocities and time.
 
-    An element of your own is a subclass that defines :meth:`bind` and :meth:`force`, and perhaps
-    :meth:`potential`, :meth:`stiffness` and :meth:`resistance`; :meth:`skfem_ancf.Scene.add` takes
-    it. It works in statics, where velocities are zero and time is the load factor, in motions, in
-    natural frequencies, and in compiled loops, which call it. It is not scaled with the loads.
-
-    The energy-momentum scheme keeps the energy if there is a :meth:`potential`; the work of what
-    depends on velocities is in ``history.dissipated``.
+    A custom element, for :meth:`skfem_ancf.Scene.add`, is a subclass that defines :meth:`bind` and
+    :meth:`force`, and perhaps :meth:`potential`, :meth:`stiffness` and :meth:`resistance`. In
+    statics velocities are zero. It is not scaled with the loads. The energy-momentum scheme keeps
+    the energy if there is a :meth:`potential`; the work of what depends on velocities is in
+    ``history.dissipated``.
 
     Attributes
     ----------

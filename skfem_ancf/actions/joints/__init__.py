@@ -39,11 +39,6 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
         A name from :data:`JOINTS`, or a Joint.
     **options
         Arguments of the joint's class, where it is given by its name.
-
-    Raises
-    ------
-    NameUnknown
-        If the name is not known; the message lists the known ones.
     """
     if isinstance(joint, Joint):
         return joint

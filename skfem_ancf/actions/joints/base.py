@@ -46,10 +46,9 @@ class Joint(Item):
     the displacement of all coordinates of the scene. The multipliers are the forces (or moment)
     that the joint exerts, in the order of :attr:`equations`.
 
-    A joint of your own is a subclass that sets :attr:`equations` and defines :meth:`bind`,
-    :meth:`value`, :meth:`jacobian` or :meth:`entries`, and :meth:`curvature` if it is not constant;
-    :meth:`skfem_ancf.Scene.add` takes it. The scene keeps a copy and binds others: one to its own
-    beams, and one to those of each finer mesh of ``solve_static(adapt=...)``.
+    A custom joint, for :meth:`skfem_ancf.Scene.add`, is a subclass that sets :attr:`equations` and
+    defines :meth:`bind`, :meth:`value`, :meth:`jacobian` or :meth:`entries`, and :meth:`curvature`
+    if it is not constant.
 
     Attributes
     ----------

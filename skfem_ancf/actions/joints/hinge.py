@@ -26,11 +26,6 @@ class Hinge(Joint):
         are apart. None is the centre of mass of a rigid body.
     name
         What messages call the joint.
-
-    References
-    ----------
-    Eq. (26) of "A series of locking-free beam element models in absolute nodal coordinate
-    formulation", Archive of Applied Mechanics (2024).
     """
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:

@@ -33,11 +33,6 @@ class Motor(Item):
     other
         What the motor stands on, as ``at``: the angle is measured from it, and it takes the torque
         with the opposite sign. The ground by default.
-
-    Raises
-    ------
-    InputError
-        Unless one of angle, speed and torque is given.
     """
 
     def __init__(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,

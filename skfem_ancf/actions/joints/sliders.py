@@ -72,11 +72,6 @@ class Sleeve(Joint):
     name
         What messages call the joint.
 
-    Raises
-    ------
-    InputError
-        If the point is not on the axis in the stress-free state.
-
     References
     ----------
     Hong, Ren: "Modeling of sliding joint on one-dimensional flexible medium", Multibody System

@@ -35,11 +35,6 @@ class Weld(Joint):
         What messages call the joint.
     apart
         Allow that the points are apart in the stress-free state: the weld draws them together.
-
-    Raises
-    ------
-    InputError
-        If the points are apart.
     """
 
     constant = False

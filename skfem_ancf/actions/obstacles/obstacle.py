@@ -60,9 +60,8 @@ class Obstacle(ForceElement):
     Parameters
     ----------
     shape
-        A :class:`~skfem_ancf.actions.obstacles.Circle`,
-        :class:`~skfem_ancf.actions.obstacles.Line`, :class:`~skfem_ancf.actions.obstacles.Polygon`
-        or :class:`~skfem_ancf.actions.obstacles.SignedDistance`.
+        A :class:`~skfem_ancf.Circle`, :class:`~skfem_ancf.Line`, :class:`~skfem_ancf.Polygon` or
+        :class:`~skfem_ancf.SignedDistance`.
     friction
         Coulomb's coefficient, zero or positive.
     stiffness

@@ -307,10 +307,6 @@ class SignedDistance(Shape):
     pivot
         The point about which it turns, where its angle depends on time; shape (2,).
 
-    Notes
-    -----
-    It is called in Python: a scene with one runs in NumPy.
-
     Examples
     --------
     A floor with waves:
