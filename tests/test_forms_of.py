@@ -8,7 +8,7 @@ from skfem.helpers import dot
 from skfem.utils import mpc
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam,
-                        NeoHookean, Scene, StVenantKirchhoff, forms, reference_coordinates)
+                        NeoHookean, Scene, Section, StVenantKirchhoff, forms, reference_coordinates)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
 
@@ -216,3 +216,42 @@ def test_beside_a_nonlinear_form_that_jax_differentiates():
     K, f = strain.assemble(beam.basis, x=q)
     assert close(-asm(own.internal_force, beam.basis, r=q), f)  # it is a right-hand side
     assert close((asm(own.tangent, beam.basis, r=q) + K).toarray(), 2.0 * K.toarray())
+
+# the strain energy as an Energy
+
+SECTIONS = {
+    "straight": dict(mesh=MeshBeam.init_line([0.0, 0.5, 1.2], 0.2, angle=0.4), width=0.3),
+    "arc": dict(mesh=BODIES["arc"](), width=0.3),
+    "taper": dict(mesh=MeshBeam.init_line([0.0, 0.5, 1.2], height=lambda s: 0.2 - 0.05 * s),
+                  width=lambda x, y: 0.3 + 0.1 * x),
+    "layers": dict(mesh=MeshBeam.init_line([0.0, 0.5, 1.2], 0.2), section=Section.layers(
+        (0.05, LAWS["svk-strain"]), (0.15, LAWS["neo"]), width=0.3)),
+}
+
+
+@pytest.mark.parametrize("law", ["svk", "neo"])
+@pytest.mark.parametrize("name", SECTIONS)
+@pytest.mark.parametrize("element", ["ancf-2", "cubic-2"])
+def test_the_strain_energy_is_an_energy(element, name, law):
+    """Of kernels and forms, of a law in NumPy at the points of full integration."""
+    options = dict(SECTIONS[name])
+    if name != "layers":
+        options["material"] = LAWS[law]
+    beam = Beam(element=SHAPES[element](), formulation="continuum", **options)
+    energy, u = forms.strain_energy(beam).bind(beam), coordinates(beam) - beam.q0
+    own = forms.of(beam)
+    assert energy.potential(u) == pytest.approx(beam.kernel.energy(u), rel=1e-12)
+    assert close(-energy.force(u), asm(own.internal_force, beam.basis, r=beam.q0 + u), 1e-12)
+    i, j, v = energy.stiffness(u)
+    K = np.zeros((beam.N, beam.N))
+    np.add.at(K, (i, j), -v)
+    assert close(K, asm(own.tangent, beam.basis, r=beam.q0 + u).toarray(), 1e-12)
+
+
+def test_a_beam_with_its_strain_energy_twice_is_twice_as_stiff():
+    one = Beam(SHORT.mesh, SHORT.element, SHORT.material, 0.05, "continuum")
+    state = Scene(one).clamp("left").add(forms.strain_energy(one)).point_force(
+        (0.0, -60.0), at=(1, 0)).solve_static()
+    half = Scene(one).clamp("left").point_force((0.0, -30.0), at=(1, 0)).solve_static()
+    assert np.allclose(state.u, half.u, rtol=0, atol=1e-9)
+    assert state.strain_energy == pytest.approx(2.0 * half.strain_energy, rel=1e-9)

@@ -113,8 +113,8 @@ def test_files_and_classes_are_of_a_size_to_be_read():
 
 #: From the ground up: a folder imports from those below its floor.
 FLOORS = [["core"], ["mesh", "materials", "sweeps"], ["elements"],
-          ["sections", "formulations", "forms"], ["beam"], ["actions", "recovery"],
-          ["equations", "io", "visuals"], ["results"], ["solvers", "dynamics"], ["scene"]]
+          ["sections", "formulations"], ["beam"], ["actions", "recovery"],
+          ["equations", "forms", "io", "visuals"], ["results"], ["solvers", "dynamics"], ["scene"]]
 FLOOR = {folder: height for height, folders in enumerate(FLOORS) for folder in folders}
 
 

@@ -142,11 +142,14 @@ class Energy(Density):
         if not getattr(beam, "has_sections", False):
             raise InputError(f"an Energy acts on elements with sections, as ElementBeamANCF(2), "
                              f"with positions linear in the degrees of freedom; not on {beam!r}")
-        bound = self._with(beam=beam, _parts=_parts_of(beam, self.over))
+        bound = self._with(beam=beam, _parts=self._points(beam))
         beside(bound._require_derivatives, beam.sizes)
         if self.check:
             bound._require_invariance()
         return bound
+
+    def _points(self, beam):
+        return _parts_of(beam, self.over)
 
     # the density and its derivatives at the six variables y, (6, n, np)
 
@@ -356,8 +359,12 @@ def _parts_of(beam, over):
 
 def _points(beam, elements, X, weights, of):
     """Points at reference places X (2, np) of elements (n,)."""
-    mesh, mapping = beam.mesh, beam.mesh.mapping()
-    dofs = (beam.nd * mesh.t[:, elements].T[:, :, None] + np.arange(beam.nd)).reshape(
-        len(elements), -1)
-    return points_of(dofs, np.asarray(mapping.F(X, elements)), weights,
+    mapping = beam.mesh.mapping()
+    return points_of(element_dofs(beam, elements), np.asarray(mapping.F(X, elements)), weights,
                      *beam.element.functions(mapping, X, elements), of)
+
+
+def element_dofs(beam: Beam, elements: Array) -> Array:
+    """Degrees of freedom (n, 2 nb) of elements (n,)."""
+    return (beam.nd * beam.mesh.t[:, elements].T[:, :, None] + np.arange(beam.nd)).reshape(
+        len(elements), -1)

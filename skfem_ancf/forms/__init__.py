@@ -15,13 +15,14 @@ field, with the degrees of freedom passed as ``r``:
 >>> K.shape, bool(abs(asm(forms.internal_force(steel, width=0.1), basis, r=q)).max() < 1e-3)
 ((24, 24), True)
 
-There are three kinds, which agree where they are the same integral:
+There are four kinds, which agree where they are the same integral:
 
 * :func:`textbook_energy`, :func:`textbook_internal_force`, :func:`textbook_tangent`: the
   mathematics as it is written down, for scikit-fem's assembly of one pair of local functions
   after the other. The others are tested against them.
 * :func:`energy`, :func:`internal_force`, :func:`tangent`: the same, contracted for all local
   functions at once.
+* :func:`strain_energy`: the first of these as an :class:`~skfem_ancf.Energy`, for a scene.
 * :func:`of`: what a Beam's own formulation makes of them, whatever it samples and stabilises: the
   forms that :class:`~skfem_ancf.Scene` solves with.
 
@@ -30,12 +31,14 @@ with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's l
 """
 
 from .own import BeamForms, Position, of, position
+from .strain import StrainEnergy, strain_energy
 from .weak import (BeamBilinearForm, BeamLinearForm, EnergyForm, ModuliForm, StressForm,
                    deformation_gradient, energy, gravity, green_lagrange, internal_force, mass,
-                   pressure, strain_variation, tangent, textbook, textbook_energy,
-                   textbook_internal_force, textbook_tangent, traction)
+                   moduli_of, piola, pressure, strain_variation, tangent, textbook,
+                   textbook_energy, textbook_internal_force, textbook_tangent, traction)
 
 __all__ = ["BeamBilinearForm", "BeamForms", "BeamLinearForm", "EnergyForm", "ModuliForm",
-           "Position", "StressForm", "deformation_gradient", "energy", "gravity", "green_lagrange",
-           "internal_force", "mass", "of", "position", "pressure", "strain_variation", "tangent",
-           "textbook", "textbook_energy", "textbook_internal_force", "textbook_tangent", "traction"]
+           "Position", "StrainEnergy", "StressForm", "deformation_gradient", "energy", "gravity",
+           "green_lagrange", "internal_force", "mass", "moduli_of", "of", "piola", "position",
+           "pressure", "strain_energy", "strain_variation", "tangent", "textbook",
+           "textbook_energy", "textbook_internal_force", "textbook_tangent", "traction"]

@@ -80,6 +80,39 @@ def _law(material, k_s):
     return material.law(require_positive("k_s", k_s))
 
 
+def piola(law: Any, F: Array, frame: Array) -> Array:
+    """The first Piola-Kirchhoff stress of a law, ``d W / d (d r_i / d X_j)``.
+
+    Parameters
+    ----------
+    law
+        A material's law.
+    F, frame
+        Deformation gradient in the beam's frame, and the frame, (2, 2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (2, 2, ...).
+    """
+    return np.einsum("iJ...,JK...,jK...->ij...", F, _tensor(law.stress(green_lagrange(F))), frame)
+
+
+def moduli_of(law: Any, F: Array, frame: Array) -> Array:
+    """The derivatives of :func:`piola` by the deformation gradient, shape (2, 2, 2, 2, ...).
+
+    Parameters
+    ----------
+    law, F, frame
+        As there.
+    """
+    eps = green_lagrange(F)
+    D, S = _voigt_to_tensor(law.moduli(eps)), _tensor(law.stress(eps))
+    A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)
+    A = A + np.einsum("ik,JL...->iJkL...", np.eye(2), S)
+    return np.einsum("jJ...,iJkL...,lL...->ijkl...", frame, A, frame, optimize=True)
+
+
 # the textbook's forms
 
 
@@ -246,9 +279,7 @@ def internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> 
 
     @StressForm
     def force(w):
-        F = deformation_gradient(w.r, w.frame)
-        S = _tensor(law.stress(green_lagrange(F)))
-        return width * np.einsum("iJ...,JK...,jK...->ij...", F, S, w.frame)
+        return width * piola(law, deformation_gradient(w.r, w.frame), w.frame)
 
     return force
 
@@ -265,12 +296,7 @@ def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> Bilinea
 
     @ModuliForm
     def stiffness(w):
-        F = deformation_gradient(w.r, w.frame)
-        eps = green_lagrange(F)
-        D, S = _voigt_to_tensor(law.moduli(eps)), _tensor(law.stress(eps))
-        A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)
-        A = A + np.einsum("ik,JL...->iJkL...", np.eye(2), S)
-        return width * np.einsum("jJ...,iJkL...,lL...->ijkl...", w.frame, A, w.frame, optimize=True)
+        return width * moduli_of(law, deformation_gradient(w.r, w.frame), w.frame)
 
     return stiffness
 
