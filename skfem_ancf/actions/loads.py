@@ -18,7 +18,7 @@ from ..beam.beam import Beam
 from ..beam.distribution import Spread, on_facets, stations_of_vector
 from ..beam.domain import Domain
 from ..beam.kinematics import locate, probe
-from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
+from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
@@ -591,17 +591,12 @@ class EndMoment(Load):
         return out
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        n = self.c.size
-        own = np.arange(2 * n).reshape(n, 2).T  # as if there were no other coordinates
-        lower = np.zeros(2 * n * 2 * n)
-        at = u[self.dofs.T].ravel()
-        add_moment_stiffness(self._pack._replace(dofs=own[None]), np.ones(1), at, lower, 2 * n)
-        i, j = np.tril_indices(2 * n)
-        values = -lower[j * 2 * n + i - j]
-        rows, cols = self.dofs.T.ravel()[i], self.dofs.T.ravel()[j]
-        off = i != j
-        return (np.append(rows, cols[off]), np.append(cols, rows[off]),
-                np.append(values, values[off]))
+        x, y = self.direction(u)
+        D = np.array([[2.0 * x * y, y * y - x * x], [y * y - x * x, -2.0 * x * y]])
+        values = np.einsum("ij,k,l->ikjl", self.M / (x * x + y * y) ** 2 * D, self.c, self.c)
+        rows = np.broadcast_to(self.dofs[:, :, None, None], values.shape)
+        columns = np.broadcast_to(self.dofs[None, None], values.shape)
+        return rows.ravel(), columns.ravel(), values.ravel()
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         out = np.zeros(self.beam.N)

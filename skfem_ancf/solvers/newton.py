@@ -165,7 +165,7 @@ class Search:
             self._spent = 0
             try:
                 result = strategy.run(self)
-                if result is not None:
+                if result:
                     self._require_good(result)
             except KeyboardInterrupt:
                 result = self.furthest or self._beginning(self.route)
@@ -176,7 +176,7 @@ class Search:
                 self._unstable = self._unstable or isinstance(failure, Unstable)
                 self._failure = failure
                 continue
-            if result is not None:
+            if result:
                 self._note(strategy.name)
                 return self._done(result)
         if self._folded is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout, WhichMember
 from ...beam.rigid import on_body
-from ...core.errors import (ask_array, ask_number, require_finite_scalar, require_function,
+from ...core.errors import (ask_number, require_finite_scalar, require_function,
                             require_label)
 from ...core.sampling import sample
 from ...core.types import Array
@@ -50,14 +49,13 @@ class PrescribedPosition(Joint):
 
     def bind(self, layout: Layout) -> None:
         self.r = point(layout, self.beam, self.at)
-        self._motion = partial(sample, self.motion, name="r", shape=(2,))
         self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
-        return self.r(u) - ask_array("r(t={:g})", (2,), self.motion, t)
+        return self.r(u) - sample(self.motion, np.array([t]), "r", (2,))[0]
 
     def offset(self, times: Array, N: int) -> Array:
-        return self.r.start - self._motion(times)
+        return self.r.start - sample(self.motion, times, "r", (2,))
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
@@ -92,21 +90,15 @@ class PrescribedAngle(Joint):
     def bind(self, layout: Layout) -> None:
         _, self.d = section(layout, self.beam, self.at)
         self.start = np.arctan2(*self.d.start[::-1])
-        self._angles = partial(sample, self.angle, name="angle", shape=())
-
-    def _angle(self, t: float) -> float:
-        return ask_number("angle(t={:g})", self.angle, t)
 
     def value(self, u: Array, t: float) -> Array:
-        a, d = self.start + self._angle(t), self.d(u)
-        return np.array([np.cos(a) * d[1] - np.sin(a) * d[0]])
+        return self._normals(np.array([t])) @ self.d(u)
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        a = self.start + self._angle(t)
-        return gradients([(self.d, (-np.sin(a), np.cos(a)))])
+        return gradients([(self.d, self._normals(np.array([t]))[0])])
 
     def _normals(self, times: Array) -> Array:
-        a = self.start + self._angles(times)
+        a = self.start + sample(self.angle, times, "angle", ())
         return np.column_stack([-np.sin(a), np.cos(a)])
 
     def offset(self, times: Array, N: int) -> Array:
