@@ -26,22 +26,11 @@ MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 
 class Grid(NamedTuple):
-    """One beam or rigid body on points.
+    """One beam or rigid body on points: reference positions ``x`` and displacements ``u``, (2, n).
 
-    Attributes
-    ----------
-    name : str
-        Its name, or "beam 0", "body 0" and so on.
-    x, u
-        Reference positions of the points, and their displacement, (2, n).
-    kind : str
-        What meshio calls the cells: "quad", "VTK_LAGRANGE_QUADRILATERAL", or "polygon".
-    cells, elements
-        Cells as rows of point numbers, shape (nc, k), and their elements, (nc,).
-    rows : int
-        Points across a section, which follow each other.
-    values
-        The :class:`~skfem_ancf.recovery.fields.Values` of a beam; None of a rigid body.
+    ``kind`` is what meshio calls the cells: "quad", "VTK_LAGRANGE_QUADRILATERAL", or "polygon";
+    ``cells`` (nc, k) are rows of point numbers, ``elements`` (nc,) their elements. ``rows`` points
+    across a section follow each other. ``values`` are the :class:`~.fields.Values` of a beam.
     """
 
     name: str
@@ -60,8 +49,9 @@ class Grid(NamedTuple):
 
 def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
           recover: bool = True) -> list[Grid]:
-    """The :class:`Grid` of each beam and rigid body of a state, or of anything with its ``beams``
-    and ``u_of``; ``subdivide`` says how many quads an element has, or it is one Lagrange cell.
+    """The :class:`Grid` of each beam and rigid body of a state.
+
+    ``subdivide`` says how many quads an element has along and across, or it is one Lagrange cell.
     """
     require_like("state", state, "State", "beams", "u_of")
     m, n = subdivision(subdivide)
@@ -123,8 +113,7 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
     """Points and quads of an element with m and n intervals along and across.
 
     There is at least one interval for each piece of the section; where fields jump across it there
-    are points on both sides. Points have the shape (2, npoints), or (2, nelements, npoints) where
-    pieces are other parts of the height from place to place.
+    are points on both sides. Points are (2, npoints), or (2, nelements, npoints) where pieces move.
     """
     sizes = np.diff(beam.across.ends())
     if len(sizes) == 1:
@@ -145,8 +134,7 @@ def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
     """Points of the Lagrange cell that holds an element, and their order in VTK.
 
     VTK numbers the corners, then the inner points of the edges bottom, right, top, left (in the
-    directions of rising xi and eta), then the inside with xi fastest. An axis of a degree beyond
-    those of VTK is interpolated by the highest there is.
+    directions of rising xi and eta), then the inside with xi fastest.
     """
     p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
     if p > MAX_LAGRANGE_DEGREE:

@@ -60,9 +60,7 @@ ACROSS, MORE, FEW, ROUND = 7, 2, 5, 17
 
 
 class ArcLength:
-    """Arc length along the reference axis of a beam; ``nodes`` (ne + 1,) at the ends of
-    elements.
-    """
+    """Arc length along the reference axis of a beam; ``nodes`` (ne + 1,) at ends of elements."""
 
     def __init__(self, beam: Beam) -> None:
         x, w = gauss(ALONG)
@@ -116,19 +114,12 @@ class Interval(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points across given sections: arrays (n, m), or (m,) where all sections are alike.
+    """Points across sections: arrays (n, m), or (m,) where all sections are the same.
 
-    Attributes
-    ----------
-    eta
-        Where they are across.
-    stretch
-        Length of their interval, relative to the longest.
-    drift, swell
-        Derivatives of eta and of the logarithm of the stretch by the height.
-    axis, till_axis
-        From values at the points to that on the axis, and to their integral over the longest
-        intervals from the lowest place to the axis.
+    ``eta`` is where they are, ``stretch`` the length of their interval over the longest; ``drift``
+    and ``swell`` are derivatives of eta and of the logarithm of the stretch by the height. ``axis``
+    and ``till_axis`` lead from values at the points to that on the axis, and to their integral over
+    the longest intervals from the lowest place to the axis.
     """
 
     eta: Array
@@ -140,24 +131,14 @@ class Points(NamedTuple):
 
 
 class Intervals:
-    """Points across a section of given slabs, with integrals and values of fields given there.
+    """Points ``eta`` (m,) across a section of layers, with integrals and values of fields.
 
-    The intervals of some tapered sections are other parts of the height from place to place
-    (``moves``). Their points are then given where the section is highest; :meth:`points` has them
-    elsewhere.
-
-    Attributes
-    ----------
-    eta
-        The points, shape (m,); those of several intervals are inside of them.
-    slabs
-        For each slab the columns of its points.
-    width
-        Width of a slab at the points over its mean, area by height, shape (m,).
-    from_bottom, whole
-        From values to the integrals over eta from 0 to the points, (m, m), and to 1, (m,).
-    bottom, top
-        From values to those at the lowest and the highest place, shape (m,).
+    The intervals of some tapered sections move: they are other parts of the height from place to
+    place. Their points are then given where the section is highest; :meth:`points` has them
+    elsewhere. ``layers`` are the columns of the points of each layer, ``width`` (m,) is its width
+    there over its mean. ``from_bottom`` (m, m) and ``whole`` (m,) lead from values to integrals
+    over eta from 0 to the points, and to 1; ``bottom`` and ``top`` to the values at the lowest and
+    highest place.
     """
 
     def __init__(self, layers: Sequence[Layer], order: int) -> None:
@@ -251,8 +232,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
                      tol: float = 1e-10) -> Array:
     """The strain of a given stress under a law, by Newton's method; both (3, ...).
 
-    Neighbouring components ``unknown`` are found, the others stay as they are in ``strain``;
-    ``tol`` is relative to the largest stress. Raises NotRecovered if there is no such strain.
+    Neighbouring components ``unknown`` are found, the others stay as they are in ``strain``.
     """
     k = list(unknown)
     strain = np.array(strain, dtype=np.result_type(strain, stress, float))
@@ -286,14 +266,9 @@ def _axial(law, strain):
 
 
 class Recovery:
-    """The recovered field of one beam; raises NotRecovered if there is none.
+    """The recovered field of one beam, a :class:`~.segments.Segment` between each two cuts.
 
-    Attributes
-    ----------
-    why : str
-        Why there are section forces, but no fields; "" if there are.
-    segments
-        The :class:`~skfem_ancf.recovery.segments.Segment` between each two cuts.
+    ``why`` says why there are section forces, but no fields; "" if there are.
     """
 
     def __init__(self, forces: SectionForces, u: Array) -> None:
@@ -381,9 +356,7 @@ class Recovery:
         return np.clip(found, 0, len(self.segments) - 1)
 
     def at(self, e: Array, X: Array, rows: slice = slice(7)) -> Array:
-        """Rows of strain, stress and angle (7 in all) at reference points X (2, n) of elements;
-        (rows, n).
-        """
+        """Rows of strain, stress and angle (7 in all) at points X (2, n) of elements; (rows, n)."""
         xi, eta = X
         if self.intervals.moves:
             eta = self.intervals.place(eta, self._heights(e, xi))
@@ -399,12 +372,7 @@ class Recovery:
 
     @staticmethod
     def gradient(strain: Array, angle: Array) -> Array:
-        """The deformation gradient, (2, 2, ...), of (eps_xx, eps_yy, 2 eps_xy) and the fibres'
-        angle.
-
-        ``F[:, 0]`` and ``F[:, 1]`` are the derivatives of the position along the axis and across
-        the section, in global components.
-        """
+        """The deformation gradient (2, 2, ...) of a strain (3, ...) and the angle of the fibres."""
         lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
         across = angle + np.arccos(strain[2] / (lam_x * lam_y))
         return np.array([[lam_x * np.cos(angle), lam_y * np.cos(across)],

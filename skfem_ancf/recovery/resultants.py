@@ -108,9 +108,9 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
                chain: int | None = None) -> Resultants:
     """The Resultants of a beam for a displacement ``u`` (N,), which may be a step.
 
-    They follow from the recovery, or without one from the stress of the elements; ``eigen`` are
-    factors and loads of eigenstrains. Sections are at places and elements ``at``, (n,) each, or all
-    along the beam, or along one chain of its elements.
+    They follow from the recovery, or from the stress of the elements; ``eigen`` are factors and
+    loads of eigenstrains. Sections are in elements and at places ``at``, or all along the beam or a
+    chain.
     """
     if at is None:
         e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts)
@@ -173,11 +173,7 @@ def _recovered(recovery, e, xi, after):
 
 
 def _axis(segment):
-    """A spline of angle, stretch and shear of the axis, and the change of curvature.
-
-    The direction of a section is that of 12 / h^3 int Y r dY, of which the derivatives across the
-    section follow from its strain.
-    """
+    """A spline of angle, stretch and shear of the axis, and the change of curvature."""
     eps = segment.strain
     phi, stretch = segment.at_axis(segment.angle), np.sqrt(1.0 + 2.0 * eps[0])
     lam_y = np.sqrt(1.0 + 2.0 * eps[1])

@@ -41,12 +41,11 @@ class NotRecovered(AncfError):
 
 
 class Sections:
-    """Points across sections: their geometry, and what the shape functions are there.
+    """Points ``eta`` across sections at places ``xi`` (n,) of elements ``e`` (n,), and functions
+    there.
 
-    Sections are at places ``xi`` (n,) of elements ``e`` (n,), points at ``eta``, (k,) or (n, k).
     With ``lifted`` points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as its
-    :class:`~skfem_ancf.beam.inertia.Inertia` has them; else all are on the axis. ``mapping`` is
-    from the reference cell to the body, by default that of the mesh.
+    :class:`~skfem_ancf.beam.inertia.Inertia` has them; else all are on the axis.
     """
 
     def __init__(self, beam: Beam, e: Array, xi: Array, eta: Any = 0.5,
@@ -101,27 +100,22 @@ class SectionForces:
     """Force and moment in the sections of one beam, for a displacement ``u`` (N,).
 
     Of linear solutions ``u`` is a :func:`~skfem_ancf.core.linear.step` from the reference
-    configuration, as are the factors of loads; then all results are one. Raises NotRecovered if
-    the state is no equilibrium.
+    configuration, as are the factors of loads; then all results are one. Raises NotRecovered if the
+    state is no equilibrium. Between ``cuts``, axial coordinates element + xi, forces are
+    continuous.
 
     Parameters
     ----------
     loads
-        Pairs of a factor and a :class:`~skfem_ancf.beam.distribution.Spread`, or None for a load
-        whose spread is not known.
+        Pairs of a factor and a :class:`~skfem_ancf.beam.distribution.Spread`, or None.
     stations
-        Where supports and joints act: axial coordinates element + xi.
+        Axial coordinates of supports and joints.
     acceleration
-        Of the coordinates, shape (N,), or None.
+        Of the degrees of freedom, shape (N,), or None.
     sampled
         Further densities of force, :class:`~skfem_ancf.beam.distribution.Sampled`.
     viscous
         Forces of the elements that resist the rate of the strain, shape (ne, nb, 2), or None.
-
-    Attributes
-    ----------
-    cuts
-        Axial coordinates, ends included, between which the section force is continuous.
     """
 
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
@@ -228,9 +222,7 @@ class SectionForces:
         return np.max(np.abs(R)) * self.beam.mesh.height + np.max(np.abs(M))
 
     def viscous_middles(self) -> tuple[Array, Array]:
-        """The part of force (2, ne) and moment (ne,) that resists the rate of the strain, in the
-        middle of elements, where it is most accurate.
-        """
+        """Force (2, ne) and moment (ne,) of the viscous stress in the middle of elements."""
         left, q = (np.split(np.asarray(x), 2, axis=1)[0] for x in (self.viscous, self.q))
         ne = self.beam.mesh.nelements
         r = Sections(self.beam, np.arange(ne), np.full(ne, 0.5)).field(self.q)[..., 0]
@@ -240,8 +232,7 @@ class SectionForces:
     def at(self, e: Array, xi: Array, side: Any) -> tuple[Array, Array]:
         """Force (2, n) and moment (n,) about the axis: of the right part of the beam on the left.
 
-        ``side`` is the end of the element from which the equilibrium is followed: 0, 1, or 0.5 for
-        the mean of both.
+        The equilibrium is followed from the end ``side`` of the element; 0.5 is the mean of both.
         """
         x, w = gauss(ALONG)
         inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
@@ -285,10 +276,7 @@ class SectionForces:
             self._pass_on(e, inside)
 
     def _pass_on(self, e, inside):
-        """The section forces at the ends of an element with a point load, from its neighbours.
-
-        Its own internal force is in equilibrium with the load that its nodes take over.
-        """
+        """The section forces at the ends of an element with a point load, from its neighbours."""
         t = self.beam.mesh.t
         for end, other in ((0, e - 1), (1, e + 1)):
             if e + end in self._acted or other in inside:

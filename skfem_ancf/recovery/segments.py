@@ -35,10 +35,7 @@ INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 
 def smoothed(s: Array, values: Array, length: float) -> Array:
-    """The solution f of ``f - length^2 f'' = values`` with f' = 0 at both ends.
-
-    Places ``s`` (n,) increase; values and f are (..., n, m).
-    """
+    """The solution f (..., n, m) of ``f - length^2 f'' = values`` with f' = 0 at both ends of s."""
     d = np.diff(s)
     w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
     c = length**2 / d
@@ -53,18 +50,9 @@ def smoothed(s: Array, values: Array, length: float) -> Array:
 class Segment:
     """The field between two cuts, at n sections (ends and middles of elements) of m points.
 
-    Attributes
-    ----------
-    s
-        Arc length of the sections, (n,).
-    strain, stress
-        Shape (3, n, m).
-    angle
-        Direction of the fibres along the axis, (n, m), in radians.
-    rate
-        At which the sections turn, (n,).
-    change
-        Of the stretch in the last round.
+    The sections are at arc lengths ``s`` (n,) and turn at the ``rate`` (n,). ``strain`` and
+    ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the fibres along the axis, and
+    ``change`` that of the stretch in the last round.
     """
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
@@ -178,8 +166,7 @@ class Segment:
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """The integral from the axis of the derivative along it, at the same distance from it.
 
-        Values (..., n, m) and their derivative ``d_ds`` are those of points at the same parts of
-        their interval.
+        Values (..., n, m) and ``d_ds`` are those of points at the same parts of their interval.
         """
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
@@ -200,10 +187,7 @@ class Segment:
         return eps + self.E0
 
     def _fibres(self, S):
-        """The strain of a cable's fibres, and their S_xx, with S_yy and S_xy as they are in S.
-
-        Hooke's law is that of stretches: P = E (stretch - 1) along a fibre, S_xx = P / stretch.
-        """
+        """The strain of a cable's fibres, and their S_xx: P / stretch of P = E (stretch - 1)."""
         r, longer = self.recovery, self.stretch - 1.0
         eps = r.strain_of(S, np.array([longer, 0.0 * longer, 0.0 * longer]) - self.E0, (1, 2))
         P = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
@@ -292,10 +276,7 @@ class Segment:
         self._shear()
 
     def _viscous_stress(self):
-        """S_xx and S_xy that resist the rate of the strain: linear in Y, and Jourawski's.
-
-        Those of the section's own force and moment of this part.
-        """
+        """S_xx, linear in Y, and S_xy that resist the rate of the strain."""
         if self.forces.viscous is None:
             return 0.0, 0.0
         N, Q = _turned(self.Rv, self.phi)

@@ -71,11 +71,9 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
 
 def recover(state: Any, number: int, at: list[float], u: Array,
             unit: Any) -> Recovery | NotRecovered:
-    """The recovered field of a beam, which may have a step for its displacement ``u`` (N,), or why
-    there is none.
+    """The recovered field of a beam, or why there is none; ``u`` (N,) may be a step.
 
-    Supports and joints are at its :func:`stations`; ``unit`` is what factors of loads are times: a
-    step where all is linear about the reference configuration, else 1.
+    Supports and joints are at its :func:`stations`; ``unit`` is what factors of loads are times.
     """
     beam, system = state.beams[number], state.system
     if state.base is not None and not np.iscomplexobj(unit):

@@ -16,11 +16,7 @@ _GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths", "heights")
 
 
 def difference(a: Beam, b: Beam) -> str | None:
-    """Why coordinates of one beam mean something else on another, that of the scene; None if they
-    do not.
-
-    Materials, widths and loads do not matter: a displacement is one of the body.
-    """
+    """Why degrees of freedom of a beam mean something else on that of the scene; or None."""
     if a is b or (a.mesh is b.mesh and a.element is b.element):
         return None
     if repr(a.element) != repr(b.element) or not _same(a.element.doflocs, b.element.doflocs):
@@ -44,11 +40,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
-    """The displacement (N,) of a State for the equations of a scene; ``name`` is what messages call
-    it.
-
-    Raises InputError if it is no State, or one of other meshes and elements, or not finite.
-    """
+    """The displacement (N,) of a State, ``name`` in messages, for the equations of a scene."""
     if not isinstance(state, State):
         raise InputError(f"{name} is a State, as solve_static returns it, got "
                          f"{type(state).__name__}; scene.state(u) makes one of coordinates "
@@ -73,10 +65,7 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
 
 
 def configuration(system: System, state: State) -> State:
-    """A State with its multipliers, as one of the equations of a scene.
-
-    Raises InputError as :func:`displacement`, and if it has multipliers of other joints.
-    """
+    """A State with its multipliers, as one of the equations of a scene."""
     u = displacement(system, state, "state")
     if state.system is system:
         return state

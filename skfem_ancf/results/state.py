@@ -250,9 +250,7 @@ class State(Immutable, MaterialPoints):
 
     @cached_property
     def _places(self) -> Array:
-        """Displacement at which fields are evaluated, shape (N,): of a linear solution the
-        :func:`~skfem_ancf.core.linear.step` from its base.
-        """
+        """Where fields are evaluated, (N,): of a linear solution a step from its base."""
         return self.u if self.base is None else step(self.base.u, self.u)
 
     def _places_of(self, beam):

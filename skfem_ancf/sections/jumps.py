@@ -17,13 +17,7 @@ JUMP, KINK, BEND = 1e-3, 0.02, 0.05
 
 
 def beside(X: Array) -> Array:
-    """Points (2, ...), those at ends of elements moved into them: what jumps is the element's.
-
-    Examples
-    --------
-    >>> beside(np.array([[0.0, 0.5], [1.0, 1.0]])).tolist()
-    [[1e-07, 0.5], [1.0, 1.0]]
-    """
+    """Points (2, ...), those at ends of elements moved into them: what jumps is the element's."""
     return np.array([np.clip(X[0], SIDE, 1.0 - SIDE), X[1]])
 
 
@@ -31,14 +25,8 @@ def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float 
           ) -> Array:
     """Stations at which a function jumps between elements: the numbers of those that begin there.
 
-    ``ask`` gives its values (..., n, k) at reference points (2, n, k) of elements (n,), at the n
-    elements and the places eta (k,) across. ``size`` is a change that is a jump; by default a
-    thousandth of the largest value.
-
-    Examples
-    --------
-    >>> jumps(lambda X, e: 1.0 + (X[0] + e[:, None] > 2.0), 4, np.array([0.5]))
-    array([2.])
+    ``ask`` gives its values (..., n, k) at reference points (2, n, k) of elements (n,). ``size`` is
+    a change that is a jump; by default a thousandth of the largest value.
     """
     e = np.arange(n)
     left, right = (ask(np.array([np.full((n, len(eta)), xi), np.tile(eta, (n, 1))]), e)

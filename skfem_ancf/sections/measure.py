@@ -20,14 +20,9 @@ MEAN = 8
 
 
 class Piece(NamedTuple):
-    """Where the width is smooth: from ``low`` to ``high``, places eta in [0, 1].
+    """Where the width, a number or a function of eta (n,), is smooth: from ``low`` to ``high``.
 
-    Attributes
-    ----------
-    low, high
-        Its ends, where the width may be a square root.
-    width
-        A number, or a function of eta (n,) that returns (n,).
+    At its ends the width may be a square root.
     """
 
     low: float
@@ -38,18 +33,10 @@ class Piece(NamedTuple):
 class Measure(Immutable):
     """What a layer has across: rules with its width in their weights, and what these stand for.
 
-    Its ends are the same parts of the height all along a beam, and its width but for a factor.
-    Methods take points of a layer, ``at``, as :meth:`.Across.at` gives them, and return numbers or
-    arrays (nelements, npoints).
-
-    Attributes
-    ----------
-    low, high : float
-        Its ends, places eta.
-    spent : int
-        Degree of exactness that rules spend on the width.
-    moves : bool
-        Its ends are other parts of the height from place to place.
+    Its ends ``low`` and ``high`` are the same parts of the height all along a beam, and its width
+    but for a factor; those of one that ``moves`` are not. Rules spend the degree ``spent`` of
+    exactness on the width. Methods take points of a layer, ``at``, as :meth:`.Across.at` gives
+    them, and return numbers or arrays (nelements, npoints).
     """
 
     low: float
@@ -90,10 +77,7 @@ class Measure(Immutable):
         return values.reshape(values.shape[0], -1, len(eta)) @ w
 
     def breadth(self, at: Any, whole: bool = False, times: str = "") -> Any:
-        """What the weights of rules are multiplied by: area over height, or integrals over it.
-
-        Of points that stand for their sections if ``whole``; of "grade" or "density".
-        """
+        """What the weights of rules are multiplied by: area over height, or integrals over it."""
         layer, mesh, size = at.layer, at.across.mesh, at.factor("width", whole)
         if callable(layer.width):
             size = size * layer.part
@@ -114,8 +98,7 @@ class Measure(Immutable):
     def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
         """At least n points of sections, for fields that are the layer's own.
 
-        Places across, and what of area over height they stand for, (nsections, q); of one point of
-        each section, (2, nsections, 1).
+        Places across, and what of area over height they stand for, (nsections, q).
         """
         eta, w = self.gauss(n)
         eta = np.repeat(eta[None], at.X.shape[1], 0)
@@ -123,15 +106,7 @@ class Measure(Immutable):
 
 
 class Uniform(Measure):
-    """The measure of a constant width from ``low`` to ``high``: its rules are those of Gauss.
-
-    Parameters
-    ----------
-    low, high
-        Its ends, places eta.
-    more
-        Points added to each rule, for what is not constant across.
-    """
+    """The measure of a constant width: rules of Gauss, with ``more`` points than asked for."""
 
     def __init__(self, low: float = 0.0, high: float = 1.0, more: int = 0) -> None:
         self.low, self.high, self.more = low, high, more
@@ -156,17 +131,8 @@ class Weighted(Measure):
     They are exact, to round-off, for polynomials of degree 2 n - 1 times the width, jumps and
     square roots at the ends of circles included: the measure is discretised piece by piece, by
     Gauss points of the angle t of ``Y = middle - half cos t``, and its orthogonal polynomials are
-    found by the procedure of Stieltjes.
-
-    Parameters
-    ----------
-    pieces
-        The width, piece by piece.
-
-    References
-    ----------
-    Gautschi: "Orthogonal Polynomials: Computation and Approximation", Oxford University Press
-    (2004), section 2.2.
+    found by the procedure of Stieltjes (Gautschi: "Orthogonal Polynomials: Computation and
+    Approximation", Oxford University Press, 2004, section 2.2).
     """
 
     def __init__(self, pieces: Sequence[Piece]) -> None:

@@ -19,13 +19,9 @@ LEAST, ROUND = 8, 40
 class Moving(Measure):
     """The measure of a width whose pieces have ends ``a + b / h``: thicknesses that stay.
 
-    ``pieces_of`` gives the pieces at heights h (..., 1), with ends of this shape; ``height`` is the
-    largest, ``degree`` that of the series.
-
     Rules across have the same points all along a beam, for strains are sampled along it at fixed
-    parts of the height. Their weights change instead: those of Gauss times the Legendre series of
-    the width there. The series has all moments of the width up to its degree, so that integrals of
-    polynomials of at most this degree are exact; single weights may be negative.
+    parts of the height. Their weights change: those of Gauss times the Legendre series of the
+    width, which has all its moments up to ``degree``; single weights may be negative.
     """
 
     low, high, moves = 0.0, 1.0, True
@@ -47,10 +43,7 @@ class Moving(Measure):
         return Weighted(self.pieces_of(height))
 
     def gauss(self, n: int) -> Rule:
-        """Points eta and weights, whose sum is 1, exact to degree 2 n - 1 times the series.
-
-        For n = 1 a place of the section where it is highest.
-        """
+        """Points eta and weights, exact to degree 2 n - 1 times the series; one for n = 1."""
         if n == 1:
             return np.array([0.5 * (self.pieces[0].low + self.pieces[-1].high)]), np.ones(1)
         return gauss(n + (self.degree + 1) // 2)
@@ -108,10 +101,7 @@ class Moving(Measure):
         return eta, w * (there.asked("width") if callable(at.layer.width) else at.layer.width)
 
     def points(self, h: Array, n: int) -> tuple[Array, Array]:
-        """Points in the pieces of sections of heights (...), n in each of constant width.
-
-        Places across, and weights that have the width, (..., q).
-        """
+        """Places across, n in each piece of constant width, and weights with it, (..., q)."""
         places, weights = [], []
         for low, high, width in self.pieces_of(h[..., None]):
             t, w = gauss(n + ROUND * callable(width))
@@ -124,10 +114,7 @@ class Moving(Measure):
         return np.concatenate(places, axis=-1), np.concatenate(weights, axis=-1)
 
     def moments(self, h: Array, times: Callable[[Array], Any] | None = None) -> Array:
-        """Coefficients (degree + 1, ...) of the Legendre series of the width at heights (...).
-
-        Of the width times a function of places eta (..., q), if it is given.
-        """
+        """Coefficients (degree + 1, ...) of the Legendre series of the width, times a function."""
         eta, w = self.points(h, self.degree // 2 + 1 + (0 if times is None else 2 * MORE))
         if times is not None:
             w = w * times(eta)

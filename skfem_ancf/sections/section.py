@@ -398,13 +398,7 @@ class Profile(Section):
                              f"{sizes['width']:g}")
 
     def pieces(self, h: Any) -> list[Piece]:
-        """The width, piece by piece from the bottom to the top, at heights h, one or (..., 1).
-
-        Raises
-        ------
-        InputError
-            If a thickness does not fit in the height or the width.
-        """
+        """The width, piece by piece from the bottom to the top, at heights h, one or (..., 1)."""
         s, name = self.sizes, self.name
         width = s.get("width", h)
         thickness = s.get("flange", s.get("wall", 0.0)) / h

@@ -18,16 +18,10 @@ def shear_factor(layers: Sequence[Layer], order: int) -> float:
     """The factor on the shear moduli of a section whose shear strain is a polynomial.
 
     The shear stress of a section in bending is that of Jourawski, ``b tau = Q S / (E I)``, with S
-    the first moment, weighted by E, of what lies beyond. Sections of order N carry polynomials of
-    degree N - 1 in its place, the best fit to ``tau / G`` in the energy, and are too stiff by the
-    part of the energy that these miss. A rectangle has 5/6 for N = 1 and 2, and 1 from N = 3 on.
-
-    Parameters
-    ----------
-    layers
-        The section, from the bottom to the top, the same all along the beam.
-    order
-        N, at least 1.
+    the first moment, weighted by E, of what lies beyond. Sections of order N >= 1 carry polynomials
+    of degree N - 1 in its place, the best fit to ``tau / G`` in the energy, and are too stiff by
+    the part of the energy that these miss. A rectangle has 5/6 for N = 1 and 2, and 1 from N = 3
+    on.
     """
     t, w = gauss(POINTS)
     till = np.array([b * (gauss(POINTS)[1] @ lagrange(t, b * t)) for b in t])

@@ -18,7 +18,7 @@ _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending mom
 def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *,
                     title: str | None = None, recover: bool = True,
                     filename: StrPath | None = None, dpi: float = 150) -> Any:
-    """Draw normal force, shear force and bending moment along the beams.
+    """Draw normal force, shear force and bending moment along the beams; returns three Axes.
 
     Parameters
     ----------
@@ -28,14 +28,8 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *,
         The beam, its name or its number; all beams of the scene by default.
     axes
         Three matplotlib Axes to draw on; a new figure by default, which needs no display.
-    title, filename, dpi
+    title, filename, dpi, recover
         As for :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
-    recover
-        As for :meth:`State.resultants <skfem_ancf.results.State.resultants>`.
-
-    Returns
-    -------
-    list of three matplotlib.axes.Axes
     """
     Figure = figure_class()
     require_like("state", state, "State", "beams", "resultants")

@@ -16,10 +16,7 @@ DPI = 80
 
 
 def _picture(draw):
-    """An img element of the figure of the Axes that ``draw()`` returns; empty without matplotlib.
-
-    A picture that cannot be drawn must not hide the words.
-    """
+    """An img element of the figure of the Axes that ``draw()`` returns; empty if it cannot."""
     try:
         figure, data = draw().figure, io.BytesIO()
         figure.savefig(data, format="png", dpi=DPI, bbox_inches="tight")

@@ -93,16 +93,9 @@ def _limits(limits, values, field):
 class Scenery:
     """States of the same beams with one factor of thickness and one range of colours.
 
-    Arguments are those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
-
-    Attributes
-    ----------
-    frames, rigid
-        For each state its beams, and the grids of its rigid bodies.
-    found
-        Values of all beams, shape (n,).
-    factor, low, high
-        Of the thickness; the range of the colours.
+    Arguments are those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and
+    ``rigid`` are for each state its beams, and the grids of its rigid bodies; ``found`` (n,) values
+    of all beams.
     """
 
     def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
