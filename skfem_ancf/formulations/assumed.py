@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.errors import InputError, require_finite_scalar, require_like
-from ..core.linear import stress_of
 from ..core.quadrature import gauss
 from ..core.types import Array
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw
 from ..materials.base import Material
 from ..mesh.mesh_beam import MeshBeam
-from .base import Formulation, Integrated, Term
+from .base import Formulation, Term
 from .ecm import AXIS, split_moduli
 
 
@@ -79,11 +78,6 @@ class Assumed(Formulation):
         return [Term(LinearLaw(uncoupled), axis, section, samples),
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
 
-    def points_along(self, element: ElementBeam, material: Material) -> int:
-        if type(self).terms is not Assumed.terms:
-            return super().points_along(element, material)
-        return element.sampling.points
-
     @staticmethod
     def _volumetric_apart(whole: Term, element: ElementBeam, material: Material
                           ) -> list[Term] | None:
@@ -96,17 +90,6 @@ class Assumed(Formulation):
         samples = {"xx": points, "xy": points, **whole.samples}
         return [Term(laws[0], whole.axis, whole.section, whole.samples),
                 Term(laws[1], gauss(volume), whole.section, samples)]
-
-    def stress(self, layer: Integrated, strain: Array, u: Array, X: Array,
-               tind: Array | None) -> Array:
-        first, *others = layer.terms
-        total = stress_of(first.law, strain)
-        for term in others:  # of the middle of the element, or of the section's mean
-            xi, mean = term.axis[0], term.section_samples
-            at = X if len(xi) > 1 else np.array([0.0 * X[0] + xi[0], X[1]])
-            across = None if mean is None else (mean[0], mean[1][0])
-            total = total + stress_of(term.law, layer.strain(term, u, at, tind, across))
-        return total
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:

@@ -83,9 +83,6 @@ class Integrated(Protocol):
 
     terms: Sequence[Term]
 
-    @property
-    def law(self) -> Law: ...
-
     def strain(self, term: Term, u: Array, X: Array, tind: Array | None = None,
                across: Rule | None = None) -> Array:
         """The strain of a term, or its mean over sections; (3, nelements, npoints)."""
@@ -137,13 +134,16 @@ class Formulation(Immutable):
                tind: Array | None) -> Array:
         """Second Piola-Kirchhoff stress, for output; shape (3, nelements, npoints).
 
+        That of the first term at the points, and of the others where they are integrated: terms
+        with one point along take the strain of the middle of the element, those with one point
+        across that of the axis, those with section samples that of the section.
+
         Parameters
         ----------
         layer
-            One layer of a beam, with ``terms``, ``law`` and ``strain(term, u, X, tind, across)``.
+            One layer of a beam, with ``terms`` and ``strain(term, u, X, tind, across)``.
         strain
-            That of ``beam.strain(u, X, tind)``, shape (3, nelements, npoints); the rest is for
-            formulations whose stress depends on more than the strain at the point.
+            That of ``beam.strain(u, X, tind)``, shape (3, nelements, npoints).
         u
             Displacement of the degrees of freedom, shape (N,).
         X
@@ -151,7 +151,17 @@ class Formulation(Immutable):
         tind
             Elements, shape (nelements,), or None for all.
         """
-        return stress_of(layer.law, strain)
+        first, *others = layer.terms
+        total = stress_of(first.law, strain)
+        for term in others:
+            (xi, _), across, mean = term.axis, None, term.section_samples
+            at = X if len(xi) > 1 else np.array([0.0 * X[0] + xi[0], X[1]])
+            if mean is not None:
+                across = mean[0], mean[1][0]
+            elif len(term.section[0]) == 1:
+                across = term.section
+            total = total + stress_of(term.law, layer.strain(term, u, at, tind, across))
+        return total
 
     @staticmethod
     def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.errors import InputError, require_like
-from ..core.linear import stress_of
 from ..core.types import Array
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw
 from ..materials.base import Material
-from .base import Formulation, Integrated, Term
+from .base import Formulation, Term
 
 #: The rule across the section that is the axis alone, with the weight of the whole section.
 AXIS = (np.array([0.5]), np.array([1.0]))
@@ -51,11 +50,3 @@ class EnhancedContinuum(Formulation):
         if np.any(coupling):  # not at nu = 0 in plane stress
             terms.append(Term(LinearLaw(coupling), axis, AXIS))
         return terms
-
-    def stress(self, layer: Integrated, strain: Array, u: Array, X: Array,
-               tind: Array | None) -> Array:
-        first, *coupling = layer.terms
-        out = stress_of(first.law, strain)
-        if coupling:
-            out = out + stress_of(coupling[0].law, layer.strain(first, u, X, tind, AXIS))
-        return out

@@ -15,8 +15,8 @@ from ..core.errors import MeshError
 from ..core.types import Array
 from .reference_cell import hermite_basis
 
-#: Corrections of Newton's method that are small enough.
-CLOSE = 1e-7
+#: Corrections of Newton's method that are small enough, and how many there are at most.
+CLOSE, ITERATIONS = 1e-7, 30
 
 #: Samples of each element in the tree of the finder, and candidates for a point that is in none of
 #: the elements next to its nearest sample.
@@ -60,10 +60,10 @@ class Inverse:
             return self.largest
         return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
 
-    def __call__(self, x: Array, e: Any, xi: ArrayLike = 0.5, max_iterations: int = 30) -> Array:
+    def __call__(self, x: Array, e: Any, xi: ArrayLike = 0.5) -> Array:
         """Reference points of points of elements e, both (2, n, npoints), by Newton's method.
 
-        It starts at ``xi``; NaN where there is none after ``max_iterations`` corrections.
+        It starts at ``xi``; NaN where there is none.
         """
         axis, director, beside = (c[..., e, None] for c in (self.axis, self.director, self.beside))
         gap = x - self.start[:, e, None]
@@ -72,7 +72,7 @@ class Inverse:
         beside[:director.shape[1]] += _cross(gap[:, None], director)
         X = np.empty(x.shape)
         X[0] = xi
-        for _ in range(max_iterations):
+        for _ in range(ITERATIONS):
             value, slope = with_slope(beside, X[0])
             change = value / slope
             X[0] -= np.clip(change, -1.0, 1.0)

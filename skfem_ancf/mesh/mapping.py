@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from skfem.mapping import Mapping
 
 from ..core.errors import MeshError
@@ -220,14 +219,12 @@ class MappingBeam(Mapping):
         return Inverse(axis, director, self.mesh.height,
                        None if self.mesh.heights is None else self.heights)
 
-    def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
-             xi: ArrayLike = 0.5) -> Array:
-        """The reference points of points x, both (2, nelements, npoints), by Newton's method from
-        ``xi``.
+    def invF(self, x: Array, tind: Array | None = None) -> Array:
+        """The reference points of points x, both (2, nelements, npoints); NaN where there is none.
 
-        They may be outside the cell; NaN where there is none after ``max_iterations`` corrections.
+        They may be outside the cell.
         """
-        return self.inverse(x, slice(None) if tind is None else tind, xi, max_iterations)
+        return self.inverse(x, slice(None) if tind is None else tind)
 
     # facets
 

@@ -61,29 +61,6 @@ class ElementBeamP1(ElementH1):
         return 1.0 - i + slope * X[0], np.array([slope + 0.0 * X[0], 0.0 * X[0]])
 
 
-def linear(xi: ArrayLike, derivative: int = 0) -> Array:
-    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape."""
-    xi = np.asarray(xi)
-    one = np.ones_like(xi)
-    if derivative == 0:
-        return np.array([1.0 - xi, xi])
-    return np.array([-one, one]) if derivative == 1 else np.array([0.0 * one, 0.0 * one])
-
-
-def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
-    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape."""
-    x = np.asarray(xi)
-    if derivative == 0:
-        return np.array([1.0 - x * x * (3.0 - 2.0 * x), x * (1.0 - x) ** 2,
-                         x * x * (3.0 - 2.0 * x), x * x * (x - 1.0)])
-    if derivative == 1:
-        return np.array([-6.0 * x * (1.0 - x), (1.0 - x) * (1.0 - 3.0 * x),
-                         6.0 * x * (1.0 - x), x * (3.0 * x - 2.0)])
-    if derivative == 2:
-        return np.array([12.0 * x - 6.0, 6.0 * x - 4.0, 6.0 - 12.0 * x, 6.0 * x - 2.0])
-    raise ValueError(f"derivative must be 0, 1 or 2, got {derivative!r}")
-
-
 @lru_cache
 def _hermite_coefficients(m: int, derivative: int) -> Array:
     """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
@@ -105,10 +82,8 @@ def _hermite_coefficients(m: int, derivative: int) -> Array:
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
 
-    Shape (2 m,) + xi.shape; m = 1 is :func:`linear`, m = 2 :func:`hermite`.
+    Shape (2 m,) + xi.shape.
     """
-    if m < 3 and derivative < 3:
-        return (linear if m == 1 else hermite)(xi, derivative)
     x, degree = np.asarray(xi), 2 * m - 1 - derivative
     if degree < 0:
         return np.zeros((2 * m,) + x.shape)
