@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -13,15 +12,12 @@ from ..core.archive import output_file
 from ..core.errors import require_options, require_path, require_text
 from ..core.types import StrPath
 from ..recovery.fields import find_fields
-from .vtu import require_next, save_vtu
+from .vtu import SeriesWriter, require_next, save_vtu
 
 logger = logging.getLogger(__name__)
 
-#: Frames of a motion after which the list is written again.
-LISTED = 64
 
-
-class PvdWriter:
+class PvdWriter(SeriesWriter):
     """Writes one .vtu a frame, and a .pvd that lists them with their times.
 
     Both are complete after every :meth:`add`, so that ParaView can follow a run. Frames are called
@@ -60,10 +56,6 @@ class PvdWriter:
         if "fields" in self.options:
             find_fields(self.options["fields"])
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
-        self._obstacles = False
-
-    def __enter__(self):
-        return self
 
     def __exit__(self, *_):
         if self.frames:
@@ -79,45 +71,16 @@ class PvdWriter:
         t
             Its time, later than that of the frame before.
         """
-        frame = self._frame(state, t)
-        self._list()
-        return frame
-
-    def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
-        """Write the frames of a motion; the list is complete at the end, and now and then before.
-
-        Parameters
-        ----------
-        states
-            Each a State with a time ``t``.
-        done
-            Called after each of them.
-        """
-        try:
-            for state in states:
-                self._frame(state, state.t)
-                if len(self.frames) % LISTED == 1:
-                    self._list()
-                done()
-        finally:
-            if self.frames:
-                self._list()
-
-    def _frame(self, state, t):
         t = require_next(state, t, self.frames[-1][0] if self.frames else None)
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
         frame = save_vtu(state, self.path.with_name(name), **self.options)
         self.frames.append((t, name))
-        self._obstacles = bool(obstacles_of(state))
-        return frame
-
-    def _list(self):
-        rows = []
-        for t, name in self.frames:
-            names = [name, name.replace(".vtu", "_obstacles.vtu")][:1 + self._obstacles]
-            rows += [f'<DataSet timestep="{t!r}" part="{k}" file={quoteattr(one)}/>'
-                     for k, one in enumerate(names)]
+        endings = (".vtu", "_obstacles.vtu")[:1 + bool(obstacles_of(state))]
+        rows = [f'<DataSet timestep="{t!r}" part="{k}" file='
+                f'{quoteattr(name.replace(".vtu", ending))}/>'
+                for t, name in self.frames for k, ending in enumerate(endings)]
         with output_file(self.path) as temporary:
             temporary.write_text("\n".join(
                 ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',
                  "<Collection>", *rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+        return frame

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,14 +15,14 @@ from ..core.errors import FileError, InputError, require_option, require_options
 from ..core.types import StrPath
 from ..recovery.fields import find_fields
 from ..recovery.grids import CELL_TYPES
-from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
+from .vtu import PRECISIONS, SeriesWriter, body_fields, require_next, save_obstacles
 
 #: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose
 #: writing fails, and takes the process with it.
 SPARE = 2**22
 
 
-class VtkHdfWriter:
+class VtkHdfWriter(SeriesWriter):
     """Writes a series into one file, in which the cells are stored once.
 
     The file appears under its name when the series is closed, as the end of a ``with`` block does.
@@ -73,9 +72,6 @@ class VtkHdfWriter:
         self._root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
         self.times: list[float] = []
 
-    def __enter__(self) -> VtkHdfWriter:
-        return self
-
     def __exit__(self, kind: Any, *_: Any) -> None:
         if self._file is None:
             return
@@ -101,20 +97,6 @@ class VtkHdfWriter:
     def _cannot(self, error):
         why = os.strerror(error.errno) if error.errno else error  # HDF5 says it in ten lines
         return FileError(f"cannot write {str(self.path)!r}: {why}")
-
-    def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
-        """Append the frames of a motion.
-
-        Parameters
-        ----------
-        states
-            Each a State with a time ``t``.
-        done
-            Called after each of them.
-        """
-        for state in states:
-            self.add(state, state.t)
-            done()
 
     def add(self, state: Any, t: float) -> Path:
         """Append a frame, and return the file that there will be.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -184,6 +185,27 @@ def _write(path, body, dtype):
             body.points.astype(dtype), body.cells,
             {name: values.astype(dtype) for name, values in body.point_data.items()},
             body.cell_data))
+
+
+class SeriesWriter:
+    """What writers of a series share, besides ``add(state, t)`` for a frame."""
+
+    def __enter__(self) -> Any:
+        return self
+
+    def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
+        """Write the frames of a motion.
+
+        Parameters
+        ----------
+        states
+            Each a State with a time ``t``.
+        done
+            Called after each of them.
+        """
+        for state in states:
+            self.add(state, state.t)  # type: ignore[attr-defined]
+            done()
 
 
 def require_next(state: Any, t: Any, before: float | None) -> float:

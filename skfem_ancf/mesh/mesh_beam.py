@@ -213,18 +213,13 @@ class MeshBeam(NumberedMesh):
         tangent = np.broadcast_to(tangent, p.shape)
         return cls(p, t, default_tags(p, t), height=height, p_X=tangent, lengths=lengths, s=s,
                    p_Y=np.array([0.0 - tangent[1], tangent[0]]), curve=curve, heights=heights,
-                   taper=taper, p_XY=np.zeros(p.shape) if turning is None else turning,
-                   validate=curve is not None or heights is not None)
+                   taper=taper, p_XY=np.zeros(p.shape) if turning is None else turning)
 
     @classmethod
     def init_refdom(cls) -> MeshBeam:
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
     def __post_init__(self):
-        if not self.validate:  # a straight line of init_line
-            self.validate = True
-            self._require_length()
-            return
         p = require_finite("the nodes", self.doflocs, (2, None))
         t = require_finite("t", self.t)
         if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
@@ -258,7 +253,12 @@ class MeshBeam(NumberedMesh):
                              ("lengths", shape[1:]), ("heights", (4, shape[1]))):
             if getattr(self, name) is not None or name not in ("p_XY", "heights"):
                 setattr(self, name, require_finite(name, getattr(self, name), wanted))
-        self._require_length()
+        chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
+        has_length = (chord > 4 * EPS * np.max(np.abs(p))) & (self.lengths > 0.0)
+        if not has_length.all():
+            k = int(np.argmin(has_length))
+            a, b = p[:, t[:, k]].T.tolist()
+            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
         if self.heights is not None and not np.all(self.heights > 0.0):
             raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
         require_option("interpolation of the sections", self.sections, SECTIONS)
@@ -266,15 +266,6 @@ class MeshBeam(NumberedMesh):
             raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
                             "MeshBeam.init_line or MeshBeam.init_curve")
         self._mapping().check()
-
-    def _require_length(self):
-        p, t = self.doflocs, self.t
-        chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
-        has_length = (chord > 4 * EPS * np.max(np.abs(p))) & (self.lengths > 0.0)
-        if not has_length.all():
-            k = int(np.argmin(has_length))
-            a, b = self.p[:, self.t[:, k]].T.tolist()
-            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
 
     def with_sections(self, sections: str) -> MeshBeam:
         """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
