@@ -53,7 +53,7 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
     found = {"supports": np.append(system.constraints.fixed, system.constraints.values_at(times)),
              "damping": damping}
     for k, member in enumerate(system.members):
-        part, kind = system.of(member), "rigid body" if member in system.bodies else "beam"
+        part, kind = system.of(member), _kind(system, member)
         name = f"{kind} {k if member.name is None else member.name}"
         found |= {f"mesh of {name}": member.q0, f"stiffness of {name}": force[part],
                   f"mass of {name}": inertia[part]}
@@ -75,6 +75,11 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
         if obstacle.moves:
             found[f"motion of obstacle {k}"] = np.array([obstacle.pose(t)[:6] for t in times])
     return found
+
+
+def _kind(system, member):
+    return ("rigid body" if member in system.bodies else "domain" if member in system.domains
+            else "beam")
 
 
 def _of_element(system, element, u, v, times):

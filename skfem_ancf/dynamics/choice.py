@@ -60,6 +60,8 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
         return Choice(EnergyMomentum(), "obstacles: touching is a kink, and energy is kept")
     if system.mass_solver.by_nodes:
         return Choice(EnergyMomentum(), "a frame: its nodes are eliminated")
+    if not all(domain.symmetric for domain in system.domains):
+        return Choice(GeneralizedAlpha(), "a domain without an energy")
     if rtol > FINE:
         if system.damped:
             return Choice(GeneralizedAlpha(), f"{asked}, damping")

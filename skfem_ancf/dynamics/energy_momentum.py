@@ -52,6 +52,13 @@ class EnergyMomentum(Scheme):
     def __repr__(self):
         return "<EnergyMomentum>"
 
+    def require(self, system: System) -> None:
+        for domain in system.domains:
+            if not domain.symmetric:
+                raise InputError(f"the tangent of {domain!r} is not symmetric: there is no energy "
+                                 "that the scheme could conserve. Take 'generalized-alpha' or "
+                                 "'radau', or forms that are derivatives of an energy")
+
 
 class EnergyMomentum4(EnergyMomentum):
     """Conserves energy, momentum and angular momentum; fourth order.
@@ -85,6 +92,7 @@ class EnergyMomentum4(EnergyMomentum):
         return "<EnergyMomentum4>"
 
     def require(self, system: System) -> None:
+        super().require(system)
         if system.damped or system.forces.contacts.lasting:
             raise InputError(f"{self!r} goes back in time in a part of each step, where damping "
                              "and friction drive: take 'energy-momentum', or 'radau' for high "

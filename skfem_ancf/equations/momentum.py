@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..beam.domain import Domain
+
 if TYPE_CHECKING:
     from ..core.types import Array
     from .system import System
@@ -23,7 +25,8 @@ def momentum(system: System, v: Array) -> Array:
     """
     p, total = system.mass.multiply(v), np.zeros(2)
     for member, s in zip(system.members, system.slices):  # a unit translation moves r alone
-        total += p[s].reshape(-1, member.nd)[:, :2].sum(axis=0)
+        total += (member.rigid_motions()[:, :2].T @ p[s] if isinstance(member, Domain) else
+                  p[s].reshape(-1, member.nd)[:, :2].sum(axis=0))
     return total
 
 

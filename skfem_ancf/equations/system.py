@@ -115,6 +115,10 @@ class System:
                                            for domain in domains)], self.N, self.bandwidth)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
+        if self.damping.stiffness and domains:
+            raise InputError("damping(stiffness=...) resists rates of strains, which the forms of "
+                             f"{domains[0]!r} do not know: give beams KelvinVoigt(time) as their "
+                             "damping=, and the scene damping(modal=...) or damping(mass=...)")
         self._rest_modes = rest_modes
         self._varying: list[Any] = []
         self.constant_force = np.zeros(self.N)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
+from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from ..core.band import fix
@@ -23,6 +24,7 @@ UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
 LANCZOS = 1e-10  # its tolerance
 SAME = 1e-6  # relative distance of eigenvalues that are the same
 UNSTRESSED = 1e-9  # force of springs at rest, over their stiffness times the size, of round-off
+SMALL = 1e-4  # displacement over the size by which tangents of domains are differences
 ASIDE = 1e-5  # motion that shows on which sides springs push, over the size
 STIFFER = 0.1  # relative change of their stiffness that is not left out
 TURNING = 1e-2  # square of the angular velocity over that of a frequency
@@ -262,7 +264,7 @@ def buckling(system: System, k: int) -> Buckling:
     n, m = tangent.size
     k = _count(k, n - m)
     du, stress, multipliers = tangent.response()
-    Ks = tangent.geometric(stress, multipliers, 1.0)
+    Ks = tangent.geometric(stress, multipliers, 1.0) + _geometric_of_domains(system, tangent, du)
     if not Ks.nnz or not abs(Ks).max() > 0.0:
         raise InputError("no positive load factor: the loads do not stress the beam")
     symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
@@ -283,6 +285,18 @@ def buckling(system: System, k: int) -> Buckling:
     shapes = np.zeros((len(order), system.N))
     shapes[:, tangent.free] = X[:, good].T[order]
     return Buckling(factors[order], shapes, not symmetric)
+
+
+def _geometric_of_domains(system, tangent, du):
+    """How tangents of domains change along a displacement (N,), between free coordinates."""
+    K = sparse.csr_matrix((system.N, system.N))
+    for domain in system.domains:
+        s = system.of(domain)
+        h = SMALL * domain.size / max(np.max(np.abs(du[s])), np.finfo(float).tiny)
+        i, j = domain.pattern
+        change = (domain.stiffness(h * du[s]) - domain.stiffness(-h * du[s])) / (2.0 * h)
+        K = K + sparse.csr_matrix((change, (s.start + i, s.start + j)), shape=K.shape)
+    return K[tangent.free][:, tangent.free]
 
 
 def _require_unstressed(system, zero):
@@ -356,6 +370,8 @@ def _buckled(tangent, Ks, k, symmetric):
 def _require_no_flutter(system, tangent, Ks, factor):
     """Raise InputError if oscillations grow below a load factor, as far as linear theory says."""
     if any(layer.density is None for beam in system.beams for layer in beam.across.layers):
+        return
+    if any(domain.mass is None for domain in system.domains):
         return
     M, S = _free_mass(system, tangent), tangent.S
     k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
+from ...beam.domain import Domain
+from ...core.types import Array
 from ..places import Vector
 from .base import ForceElement
-
-if TYPE_CHECKING:
-    from ...beam.domain import Domain
-    from ...core.types import Array
 
 
 class DomainForce(ForceElement):
@@ -25,8 +21,7 @@ class DomainForce(ForceElement):
         The number of its first degree of freedom in the scene.
     """
 
-    resists = False
-    internal = True
+    internal, resists = True, False
 
     def __init__(self, domain: Domain, first: int) -> None:
         self.domain, self.symmetric, self.name = domain, domain.symmetric, domain.name
@@ -39,16 +34,11 @@ class DomainForce(ForceElement):
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         if np.array_equal(x, y):
-            return self.force(x, x, t)
-        d = y - x
-        force = -self.domain.mean_force(x.ravel(), y.ravel()).reshape(x.shape)
-        return force - (self.gain(x, y, t) + np.sum(force * d)) / np.sum(d * d) * d
+            return self.force(x, 0.0 * x, t)
+        return -self.domain.mean_force(x.ravel(), y.ravel()).reshape(x.shape)
 
     def potential_at(self, x: Array, t: float) -> float | None:
         return self.domain.energy(x.ravel()) if self.symmetric else None
-
-    def gain(self, x: Array, y: Array, t: float) -> Any:
-        return self.domain.energy(y.ravel()) - self.domain.energy(x.ravel())
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         return -self.domain.stiffness(x.ravel())
