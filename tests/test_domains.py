@@ -1,8 +1,10 @@
 """Domains: stock bases of scikit-fem with their forms in one scene with beams."""
 
+import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse.linalg import eigsh
 from skfem import (Basis, BilinearForm, ElementQuad1, ElementQuad2, ElementTetP1, ElementTriP2,
                    ElementVector, LinearForm, MeshQuad, MeshTet, MeshTri, condense, solve)
 from skfem.helpers import ddot, dot, eye, grad, identity, mul, sym_grad, trace, transpose
@@ -14,28 +16,32 @@ from skfem_ancf import (Beam, CallbackError, Domain, ElementBeamANCF, ElementBea
 E, NU, RHO, WIDTH, H = 1e6, 0.3, 780.0, 0.1, 0.1
 
 
-def forms(E=E, nu=NU, width=WIDTH):
-    """St. Venant-Kirchhoff in plane stress with the Green-Lagrange strain."""
+def forms(E=E, nu=NU, width=WIDTH, soft=None):
+    """St. Venant-Kirchhoff in plane stress with the Green-Lagrange strain.
+
+    The modulus is ``soft`` times E above the beam.
+    """
     lam, mu = E * nu / (1 - nu**2), E / (2 * (1 + nu))
 
-    def stress(strain):
-        return lam * eye(trace(strain), 2) + 2 * mu * strain
+    def stress(strain, w):
+        part = 1.0 if soft is None else np.where(w.x[1] > H / 2, soft, 1.0)
+        return part * (lam * eye(trace(strain), 2) + 2 * mu * strain)
 
-    def parts(u):
-        F = grad(u) + identity(grad(u))
-        return F, stress(0.5 * (mul(transpose(F), F) - identity(F)))
+    def parts(w):
+        F = grad(w["u"]) + identity(grad(w["u"]))
+        return F, stress(0.5 * (mul(transpose(F), F) - identity(F)), w)
 
     @LinearForm
     def residual(v, w):
-        F, S = parts(w["u"])
+        F, S = parts(w)
         return width * ddot(mul(F, S), grad(v))
 
     @BilinearForm
     def tangent(u, v, w):
-        F, S = parts(w["u"])
+        F, S = parts(w)
         dE = mul(transpose(F), grad(u))
         return width * (ddot(mul(grad(u), S), grad(v))
-                        + ddot(mul(F, stress(0.5 * (dE + transpose(dE)))), grad(v)))
+                        + ddot(mul(F, stress(0.5 * (dE + transpose(dE)), w)), grad(v)))
 
     return residual, tangent
 
@@ -67,12 +73,11 @@ def beam_of(x0, x1, n=16, element=None, **options):
                 **options)
 
 
-def plain_newton(mesh, force, steps=8):
-    """The tip of a cantilever all of Q2 by scikit-fem alone."""
+def plain_newton(mesh, load, clamped, at, steps=4, **options):
+    """The displacement of a point by scikit-fem alone, all of Q2."""
     basis = Basis(mesh, ElementVector(ElementQuad2()))
-    residual, tangent = forms()
-    b = force * pull.assemble(basis.boundary("right"))
-    fixed, x = basis.get_dofs("left"), basis.zeros()
+    residual, tangent = forms(**options)
+    b, fixed, x = load(basis), basis.get_dofs(clamped), basis.zeros()
     for k in range(1, steps + 1):
         for _ in range(20):
             u = basis.interpolate(x)
@@ -81,7 +86,16 @@ def plain_newton(mesh, force, steps=8):
             x = x + dx
             if np.abs(dx).max() < 1e-11:
                 break
-    return basis.probes(np.array([[mesh.p[0].max() - 1e-12], [0.0]])) @ x
+    return basis.probes(np.array(at)[:, None] * (1 - 1e-12)) @ x
+
+
+def pulled_down(basis):
+    return pull.assemble(basis.boundary("right"))
+
+
+def cantilever(n=32):
+    """The tip of a cantilever of the length 2 that is pulled down."""
+    return plain_newton(strip(0, 2, n), pulled_down, "left", (2.0, 0.0))
 
 
 # statics
@@ -92,7 +106,7 @@ def test_a_domain_alone_is_what_scikit_fem_finds():
     solid = domain_of(mesh)
     scene = Scene(solid).clamp("left").load(pull, "right")
     state = scene.solve_static()
-    assert_allclose(state.displacement((2, 0)), plain_newton(mesh, 1.0), rtol=1e-8)
+    assert_allclose(state.displacement((2, 0)), cantilever(16), rtol=1e-8)
     assert state.stability == "stable"
     reaction = state.reactions("left")
     assert_allclose(reaction.force, (0.0, 1.0), atol=1e-9)
@@ -105,7 +119,7 @@ def test_a_domain_alone_is_what_scikit_fem_finds():
 
 @pytest.mark.parametrize("element, tol", [(None, 2e-4), (ElementBeamCable(5), 1e-3)])
 def test_a_cantilever_half_of_quads_and_half_beam(element, tol):
-    tip = plain_newton(strip(0, 2, 32), 1.0)
+    tip = cantilever()
     solid, beam = domain_of(strip(0, 1, 16)), beam_of(1, 2, element=element)
     scene = Scene(beam, solid).clamp("left", solid).point_force((0, -1), at=(2, 0), beam=beam)
     weld = scene.weld((solid, "right"), (beam, "left"))
@@ -119,7 +133,7 @@ def test_a_cantilever_half_of_quads_and_half_beam(element, tol):
 
 
 def test_a_beam_carries_a_domain_of_triangles():
-    tip = plain_newton(strip(0, 2, 32), 1.0)
+    tip = cantilever()
     mesh = MeshTri.init_tensor(np.linspace(1, 2, 17), np.linspace(-H / 2, H / 2, 4)).with_defaults()
     solid, beam = domain_of(mesh, ElementTriP2()), beam_of(0, 1)
     scene = Scene(beam, solid).clamp("left", beam).load(pull, "right", solid)
@@ -154,7 +168,7 @@ def test_a_domain_buckles_where_it_has_to():
 
 
 def test_domains_are_glued_to_rigid_bodies_and_to_each_other():
-    whole = plain_newton(strip(0, 2, 16), 1.0)
+    whole = cantilever(16)
     left, right = domain_of(strip(0, 1, 8), name="a"), domain_of(strip(1, 2, 8, 3), name="b")
     scene = Scene(left, right).clamp("left", left).load(pull, "right", right)
     scene.weld((left, "right"), (right, "left"))
@@ -164,6 +178,58 @@ def test_domains_are_glued_to_rigid_bodies_and_to_each_other():
     scene.weld(("solid", "right"), block).equations
     state = scene.point_force((0, -1), (2, 0), block).solve_static()
     assert_allclose(state.displacement((2, 0), "solid"), whole, rtol=2e-3)
+
+
+def test_a_bracket_with_three_beams():
+    """A solid T with arms that are beams, against all of Q2."""
+    arm, inner = np.linspace(0.2, 1, 9), np.linspace(0.05, 0.2, 4)
+    core = np.linspace(-0.05, 0.05, 5)
+    x = np.unique(np.concatenate([-arm, -inner, core, inner, arm]))
+    y = np.unique(np.concatenate([core, inner, arm]))
+
+    def tee(reach):
+        mesh = MeshQuad.init_tensor(x[np.abs(x) <= reach], y[y <= reach])
+        middle = mesh.p[:, mesh.t].mean(axis=1)
+        kept = np.flatnonzero((np.abs(middle[0]) < 0.05) | (middle[1] < 0.05))
+        return mesh.restrict(kept).with_boundaries({
+            "left": lambda x: np.isclose(x[0], -reach), "right": lambda x: np.isclose(x[0], reach),
+            "top": lambda x: np.isclose(x[1], reach)})
+
+    force = LinearForm(lambda v, w: 2.0 * v[0] / H)
+    whole = plain_newton(tee(1.0), lambda basis: force.assemble(basis.boundary("top")),
+                         ["left", "right"], (0.0, 1.0))
+    solid = domain_of(tee(0.2))
+    arms = [Beam(MeshBeam.init_line(np.linspace(0, 0.8, 9), H, origin=origin, angle=angle),
+                 ElementBeamANCF(2), StVenantKirchhoff(E, NU, RHO), WIDTH)
+            for origin, angle in (((-1, 0), 0), ((0.2, 0), 0), ((0, 0.2), np.pi / 2))]
+    scene = Scene(*arms, solid).clamp("left", arms[0]).clamp("right", arms[1])
+    scene.point_force((2.0, 0), at=(0, 1), beam=arms[2])
+    for side, beam, end in zip(("left", "right", "top"), arms, ("right", "left", "left")):
+        scene.weld((solid, side), (beam, end))
+    state = scene.solve_static()
+    found = state.displacement((0, 1), arms[2])
+    assert found[0] > 0.1 and state.stability == "stable"
+    assert np.hypot(*(found - whole)) < 5e-3 * np.hypot(*whole)  # of the clamps of beams
+
+
+def test_a_block_on_the_side_of_a_beam():
+    """A softer block is glued to the top of a cantilever, against all of Q2."""
+    x, y = np.linspace(0, 1, 41), np.append(np.linspace(-H / 2, H / 2, 5), [0.1, 0.15])
+    mesh = MeshQuad.init_tensor(x, y)
+    middle = mesh.p[:, mesh.t].mean(axis=1)
+    kept = np.flatnonzero((middle[1] < H / 2) | (np.abs(middle[0] - 0.65) < 0.15))
+    both = mesh.restrict(kept).with_boundaries({
+        "left": lambda x: np.isclose(x[0], 0), "right": lambda x: np.isclose(x[0], 1)})
+    whole = plain_newton(both, pulled_down, "left", (1.0, 0.0), soft=0.2)
+    bare = plain_newton(strip(0, 1, 40), pulled_down, "left", (1.0, 0.0))
+    block = domain_of(strip(0.5, 0.8, 12, 2, y0=0.1), E=0.2 * E)
+    beam = beam_of(0, 1, 20, ElementBeamANCF(3))
+    scene = Scene(beam, block).clamp("left", beam).point_force((0, -1), at=(1, 0), beam=beam)
+    scene.weld((block, "bottom"), (beam, "top"))
+    found = scene.solve_static().displacement((1, 0), beam)
+    alone = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    stiffer = found[1] - alone.displacement((1, 0))[1]
+    assert_allclose(stiffer, whole[1] - bare[1], rtol=0.03)
 
 
 def test_springs_and_hinges_hold_points_of_a_domain():
@@ -176,6 +242,131 @@ def test_springs_and_hinges_hold_points_of_a_domain():
         (0, -9.81)).solve_static()
     assert state.stability == "stable"
     assert state.displacement((1, 0))[1] < -0.1
+
+
+# vibrations, buckling, motion
+
+
+def test_frequencies_of_quads_and_beam():
+    basis = Basis(strip(0, 2, 32), ElementVector(ElementQuad2()))
+    K = forms()[1].assemble(basis, u=basis.interpolate(basis.zeros()))
+    free = basis.complement_dofs(basis.get_dofs("left"))
+    known = np.sqrt(eigsh(K[free][:, free], 4, mass.assemble(basis)[free][:, free], sigma=0)[0])
+    whole = Scene(domain_of(strip(0, 2, 32))).clamp("left")
+    assert_allclose(whole.modes(4).frequencies, known, rtol=1e-9)
+    solid, beam = domain_of(strip(0, 1, 16)), beam_of(1, 2)
+    scene = Scene(beam, solid).clamp("left", solid)
+    scene.weld((solid, "right"), (beam, "left"))
+    assert_allclose(scene.modes(4).frequencies, known, rtol=1e-3)
+    free_modes = Scene(domain_of(strip(0, 1, 8, 2))).modes(4)
+    assert np.all(np.abs(free_modes.frequencies[:3]) < 1e-4 * free_modes.frequencies[3])
+
+
+def test_buckling_of_a_column_half_of_quads():
+    """Euler's load, less what shear takes of it."""
+    critical = np.pi**2 * E * H**3 * WIDTH / 12 / (4 * 2.0**2)
+    solid, beam = domain_of(strip(0, 1, 16)), beam_of(1, 2)
+    scene = Scene(beam, solid).clamp("left", solid).point_force((-critical, 0), (2, 0), beam)
+    scene.weld((solid, "right"), (beam, "left"))
+    shear = 1.2 * critical / (E / (2 * (1 + NU)) * H * WIDTH)
+    assert_allclose(scene.buckling(1).factors[0], 1 / (1 + shear), rtol=1e-3)
+
+
+def test_a_motion_is_that_of_a_plain_newmark():
+    """The trapezoidal rule in a loop of scikit-fem's own."""
+    mesh, dt, steps = strip(0, 1, 6, 2), 0.02, 10
+    basis = Basis(mesh, ElementVector(ElementQuad2()))
+    residual, tangent = forms()
+    M, fixed = mass.assemble(basis), basis.get_dofs("left")
+    b = M @ basis.project(lambda x: np.array([0.0 * x[0], -9.81 + 0.0 * x[0]]))
+    x, v = basis.zeros(), basis.zeros()
+    a = solve(*condense(M, b, D=fixed))
+    for _ in range(steps):
+        new = x + dt * v + 0.25 * dt**2 * a
+        for _ in range(20):
+            u = basis.interpolate(new)
+            acceleration = 4 / dt**2 * (new - x - dt * v) - a
+            r = b - residual.assemble(basis, u=u) - M @ acceleration
+            dx = solve(*condense(tangent.assemble(basis, u=u) + 4 / dt**2 * M, r, D=fixed))
+            new = new + dx
+            if np.abs(dx).max() < 1e-13:
+                break
+        acceleration = 4 / dt**2 * (new - x - dt * v) - a
+        x, v, a = new, v + 0.5 * dt * (a + acceleration), acceleration
+    solid = Domain(basis, residual, tangent, mass)
+    history = Scene(solid).clamp("left").gravity((0, -9.81)).integrate(
+        dt * steps, dt, scheme="newmark")
+    assert_allclose(solid.of_basis(history.u[-1]), x, atol=1e-7 * np.abs(x).max())
+
+
+def test_a_motion_of_quads_and_beam_keeps_its_energy():
+    ends, energies = [], {}
+    for scheme in ("generalized-alpha", "energy-momentum"):
+        solid, beam = domain_of(strip(0, 1, 6, 2)), beam_of(1, 2, 4)
+        scene = Scene(beam, solid).clamp("left", solid).gravity((0, -9.81))
+        scene.weld((solid, "right"), (beam, "left"))
+        history = scene.integrate(0.4, 0.02, scheme=scheme)
+        ends.append(history.displacement((2, 0), beam)[-1])
+        energies[scheme] = np.ptp(history.total_energy)
+        top = history.strain_energy.max()
+    alone = Scene(beam_of(0, 2, 8)).clamp("left").gravity((0, -9.81))
+    ends.append(alone.integrate(0.4, 0.02, scheme="energy-momentum").displacement((2, 0))[-1])
+    assert_allclose(ends[0], ends[1], atol=0.01 * np.hypot(*ends[1]))
+    assert_allclose(ends[1], ends[2], atol=0.01 * np.hypot(*ends[2]))
+    assert energies["energy-momentum"] < 1e-10 * top < energies["generalized-alpha"]
+
+
+def test_a_domain_that_flies_keeps_energy_and_momentum():
+    solid = domain_of(strip(-0.5, 0.5, 6, 2))
+    scene = Scene(solid).initial_velocity(
+        lambda x: np.array([1.0 - 8.0 * x[1], 2.0 + 8.0 * x[0]]))
+    lost = []
+    for dt in (0.02, 0.01):
+        history = scene.integrate(0.2, dt, scheme="energy-momentum")
+        assert np.ptp(history.total_energy) < 1e-11 * history.total_energy[0]
+        assert np.max(np.ptp(history.momentum, axis=0)) < 1e-10 * np.abs(history.momentum).max()
+        lost.append(np.ptp(history.angular_momentum) / history.angular_momentum[0])
+    assert lost[1] < 2e-3 and lost[0] > 3 * lost[1]
+    assert_allclose(history.momentum[0], RHO * WIDTH * H * np.array([1.0, 2.0]), rtol=1e-9)
+
+
+def test_what_motions_refuse():
+    solid = domain_of(strip(0, 1, 4, 1))
+    with pytest.raises(InputError, match="KelvinVoigt"):
+        Scene(solid).clamp("left").damping(stiffness=0.1).integrate(0.1, 0.05)
+    twisted = Domain(solid.basis, LinearForm(lambda v, w: 1e3 * ddot(w["u"].grad, grad(v))
+                                             + 50 * w["u"][0] * v[1]),
+                     BilinearForm(lambda u, v, w: 1e3 * ddot(grad(u), grad(v)) + 50 * u[0] * v[1]),
+                     mass)
+    scene = Scene(twisted).clamp("left").gravity((0, -9.81))
+    with pytest.raises(InputError, match="not symmetric"):
+        scene.integrate(0.1, 0.05, scheme="energy-momentum")
+    assert scene.integrate(0.1, 0.05, scheme="generalized-alpha").u.any()
+    assert "no potential" in str(scene.solve_static().verdict)
+
+
+# files and pictures
+
+
+def test_files_and_pictures_show_both(tmp_path):
+    solid, beam = domain_of(strip(0, 1, 8)), beam_of(1, 2, 8)
+    scene = Scene(beam, solid).clamp("left", solid).point_force((2.0, 0), at=(2, 0), beam=beam)
+    scene.weld((solid, "right"), (beam, "left"))
+    state = scene.solve_static()
+    mesh = meshio.read(state.save(tmp_path / "both.vtu"))
+    kinds = np.concatenate(mesh.cell_data["beam"])
+    assert [np.sum(kinds == k) for k in (0, 1)] == [8 * 8 * 4, 4 * 8 * 4]
+    right = mesh.points[:, 0] - mesh.point_data["displacement"][:, 0] > 0.3
+    strain = mesh.point_data["eps_xx"][right]
+    assert_allclose(strain, 2.0 / (E * H * WIDTH), rtol=2e-2)
+    of_solid = np.isnan(mesh.point_data["S_xx"])
+    assert 0 < of_solid.sum() < len(of_solid)
+    ax = state.plot("eps_xx", filename=tmp_path / "strain.png")
+    coloured = [c.get_array() for c in ax.collections if c.get_array() is not None]
+    assert len(coloured) == 1 and np.isfinite(coloured[0]).all()
+    assert len(coloured[0]) > 32 * 9 and len(state.plot("eps_xx").collections) == 2
+    shown = state.plot("S_xx").collections  # grey where the stress is not known
+    assert any(len(c.get_paths()) == 4 * 32 for c in shown)
 
 
 # what is refused

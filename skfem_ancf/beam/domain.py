@@ -196,6 +196,11 @@ class Domain(Immutable):
         d = u1 - u0
         return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(STEP))), np.zeros(self.N))
 
+    def inverted(self, u: Array) -> bool:
+        """True if a cell is turned inside out by a displacement (N,)."""
+        (a, b), (c, d) = self._with(u)["u"].grad
+        return bool(np.any((1.0 + a) * (1.0 + d) <= b * c))
+
     def _require_derivatives(self):
         d, v = self.sizes * np.cos(np.arange(2.0 * self.N)).reshape(2, -1)
         u, v = 1e-4 * d, 1e-6 * v
@@ -414,24 +419,33 @@ class Domain(Immutable):
         return np.array([np.asarray(basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0])[0]
                          for k in range(0, basis.Nbfun, 2)])
 
-    def drawn(self, u: Array, parts: int = 1) -> tuple[Array, Array, Array]:
-        """Points for pictures of each cell, (2, n), their displacement, (2, n), and polygons.
+    def drawn(self, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:
+        """What pictures show of a displacement of the DOFs, shape (N,).
 
         Parameters
         ----------
         u
-            Displacement of the DOFs, shape (N,).
+            The displacement.
         parts
             Times that a cell is halved.
+
+        Returns
+        -------
+        x, moved, gradient, cells
+            Points of each cell, (2, n), their displacement and its gradient, (2, 2, n), and
+            triangles or quads as rows of point numbers.
         """
-        mesh, mapping = self.basis.mesh, self.basis.mapping
+        mesh, basis = self.basis.mesh, self.basis
         cell = mesh.init_refdom().refined(parts)
-        x = np.asarray(mapping.F(cell.p))
-        dofs = self.numbers(self.basis.element_dofs).reshape(-1, 2, mesh.nelements)
+        x = np.asarray(basis.mapping.F(cell.p))
+        dofs = self.numbers(basis.element_dofs).reshape(-1, 2, mesh.nelements)
+        grads = np.array([np.asarray(basis.elem.gbasis(basis.mapping, cell.p, k)[0].grad)[0]
+                          for k in range(0, basis.Nbfun, 2)])
         moved = np.einsum("kep,kce->cep", self._functions(cell.p), u[dofs])
+        gradient = np.einsum("kjep,kce->cjep", grads, u[dofs])
         first = cell.p.shape[1] * np.arange(mesh.nelements)
         cells = (first[:, None, None] + cell.t.T).reshape(-1, len(cell.t))
-        return x.reshape(2, -1), moved.reshape(2, -1), cells
+        return x.reshape(2, -1), moved.reshape(2, -1), gradient.reshape(2, 2, -1), cells
 
 
 class DomainPoints:

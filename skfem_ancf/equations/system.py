@@ -240,7 +240,7 @@ class System:
     def inverted(self, u: Array) -> bool:
         """True if a body is turned inside out somewhere."""
         return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices)
-                   if b.has_sections)
+                   if b.has_sections) or any(d.inverted(u[self.of(d)]) for d in self.domains)
 
     def folded(self, u: Array) -> bool:
         """True if the axis turns back within an element of a beam."""

@@ -15,7 +15,7 @@ from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
                            require_option, require_path, warn)
 from ..core.types import Array, StrPath
-from ..recovery.fields import find_fields
+from ..recovery.fields import DomainValues, find_fields
 from ..recovery.grids import grids, in_space
 
 logger = logging.getLogger(__name__)
@@ -31,7 +31,8 @@ class BodyFields(NamedTuple):
     """The body of a state on points: the arguments of a ``meshio.Mesh``.
 
     ``points`` have the shape (n, 3); elements do not share points. ``cells`` has for each beam its
-    cell type and its cells, as rows of point numbers; of each rigid body its outline.
+    cell type and its cells, as rows of point numbers; of each rigid body its outline; of each
+    domain its triangles or quads.
     ``point_data`` has fields by name, (n,) or (n, 3): vectors with a third component of zero,
     tensors as (xx, yy, xy). ``cell_data`` has the numbers ``beam`` and ``element``, one array for
     each beam.
@@ -66,7 +67,8 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     undeformed = require_flag("undeformed", undeformed)
     first = np.cumsum([0] + [g.x.shape[1] for g in found])
     data = {field.name: np.concatenate([_values(field, g, fields is None) for g in found])
-            for field in wanted if state.beams or field.name == "displacement"}
+            for field in wanted
+            if field.name == "displacement" or any(g.values is not None for g in found)}
     return BodyFields(
         np.concatenate([g.points(undeformed) for g in found]),
         [(g.kind, start + g.cells) for start, g in zip(first, found)], data,
@@ -85,7 +87,7 @@ def _values(field, grid, lenient):
     try:
         value = field.of(grid.values)
     except InputError as error:
-        if not lenient:
+        if not lenient and not isinstance(grid.values, DomainValues):
             raise
         logger.info("%s is not a number: %s", field.name, error)
         return nan
@@ -112,7 +114,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     =============================  ==========================================================
 
     ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
-    outline, numbered behind the beams, without strain and stress (NaN). The outlines of obstacles
+    outline, numbered behind the beams, without strain and stress (NaN). A domain has its
+    own cells, halved, and its strain in global axes. The outlines of obstacles
     go into a file of lines beside it, ``name_obstacles``, with their numbers in ``obstacle``.
 
     Parameters

@@ -410,6 +410,40 @@ def find_fields(fields: Any) -> list[Field]:
     return found
 
 
+class DomainValues:
+    """What is known at points of a domain: displacement and strain, in global axes.
+
+    Parameters
+    ----------
+    x, u, gradient
+        Reference positions and displacements, (2, n), and the displacement gradient, (2, 2, n).
+
+    Attributes
+    ----------
+    strain
+        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), (3, n).
+    F
+        Deformation gradient, (2, 2, n).
+    """
+
+    _small = False
+
+    def __init__(self, x: Array, u: Array, gradient: Array) -> None:
+        self.x, self.u, self.n = x, u, x.shape[1]
+        self.F = gradient + np.eye(2)[..., None]
+        C = np.einsum("kin,kjn->ijn", self.F, self.F)
+        self.strain = self.elastic = np.array(
+            [0.5 * (C[0, 0] - 1.0), 0.5 * (C[1, 1] - 1.0), C[0, 1]])
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise InputError(f"{name.lstrip('_')} of a domain is a matter of its own forms")
+
+    def __getitem__(self, name: str) -> Array:
+        return find_field(name).of(self)  # type: ignore[arg-type]
+
+
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
     """Values of a beam in a state at reference points of all its elements, flattened.
 

@@ -10,10 +10,10 @@ from ..beam.beam import Beam
 from ..core.errors import InputError, require_flag, require_integer, require_like, shown
 from ..core.quadrature import tensor
 from ..core.types import Array
-from .fields import Values, values_on_grid
+from .fields import DomainValues, Values, values_on_grid
 
 #: VTK's numbers of cells, by what meshio calls them.
-CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
+CELL_TYPES = {"triangle": 5, "polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
 #: VTK evaluates Lagrange cells up to this degree.
 MAX_LAGRANGE_DEGREE = 10
@@ -26,11 +26,12 @@ MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 
 class Grid(NamedTuple):
-    """One beam or rigid body on points: reference positions ``x`` and displacements ``u``, (2, n).
+    """One member on points: reference positions ``x`` and displacements ``u``, (2, n).
 
-    ``kind`` is what meshio calls the cells: "quad", "VTK_LAGRANGE_QUADRILATERAL", or "polygon";
-    ``cells`` (nc, k) are rows of point numbers, ``elements`` (nc,) their elements. ``rows`` points
-    across a section follow each other. ``values`` are the :class:`~.fields.Values` of a beam.
+    ``kind`` is what meshio calls the cells: "quad", "triangle", "VTK_LAGRANGE_QUADRILATERAL", or
+    "polygon"; ``cells`` (nc, k) are rows of point numbers, ``elements`` (nc,) their elements.
+    ``rows`` points across a section follow each other. ``values`` are the :class:`~.fields.Values`
+    of a beam, :class:`~.fields.DomainValues`, or None of a rigid body.
     """
 
     name: str
@@ -40,7 +41,7 @@ class Grid(NamedTuple):
     cells: Array
     elements: Array
     rows: int
-    values: Values | None
+    values: Values | DomainValues | None
 
     def points(self, undeformed: bool = False) -> Array:
         """Positions with a third component of zero, shape (n, 3)."""
@@ -49,7 +50,7 @@ class Grid(NamedTuple):
 
 def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
           recover: bool = True) -> list[Grid]:
-    """The :class:`Grid` of each beam and rigid body of a state.
+    """The :class:`Grid` of each beam, rigid body and domain of a state.
 
     ``subdivide`` says how many quads an element has along and across, or it is one Lagrange cell.
     """
@@ -73,6 +74,13 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
         out.append(Grid(f"body {k}" if body.name is None else body.name, x,
                         body.outline_at(state.u_of(body)) - x, "polygon",
                         np.arange(x.shape[1])[None], np.zeros(1, dtype=int), 1, None))
+    for k, domain in enumerate(getattr(getattr(state, "system", None), "domains", ())):
+        x, u, gradient, cells = domain.drawn(state.u_of(domain))
+        number = domain.basis.mesh.nelements
+        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, x, u,
+                        "triangle" if cells.shape[1] == 3 else "quad", cells,
+                        np.repeat(np.arange(number), len(cells) // number), 1,
+                        DomainValues(x, u, gradient)))
     return out
 
 

@@ -233,11 +233,6 @@ class State(Immutable, MaterialPoints):
         return tuple(self.system.bodies)
 
     @property
-    def domains(self) -> tuple[Domain, ...]:
-        """The domains of the scene."""
-        return tuple(self.system.domains)
-
-    @property
     def q(self) -> Array:
         """Absolute coordinates, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.system.members]) + self.u

@@ -13,7 +13,7 @@ from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
                            require_options, require_path, require_text)
 from ..core.types import StrPath
-from ..recovery.fields import FIELDS, find_fields
+from ..recovery.fields import FIELDS, DomainValues, find_fields
 from ..recovery.grids import CELL_TYPES, grids, in_space
 from .animation import pixels
 from .matplotlib import colormap
@@ -33,8 +33,8 @@ def _pyvista():
 
 def _normal(field, values):
     """The component of a tensor normal to the plane, (n,); NaN where the law does not say it."""
-    strain, cable = values.elastic, not values.beam.has_sections
     try:
+        strain, cable = values.elastic, not values.beam.has_sections
         if field.name == "strain":
             return values.of_materials(lambda law: 0.5 * (law.thickness_stretch(strain)**2 - 1.0))
         if field.name == "stress":
@@ -53,7 +53,7 @@ def _arrays(values, wanted, lenient):
         try:
             value = field.of(values)
         except InputError:
-            if not lenient:
+            if not lenient and not isinstance(values, DomainValues):
                 raise
             continue  # a law without a stress normal to the plane
         name = f"{field.name} ({field.frame} frame)" if field.components > 1 and field.frame else (

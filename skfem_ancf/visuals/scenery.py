@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..actions.obstacles.pictures import around, outlines
-from ..core.errors import (InputError, require_finite_scalar, require_flag, require_positive,
-                           require_unmasked, shown)
+from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
+                           require_positive, require_unmasked, shown)
 from ..core.types import Array
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
 from ..recovery.grids import Grid, grids, in_space
@@ -35,9 +35,7 @@ class _Body:
         x, u = (y.reshape(*flat, grid.rows) for y in (grid.x, grid.u))
         axis_x, axis_u = (y.reshape(flat) for y in (axis.x, axis.u))
         self.reference, self.deformed = (x, axis_x), (x + u, axis_x + axis_u)
-        self.values = field.of(grid.values)
-        if field.components > 1:
-            self.values = np.sqrt(np.sum(self.values**2, axis=0))
+        self.values = _values(field, grid)
 
     def points(self, body, factor):
         """Positions (2, nelements, m + 1, rows) with the section drawn ``factor`` thicker."""
@@ -55,6 +53,44 @@ class _Body:
             out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
                                   run[:, 0, -2:0:-1]]).T)
         return out
+
+
+class _Solid:
+    """One domain, with what a :class:`_Body` has: quads, those of triangles with a corner twice."""
+
+    def __init__(self, grid, field):
+        self.cells = grid.cells[:, [0, 1, 2, -1]]
+        self.reference, self.deformed = grid.x, grid.x + grid.u
+        self.values = _values(field, grid)
+
+    def points(self, body, factor):
+        """Positions (2, n)."""
+        return body
+
+    def outline(self, body, factor):
+        """Edges of the boundary, of the reference configuration all cells; shapes (points, 2)."""
+        if body is self.reference:
+            return list(body.T[self.cells])
+        size = 1e-6 * np.max(np.ptp(self.reference, axis=1))
+        number = np.unique(np.round(self.reference / size), axis=1, return_inverse=True)[1].ravel()
+        ends = np.concatenate([self.cells[:, [k, (k + 1) % 4]] for k in range(4)])
+        ends = ends[number[ends[:, 0]] != number[ends[:, 1]]]
+        _, first, times = np.unique(np.sort(number[ends], axis=1), axis=0, return_index=True,
+                                    return_counts=True)
+        return list(body.T[ends[first[times == 1]]])
+
+
+def _values(field, grid):
+    values = field.of(grid.values)
+    return values if field.components == 1 else np.sqrt(np.sum(values**2, axis=0))
+
+
+def _coloured(grid, field):
+    """What is drawn of a domain, or None where the field is not known."""
+    try:
+        return None if grid.values is None else _Solid(grid, field)
+    except AncfError:
+        return None
 
 
 def _thickness(thickness, bodies):
@@ -94,23 +130,25 @@ class Scenery:
     """States of the same beams with one factor of thickness and one range of colours.
 
     Arguments are those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and
-    ``rigid`` are for each state its beams, and the grids of its rigid bodies; ``found`` (n,) values
-    of all beams.
+    ``rigid`` are for each state its beams and domains, and the grids of its rigid bodies, and of
+    domains on which the field is not known; ``found`` (n,) values of all that is coloured.
     """
 
     def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
                  limits: Any, subdivide: tuple[int, int], recover: bool) -> None:
         self.field: Field = find_field(field, DRAWN)
         self.undeformed = require_flag("undeformed", undeformed)
-        self.frames: list[list[_Body]] = []
+        self.frames: list[list[Any]] = []
         self.rigid: list[list[Grid]] = []
         for state in states:
             found = grids(state, subdivide, recover=recover)
             self.frames.append([_Body(grid, state, beam, subdivide[0], self.field)
                                 for grid, beam in zip(found, state.beams)])
-            self.rigid.append(found[len(state.beams):])
+            others = [(grid, _coloured(grid, self.field)) for grid in found[len(state.beams):]]
+            self.frames[-1] += [solid for _, solid in others if solid is not None]
+            self.rigid.append([grid for grid, solid in others if solid is None])
         self.beams = [body for frame in self.frames for body in frame]
-        self.factor = _thickness(thickness, self.beams)
+        self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
         self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
         self.low, self.high = _limits(limits, self.found, self.field)
         self._states = states
@@ -151,7 +189,7 @@ class Scenery:
 
     def rigid_outlines(self, k: int) -> list[Array]:
         """Corners of the rigid bodies of frame ``k``, shapes (n, 2)."""
-        return [(g.x + g.u).T for g in self.rigid[k]]
+        return [cell for g in self.rigid[k] for cell in (g.x + g.u).T[g.cells]]
 
     def cells(self, frames: Iterable[int] = (0,)) -> Array:
         """Quads of the beams of frames, one behind the other, as rows of points, (nc, 4)."""
@@ -166,9 +204,9 @@ class Scenery:
         cells, at = self.cells(), sum(b.values.size for b in self.frames[0])
         parts = [np.hstack([np.full((len(cells), 1), 4), cells]).ravel()]
         for grid in self.rigid[0]:
-            corners = grid.x.shape[1]
-            parts.append(np.append(corners, at + np.arange(corners)))
-            at += corners
+            corners = np.full((len(grid.cells), 1), grid.cells.shape[1])
+            parts.append(np.hstack([corners, at + grid.cells]).ravel())
+            at += grid.x.shape[1]
         return np.concatenate(parts)
 
     @property
