@@ -111,10 +111,8 @@ def gradients(beam: Any, u: Array, X: Array, tind: Array | None) -> tuple[Array,
     mapping = beam.mesh.mapping()
     if beam.has_sections:
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-        _, d_xi, d_eta = beam.element.of_mesh(mapping, X, tind)
-        r_xi, r_eta = (np.einsum("ebi,bep->iep", u_e, d, optimize=True) for d in (d_xi, d_eta))
-        rates, frame = mapping.in_frame(X, tind)
-        return r_xi[:, None] * rates[:, 0] + r_eta[:, None] * rates[:, 1], frame
+        slopes, frame = beam.element.slopes(mapping, X, tind)
+        return np.einsum("ebi,bjep->ijep", u_e, slopes, optimize=True), frame
     e, P, shape = _flat(beam, X, tind)
     (_, tangent), *axis = cable_axis(beam, u, e, P[0])
     longer, ratio = fibres(beam, e, P, *axis)

@@ -11,7 +11,7 @@ import scipy
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..core.errors import (InputError, MeshError, ModelWarning, NameUnknown, ask, ask_field,
+from ..core.errors import (InputError, MeshError, ModelWarning, NameUnknown, ask_field,
                            require_finite, require_integer, require_label, require_not_negative,
                            require_unmasked, shown, warn)
 from ..core.types import Array
@@ -19,7 +19,7 @@ from .curve import Curve
 from .members import Axes, MeshLines, heights_of_chains
 from .mesh_beam import MeshBeam
 from .numbering import default_tags
-from .places import is_point, points_of_rows
+from .places import is_point, points_of_rows, satisfying
 
 #: How far from a node a point may be that names it, relative to the size of the net.
 NEAR = 1e-9
@@ -201,14 +201,10 @@ class Net:
         if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
             return np.array([require_integer("the number of a node", place, 0, n - 1)])
         if callable(place):
-            chosen = np.asarray(ask("the function that names nodes, of x,", place, self.points))
-            if chosen.shape != (n,) or chosen.dtype != bool:
-                raise InputError("a function that names nodes takes points x of shape (2, n) and "
-                                 f"returns n truth values, as lambda x: x[1] == 0; for n = {n} it "
-                                 f"returned {chosen.dtype} of shape {chosen.shape}")
-            if not np.any(chosen):
+            chosen = satisfying(place, self.points, "nodes")
+            if not len(chosen):
                 raise MeshError(f"the function {place!r} selects none of the {n} nodes")
-            return np.flatnonzero(chosen)
+            return chosen
         if isinstance(place, (list, tuple, set, frozenset)) and len(place) or (
                 isinstance(place, np.ndarray) and place.ndim == 1 and len(place)):
             return np.unique(np.concatenate([self.points_at(one) for one in place]))

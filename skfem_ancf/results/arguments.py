@@ -12,7 +12,14 @@ from ..core.types import Array
 from ..equations.system import System
 from .state import State
 
-_GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths", "heights")
+#: What two meshes have in common whose states may be exchanged, and what is said where not.
+_GEOMETRY = {
+    "nelements": "its mesh has {} elements, that of the scene {}",
+    "height": "its height is {:.9g}, that of the scene {:.9g}",
+    "sections": "its sections are {}, those of the scene {}",
+    **dict.fromkeys(("p", "p_X", "lengths"), "its nodes lie elsewhere"),
+    "t": "its nodes are joined in another way", "heights": "its heights are others",
+    **dict.fromkeys(("p_Y", "p_XY"), "its sections turn in another way")}
 
 
 def difference(a: Beam, b: Beam) -> str | None:
@@ -21,17 +28,10 @@ def difference(a: Beam, b: Beam) -> str | None:
         return None
     if repr(a.element) != repr(b.element) or not _same(a.element.doflocs, b.element.doflocs):
         return f"its element is {a.element!r}, that of the scene {b.element!r}"
-    if a.mesh.nelements != b.mesh.nelements:
-        return f"its mesh has {a.mesh.nelements} elements, that of the scene {b.mesh.nelements}"
-    if a.mesh.height != b.mesh.height:
-        return f"its height is {a.mesh.height:.9g}, that of the scene {b.mesh.height:.9g}"
-    if a.mesh.sections != b.mesh.sections:
-        return f"its sections are {a.mesh.sections}, those of the scene {b.mesh.sections}"
-    for name in _GEOMETRY:
-        if not _same(getattr(a.mesh, name), getattr(b.mesh, name)):
-            what = "the nodes lie elsewhere" if name in ("p", "p_X", "lengths") else (
-                f"{name} of the mesh differs")
-            return f"{what} in the stress-free body"
+    for name, what in _GEOMETRY.items():
+        x, y = getattr(a.mesh, name), getattr(b.mesh, name)
+        if not _same(x, y):
+            return what.format(x, y)
     return None
 
 
