@@ -80,6 +80,8 @@ class ElementBeam(Immutable, Element):
         Reference points, shape (2, npoints) or (2, nelements, npoints).
     tind
         Elements, shape (nelements,), or None for all.
+    i, which
+        Number of the local function, or a slice of them.
 
     Attributes
     ----------
@@ -129,10 +131,9 @@ class ElementBeam(Immutable, Element):
 
         Parameters
         ----------
-        measure
-            With ``gauss(n)``, as of :mod:`skfem_ancf.sections.measure`.
-        shear
-            What :func:`skfem_ancf.sections.shear.shear_factor` gives for the section.
+        measure, shear
+            With ``gauss(n)``, as of :mod:`skfem_ancf.sections.measure`; the shear factor of the
+            section.
         """
         other = self._thawed()
         other._measure, other.shear = measure, shear
@@ -199,13 +200,11 @@ class ElementBeam(Immutable, Element):
 
         Parameters
         ----------
-        h
-            Height of the section; of a tapered one at each point, shape X.shape[1:], or of each
-            element at the same points, shape (nelements, npoints).
+        h, rate
+            Height of the section and its derivative by xi; of a tapered one at each point, shape
+            X.shape[1:], or of each element at the same points, shape (nelements, npoints).
         i
             Number of the local function, 0 to 2 nodal_dofs - 1, or a slice of them.
-        rate
-            Derivative of the height by xi, of the same shape.
 
         Returns
         -------
@@ -253,8 +252,7 @@ class ElementBeam(Immutable, Element):
         Parameters
         ----------
         X, Y
-            Reference points of derivatives along the axis, shape (2, n), and of those across, (2,
-            m).
+            Reference points of derivatives along the axis, (2, n), and of those across, (2, m).
         """
         out = np.concatenate([self._unit(X)[1].T, self._unit(Y)[2].T])
         # the positions of both nodes together are a translation: exactly, or round-off resists it
@@ -263,13 +261,7 @@ class ElementBeam(Immutable, Element):
 
     def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                 i: slice = slice(None)) -> list[Array]:
-        """Local functions and their derivatives by xi and eta, (n, nelements, npoints) each.
-
-        Parameters
-        ----------
-        i
-            Some of the functions.
-        """
+        """Local functions ``i``, derivatives by xi and eta, (n, nelements, npoints) each."""
         h, rate = mapping.height(X[0], tind) if self.section.number else (1.0, 0.0)
         *found, slope = self.local(X, h, i, rate)
         lengths = mapping.mesh.lengths if tind is None else mapping.mesh.lengths[tind]
@@ -278,12 +270,8 @@ class ElementBeam(Immutable, Element):
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
-        """A local function on the body, with its gradient: what scikit-fem's ``Basis`` asks for.
-
-        Parameters
-        ----------
-        i
-            Number of the local function, 0 to 2 nodal_dofs - 1.
+        """The local function ``i`` on the body, with its gradient: what scikit-fem's ``Basis`` asks
+        for.
 
         Returns
         -------
@@ -297,13 +285,7 @@ class ElementBeam(Immutable, Element):
 
     def functions(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                   which: slice = slice(None)) -> tuple[Array, Array]:
-        """Local functions, (n, nelements, npoints), and their gradients, (n, 2, ...).
-
-        Parameters
-        ----------
-        which
-            Some of them.
-        """
+        """Local functions ``which``, (n, nelements, npoints), and their gradients, (n, 2, ...)."""
         value, d_xi, d_eta = self.of_mesh(mapping, X, tind, which)
         invDF = mapping.invDF(X, tind)
         return value, invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None]
@@ -312,11 +294,7 @@ class ElementBeam(Immutable, Element):
                ) -> tuple[Array, Array]:
         """Derivatives of all local functions along the axis and across it, and the beam's frame.
 
-        Returns
-        -------
-        slopes, frame
-            Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints), see
-            :meth:`MappingBeam.frame <skfem_ancf.mesh.mapping.MappingBeam.frame>`.
+        Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints).
         """
         _, d_xi, d_eta = self.of_mesh(mapping, X, tind)
         rates, frame = mapping.in_frame(X, tind)
@@ -352,10 +330,11 @@ class ElementBeam(Immutable, Element):
 
     @cached_property
     def halving(self) -> Array:
-        """The left half of an element of length 1 and height 1 from the whole of it.
+        """The left half of an element of length 1 and height 1 from the whole, (2 nodal_dofs, 2
+        nodal_dofs).
 
-        Shape (2 nodal_dofs, 2 nodal_dofs), for degrees of freedom multiplied by the length to the
-        number of their derivatives along X. The last nodal_dofs rows are those of the middle.
+        For degrees of freedom multiplied by the length to the number of their derivatives along X.
+        The last nodal_dofs rows are those of the middle.
         """
         n = self.axis_degree + 1, max(self.order, 1) + 1
         X = np.array(np.meshgrid(np.linspace(0, 1, n[0]), np.linspace(0, 1, n[1]))).reshape(2, -1)
@@ -371,8 +350,7 @@ class ElementBeam(Immutable, Element):
         Raises
         ------
         MeshError
-            If it is curved, and the element's axis and sections are of two degrees, which those of
-            a curved mesh are not but for a cubic axis.
+            If it is curved, and the element's axis and sections are of two degrees.
         """
         if mesh.is_straight:
             return mesh
@@ -388,12 +366,8 @@ class ElementBeam(Immutable, Element):
         return self.sections
 
     def rigid(self, mesh: MeshBeam) -> Array:
-        """The degrees of freedom of the reference configuration, less the positions of nodes.
-
-        Returns
-        -------
-        ndarray
-            Shape (nodal_dofs, 2, nvertices); the first row, for ``r``, is zero.
+        """The DOFs of the reference configuration less the positions of nodes, (nodal_dofs, 2,
+        nvertices).
 
         Raises
         ------

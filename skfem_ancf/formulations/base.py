@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -78,59 +78,36 @@ class Term:
         return np.kron(along, across)
 
 
-class Integrated(Protocol):
-    """What a formulation reads of a layer, a :class:`~skfem_ancf.beam.strains.BeamLayer`."""
-
-    terms: Sequence[Term]
-
-    def strain(self, term: Term, u: Array, X: Array, tind: Array | None = None,
-               across: Rule | None = None) -> Array:
-        """The strain of a term, or its mean over sections; (3, nelements, npoints)."""
-
-
 class Formulation(Immutable):
-    """Base class of the formulations; a subclass gives its name and its terms."""
+    """Base class of the formulations; a subclass gives its name and its terms.
+
+    Other Parameters
+    ----------------
+    mesh, element, material, width
+        Those of the beam.
+    """
 
     name = ""
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
-        """The integrals that make up the strain energy, a list of :class:`Term`.
-
-        Parameters
-        ----------
-        element, material
-            A beam element and a material.
-        """
+        """The integrals that make up the strain energy, a list of :class:`Term`."""
         raise NotImplementedError(f"{type(self).__name__} has no terms: a formulation defines "
                                   "terms(element, material), a list of Term")
 
     def points_along(self, element: ElementBeam, material: Material) -> int:
-        """Number of points along an element of the first of the terms.
-
-        Parameters
-        ----------
-        element, material
-            As for :meth:`terms`.
-        """
+        """Number of points along an element of the first of :meth:`terms`."""
         return len(self.terms(element, material)[0].axis[0])
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:
-        """A constant element stiffness, added to that of the terms, or None for none.
+        """A constant element stiffness (nelements or 1, 2 nb, 2 nb), added to that of the terms, or
+        None.
 
-        It must vanish for rigid motions of the reference configuration, large ones included. Its
-        shape is (nelements, 2 nb, 2 nb), or (1, ...) where it is the same for all elements.
-
-        Parameters
-        ----------
-        mesh, element, material
-            Those of the beam.
-        width
-            Width of its section.
+        It must vanish for rigid motions of the reference configuration, large ones included.
         """
         return None
 
-    def stress(self, layer: Integrated, strain: Array, u: Array, X: Array,
+    def stress(self, layer: Any, strain: Array, u: Array, X: Array,
                tind: Array | None) -> Array:
         """Second Piola-Kirchhoff stress, for output; shape (3, nelements, npoints).
 
@@ -169,8 +146,7 @@ class Formulation(Immutable):
 
         That is of twice the degree of the strain: ``element.strain_degree`` along the axis of a
         straight element, and 2 N across the section, for St. Venant-Kirchhoff. Across a section
-        that is no rectangle they have its width, and across several materials they are those of
-        one of them: a formulation is asked for each.
+        that is no rectangle they have its width.
         """
         require_like("element", element, "beam element", "strain_degree", "order")
         n = 2 * element.order + 1

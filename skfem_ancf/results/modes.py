@@ -92,16 +92,13 @@ class Modes:
     def mode(self, i: int, amplitude: float) -> State:
         """The state displaced along a shape, to plot or save; along the real part of a complex one.
 
-        It is linearised about :attr:`state`: strain, stress and section forces differ from those
-        there in proportion to the amplitude, and with the inertia of the vibration they are in
-        equilibrium. About the stress-free state its strain energy is ``(omega amplitude)^2 / 2``.
+        It is linearised about :attr:`state`, and with the inertia of the vibration in equilibrium.
+        About the reference configuration its strain energy is ``(omega amplitude)^2 / 2``.
 
         Parameters
         ----------
-        i
-            Number of the shape; negative ones count from the end.
-        amplitude
-            What the shape is multiplied by.
+        i, amplitude
+            Number of the shape, negative ones from the end; what it is multiplied by.
         """
         i = require_index("i", i, len(self.shapes))
         amplitude = require_finite_scalar("amplitude", amplitude)

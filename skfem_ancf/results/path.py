@@ -118,8 +118,7 @@ class Path:
         Parameters
         ----------
         point, beam
-            One point, shape (2,), or many, as for :meth:`State.displacement
-            <skfem_ancf.results.State.displacement>`.
+            One point, shape (2,), or many, as for :meth:`State.displacement`.
         """
         return self.system.points.find(point, beam).displacement(self.u)
 
@@ -144,10 +143,9 @@ class Path:
 
         Parameters
         ----------
-        point, component, beam
-            A material point, shape (2,), the component 0 or 1 of its displacement, and its beam.
-        **options
-            Those of that function.
+        point, component, beam, **options
+            A material point, shape (2,), the component 0 or 1 of its displacement, and its beam;
+            those of that function.
         """
         from ..visuals.matplotlib import plot_path
 

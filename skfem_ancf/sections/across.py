@@ -256,7 +256,7 @@ class Across(Immutable):
         return self.at(layer, X, tind).factor("density")
 
     def face(self, side: int, X: Array, tind: Array | None = None) -> Any:
-        """The width of the bottom or the top at points on it; raises InputError of a circle.
+        """The width of the bottom (``side`` 0) or the top (1); raises InputError of a circle.
 
         Parameters
         ----------
@@ -303,21 +303,13 @@ class Across(Immutable):
 
         Parameters
         ----------
-        e, xi
-            Elements and places along them, shapes (nsections,).
-        n
-            Number of points, at least.
+        e, xi, n
+            Elements and places along them, shapes (nsections,); number of points, at least.
         """
         return layer.measure.sampled(self.at(layer, np.repeat(xi[None, :, None], 2, 0), e), n)
 
     def terms(self, formulation: Any) -> list[tuple[Layer, list[Any]]]:
-        """The terms of the strain energy of each layer, by a formulation.
-
-        Raises
-        ------
-        InputError
-            If the rules of the formulation do not know the section.
-        """
+        """The terms of the strain energy of each layer, by a formulation."""
         out = []
         for layer in self.layers:
             terms = list(formulation.terms(self.element_of(layer), layer.material))
