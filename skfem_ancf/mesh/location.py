@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import scipy
 from numpy.polynomial.polynomial import polyder, polyval
-from numpy.typing import ArrayLike
 
 from ..core.errors import MeshError
 from ..core.types import Array
@@ -18,9 +17,9 @@ from .reference_cell import hermite_basis
 #: Corrections of Newton's method that are small enough, and how many there are at most.
 CLOSE, ITERATIONS = 1e-7, 30
 
-#: Samples of each element in the tree of the finder, and candidates for a point that is in none of
-#: the elements next to its nearest sample.
-SAMPLES, CANDIDATES = 4, 6
+#: Samples of each element in the tree of the finder, steps to neighbours from the nearest sample,
+#: and candidates for a point that is in none of these elements.
+SAMPLES, WALK, CANDIDATES = 4, 3, 6
 
 
 @lru_cache(16)
@@ -60,18 +59,17 @@ class Inverse:
             return self.largest
         return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
 
-    def __call__(self, x: Array, e: Any, xi: ArrayLike = 0.5) -> Array:
-        """Reference points of points of elements e, both (2, n, npoints), by Newton's method.
+    def __call__(self, x: Array, e: Any) -> Array:
+        """Reference points of points of elements e, both (2, n, npoints); NaN where there is none.
 
-        It starts at ``xi``; NaN where there is none.
+        They are found by Newton's method from the middle of the elements.
         """
         axis, director, beside = (c[..., e, None] for c in (self.axis, self.director, self.beside))
         gap = x - self.start[:, e, None]
         # from the axis to the point x director: zero at the section that holds the point
         beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
         beside[:director.shape[1]] += _cross(gap[:, None], director)
-        X = np.empty(x.shape)
-        X[0] = xi
+        X = np.full(x.shape, 0.5)
         for _ in range(ITERATIONS):
             value, slope = with_slope(beside, X[0])
             change = value / slope
@@ -239,27 +237,36 @@ class Finder:
         near = self._tree.query(x.T, k=k)[1].reshape(x.shape[1], k)
         return np.sort(near // SAMPLES, axis=1)
 
+    @cached_property
+    def _line(self):
+        """Direction of the axis and places of its nodes along it, where it is one straight line."""
+        mesh, d = self.mesh, self.mesh.p_X[:, 0]
+        one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
+        return (d, d @ mesh.p) if one else None
+
     def _near(self, x, noise):
-        """From the nearest sample, and to the neighbour where the point is beyond a node."""
-        distance, near = self._tree.query(x.T)
-        e, far = near // SAMPLES, distance > self._far
+        """In the element that is nearest, and the neighbour where the point is beyond a node."""
+        if self._line is None:
+            distance, near = self._tree.query(x.T)
+            e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
+        else:
+            d, nodes = self._line
+            e = np.clip(np.searchsorted(nodes, d @ x) - 1, 0, len(nodes) - 2)
+            todo = np.arange(x.shape[1])
         X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
-        todo = np.nonzero(~far)[0]
-        xi = (near % SAMPLES + 0.5) / SAMPLES
-        for _ in range(3):
-            X[:, todo] = self.inverse(x[:, todo, None], e[todo], xi[todo, None])[..., 0]
+        steps = 0
+        while len(todo):
+            X[:, todo] = self.inverse(x[:, todo, None], e[todo])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)
             # a point of the section between two elements is one of the left
             before, after = self._beside[:, e[todo]]
             other = np.where(X[0, todo] <= noise, before,
                              np.where(X[0, todo] > 1.0 + noise, after, -1))
-            todo, other = todo[other >= 0], other[other >= 0]
-            if not len(todo):
-                break
-            e[todo], xi[todo] = other, 0.5
-        else:
-            X[:, todo] = self.inverse(x[:, todo, None], e[todo])[..., 0]
-            outside[todo] = self._outside(X[:, todo], noise)
+            on, steps = (other >= 0) & (steps < WALK), steps + 1
+            todo = todo[on]
+            e[todo] = other[on]
+        if self._line is not None:
+            outside[outside > 1.0] = np.inf
         return e, X, outside
 
     def _best(self, x, candidates, noise):
