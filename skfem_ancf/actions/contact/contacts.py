@@ -13,14 +13,14 @@ from ...core.band import Band
 from ...core.callbacks import handle_of
 from ...core.errors import InputError
 from ...core.types import Array
-from .active_set import project, projected, projection
+from .active_set import project
 from .crossing import CrossingGuard, middle_of
-from .gap import distances, places, surface
+from .gap import places
 from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, of_contacts, push, resist, rub,
                       states, way)
 from .poses import taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, LARGEST, NOW, POSE,
-                     POSES, PRESSURES, PROJECTED, RATE, SETTLE, SLOTS, STIFFNESS, TANGENT, WIDTH,
+                     POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, WIDTH,
                      ContactTables, Pair, Question, pair_of)
 
 
@@ -36,7 +36,7 @@ BY_POINTS = ("its steps do not correct pressures: held at their points, a body t
              "Gauss, 4.3 times by those of Radau")
 #: Of scenes without obstacles.
 NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(LARGEST),
-                            np.zeros(0), np.zeros(2, np.int64), 0, 0)
+                            0, 0)
 
 
 class Group(NamedTuple):
@@ -99,25 +99,20 @@ class Contacts:
     def _tables(self):
         n = len(self.groups)
         headers, ints, floats = np.zeros((n, HEADER), dtype=np.int64), [], []
-        memory, cache, at, after = LARGEST + 2 * n, 0, 0, HEADER * n
+        memory, at, after = LARGEST + 2 * n, 0, HEADER * n
         for number, (k, group) in enumerate(self.groups):
             shape, points, pairs = self.numbers(k), len(group.first), len(group.weights)
-            low = int(group.first.min())
-            span = int(group.first.max()) + 2 * pairs - low
             headers[number] = (self.obstacles[k].shape.kind, k, group.elements, group.points, pairs,
-                               len(group.slopes) > 0, len(shape), after, at, memory, cache, low,
-                               span)
+                               len(group.slopes) > 0, len(shape), after, at, memory)
             ints.append(group.first)
             floats.append(np.concatenate([x.ravel() for x in (
                 group.weights, group.slopes, group.areas, group.offsets, group.starts,
                 middle_of(group), group.numbers, shape)]))
             memory, after, at = memory + 4 * points, after + points, at + floats[-1].size
-            cache += SLOTS * (span + POSE + group.elements + PROJECTED * points)
         return ContactTables(
             n, np.concatenate([headers.ravel(), *ints]).astype(np.int64), np.concatenate(floats),
-            np.zeros(POSES * len(self.obstacles)), np.zeros(memory), np.full(cache, np.nan),
-            np.zeros(2 + n, np.int64), int(self.moving or self.own), handle_of(self),
-            ANCHORS * self.anchored + PRESSURES * self.augmented)
+            np.zeros(POSES * len(self.obstacles)), np.zeros(memory), int(self.moving or self.own),
+            handle_of(self), ANCHORS * self.anchored + PRESSURES * self.augmented)
 
     def pair(self, k: int) -> Pair:
         """Views of the tables for group k."""
@@ -298,11 +293,8 @@ class Contacts:
         out = []
         for k, group in enumerate(self.groups):
             pair, at = self.pair(k), np.arange(len(group[1].first))
-            z, x, found = (np.empty((rows, at.size)) for rows in (4, 2, 6))
-            places(pair, u, 1.0, at, z)
-            surface(pair, at, z, x)
-            distances(pair, NOW, False, x, found)
-            out.append((group, x, found[0]))
+            found = project(pair, NOW, u, at)
+            out.append((group, found[4:GAP], found[GAP]))
         return out
 
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
@@ -315,10 +307,8 @@ class Contacts:
         out = []
         for k, (which, group) in enumerate(self.groups):
             pair, at = self.pair(k), np.arange(len(group.first))
-            w, slot = np.zeros((ROWS, at.size)), projection(pair, NOW, u)
-            project(pair, NOW, slot, u, at)
-            gap = projected(pair, slot)[GAP].copy()
-            states(pair, slot, slot, at, w)
+            w, found = np.zeros((ROWS, at.size)), project(pair, NOW, u, at)
+            states(pair, True, found, found, at, w)
             push(pair, at, w)
             rub(pair, True, at, w)
             force, pressure = -w[PUSH:PUSH + 2], w[PRESSURE] / group.areas
@@ -327,7 +317,8 @@ class Contacts:
                 way(w)
                 resist(pair, 0.0, at, w)
                 force = force - w[PUSH:PUSH + 2]
-            out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure, gap))
+            out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure,
+                        found[GAP]))
         return out
 
     def potential(self, u: Array, t: float) -> float:

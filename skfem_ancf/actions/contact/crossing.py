@@ -174,7 +174,6 @@ class _Path:
         if self.obstacle.moves:
             x = np.array([taken_back(self._contacts.pose(self._which, float(s), False), y)
                           for s, y in zip(t, x)])
-        self._contacts.tables.counts[1] += x[:, 0].size
         return x
 
     def _gap(self, x, t):

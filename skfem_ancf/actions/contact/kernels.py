@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.source import indices, primitive, source
 from ..tables import add_each
-from .active_set import near_points, project, projected, projection, stride, touching
+from .active_set import near_points, project, search, stride, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface
 from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_slope,
                    return_mapping, slip_of)
@@ -57,20 +57,19 @@ def _of_pair(pair, asked, u, v, out):
     resists = what == RESISTING or what == DAMPED_TANGENT
     if resists and pair.numbers[DAMPING] == 0.0:
         return
-    begin = projection(pair, NOW if same else BEGIN, u)
-    end = begin if same else projection(pair, END, v)
-    at = near_points(pair, what, begin, end)
+    begin = search(pair, NOW if same else BEGIN, u)
+    at = near_points(pair, what, begin, begin if same else search(pair, END, v))
     if at.size == 0:
         return
-    project(pair, NOW if same else BEGIN, begin, u, at)
-    if not same:
-        project(pair, END, end, v, at)
+    a = project(pair, NOW if same else BEGIN, u, at)
+    b = a if same else project(pair, END, v, at)
     if what < SETTLE:
-        at = touching(pair, begin, end, at)
+        some = touching(pair, a, b, at)
+        at, a, b = at[some], a[:, some], b[:, some]
     if at.size == 0:
         return
     w = np.empty((ROWS, at.size))
-    states(pair, begin, end, at, w)
+    states(pair, same, a, b, at, w)
     if what == AUGMENT:
         _augment(pair, at, w, out)
         return
@@ -99,21 +98,20 @@ def _of_pair(pair, asked, u, v, out):
 
 
 @source
-def states(pair, begin, end, at, w):
-    """Fill the rows of points up to the derivative by the slope, by two projections."""
-    a, b, multiplier = projected(pair, begin), projected(pair, end), pair.memory[MULTIPLIER]
-    part = 1.0 / hardening(pair)
+def states(pair, same, a, b, at, w):
+    """Fill the rows of points up to the derivative by the slope, by their projections."""
+    part, multiplier = 1.0 / hardening(pair), pair.memory[MULTIPLIER]
     for c in range(4):
         for i in indices(at.size):
-            w[RATES + c, i] = b[c, at[i]] - a[c, at[i]]
-            w[MIDDLE + c, i] = a[c, at[i]]
+            w[RATES + c, i] = b[c, i] - a[c, i]
+            w[MIDDLE + c, i] = a[c, i]
     for i in indices(at.size):
         more = part * multiplier[at[i]]
-        w[DEPTH, i], w[DEPTH + 1, i] = more - a[GAP, at[i]], more - b[GAP, at[i]]
-        w[LAST, i], w[LAST + 1, i] = b[4, at[i]], b[5, at[i]]
-    if begin != end and pair.moving > 0:
-        _carry(pair, a, at, w)
-    if begin != end:
+        w[DEPTH, i], w[DEPTH + 1, i] = more - a[GAP, i], more - b[GAP, i]
+        w[LAST, i], w[LAST + 1, i] = b[4, i], b[5, i]
+    if not same and pair.moving > 0:
+        _carry(pair, a, w)
+    if not same:
         for c in range(4):
             for i in indices(at.size):
                 w[MIDDLE + c, i] += 0.5 * w[RATES + c, i]
@@ -124,11 +122,11 @@ def states(pair, begin, end, at, w):
 
 
 @source
-def _carry(pair, a, at, w):
+def _carry(pair, a, w):
     """Move points with the obstacle, from where it was or will be to where it is."""
-    for i in indices(at.size):
-        x, y = carried(pair.poses[NOW], pair.poses[BEGIN], a[4, at[i]], a[5, at[i]])
-        p, q = x - a[4, at[i]], y - a[5, at[i]]
+    for i in indices(w.shape[1]):
+        x, y = carried(pair.poses[NOW], pair.poses[BEGIN], a[4, i], a[5, i])
+        p, q = x - a[4, i], y - a[5, i]
         x, y = carried(pair.poses[NOW], pair.poses[END], w[LAST, i], w[LAST + 1, i])
         w[MIDDLE, i] += p
         w[MIDDLE + 1, i] += q

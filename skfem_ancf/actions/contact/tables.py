@@ -16,11 +16,9 @@ OUTLINE, CUSTOM = range(2)
 FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
 #: Of a pair: kind and number of its obstacle, elements, points of each element, pairs of degrees of
 #: freedom of each, whether normals depend on slopes, how many numbers the shape has; where its
-#: integers, numbers, memory and projections begin; the first of its degrees of freedom, and how
-#: many there are.
-(KIND, OBSTACLE, ELEMENTS, POINTS, PAIRS, SLOPES, SHAPE, INTS, FLOATS, MEMORY, CACHE, LOWEST,
- SPAN) = range(13)
-HEADER = 13
+#: integers, numbers and memory begin.
+KIND, OBSTACLE, ELEMENTS, POINTS, PAIRS, SLOPES, SHAPE, INTS, FLOATS, MEMORY = range(10)
+HEADER = 10
 #: Numbers of a pair: penalty stiffness, width of the transition, friction, tangential stiffness,
 #: damping, what a step in time adds to the stiffness, largest distance of a point from the middle
 #: of its element without displacement, 1 or -1 outside or inside of the shape, and the penetration
@@ -42,10 +40,8 @@ NOW, BEGIN, END = map(np.int64, range(3))
 ANCHORED, RATE, BILATERAL, LARGEST = range(4)
 #: What is kept from step to step: anchors, multipliers.
 ANCHORS, PRESSURES = 1, 2
-#: Projections of points: place and slope, point of the surface, gap, and whether it is known.
-GAP, KNOWN, PROJECTED = 6, 7, 8
-#: Displacements of which the projections are kept.
-SLOTS = 2
+#: The row of projections of points that is the gap, behind place and slope and the surface.
+GAP = 6
 
 
 class Question(NamedTuple):
@@ -72,12 +68,10 @@ class ContactTables(NamedTuple):
     """The obstacles of a scene, as ``number`` pairs.
 
     ``ints`` and ``floats`` are headers of the pairs and DOFs, and numbers of points and shapes;
-    ``poses`` those of obstacles at the time asked last; ``memory`` what steps leave behind;
-    ``cache`` projections of points at the displacements asked last; ``counts`` elements searched,
-    points projected, and the slot of the cache that each pair used last. ``moving`` says whether
-    poses depend on time, ``own`` is the handle of what knows them, and shapes of the caller's.
-    ``lasting`` is the sum of what is kept from step to step: ANCHORS, PRESSURES. ``address`` is
-    that of the compiled function, 0 in NumPy.
+    ``poses`` those of obstacles at the time asked last; ``memory`` what steps leave behind.
+    ``moving`` says whether poses depend on time, ``own`` is the handle of what knows them, and
+    shapes of the caller's. ``lasting`` is the sum of what is kept from step to step: ANCHORS,
+    PRESSURES. ``address`` is that of the compiled function, 0 in NumPy.
     """
 
     number: int
@@ -85,8 +79,6 @@ class ContactTables(NamedTuple):
     floats: F1
     poses: F1
     memory: F1
-    cache: F1
-    counts: I1
     moving: int
     own: int
     lasting: int = 0
@@ -115,9 +107,7 @@ class Pair(NamedTuple):
     numbers: Any
     poses: Any
     memory: Any
-    cache: Any
     common: Any
-    counts: Any
 
 
 @source
@@ -129,7 +119,7 @@ def pair_of(tables, k):
     points = at + (pairs + slopes) * n
     middles = points + 6 * n
     numbers = middles + (2 + 2 * pairs) * elements
-    pose, slot = h[OBSTACLE] * POSES, h[SPAN] + POSE + elements + PROJECTED * n
+    pose = h[OBSTACLE] * POSES
     return Pair(
         k, tables.number, tables.moving, tables.own, h, tables.ints[h[INTS]:h[INTS] + n],
         shaped(floats[at:at + pairs * n], (pairs, n)),
@@ -139,8 +129,7 @@ def pair_of(tables, k):
         floats[numbers:numbers + NUMBERS + h[SHAPE]],
         shaped(tables.poses[pose:pose + POSES], (3, POSE)),
         shaped(tables.memory[h[MEMORY]:h[MEMORY] + 4 * n], (4, n)),
-        shaped(tables.cache[h[CACHE]:h[CACHE] + SLOTS * slot], (SLOTS, slot)),
-        tables.memory, tables.counts)
+        tables.memory)
 
 
 @source
