@@ -7,7 +7,7 @@ ORDER = [
     "poisson_locking", "thick_beam",
     "tapered_blade", "catenary", "spring", "leaf_spring", "bimetal", "soft_finger", "frame",
     "cylinder", "pipe_laying", "capstan", "ring",
-    "column", "magnetic_rod", "shallow_arch",
+    "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",
     "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "tuning_fork", "damping",
     "own_law", "own_element", "fit_modulus", "uncertainty",
 ]

@@ -24,6 +24,8 @@ def test_scripts_of_a_page_run_in_order(page, tmp_path, monkeypatch, capsys):
         exec(compile(script, str(page), "exec"), names)
     if page.name == "README.md":
         assert abs(names["state"].displacement((1, 0))[1] + 0.0199) < 1e-4
+        both = names["tip"] @ names["q"], names["bent"].position((1, 0))
+        assert abs(both[0] - both[1]).max() < 1e-8
         assert {p.name for p in tmp_path.iterdir()} == {"circle.png", "cantilever.vtu",
                                                        "cantilever.png"}
 

@@ -94,6 +94,34 @@ def iteration(about, watch):
         A, B = np.random.default_rng(0).normal(size=(2, n * points, 20, 20))
         rows.append(row("iteration", "NumPy", f"{n} x {points} products of 20 x 20 by 20 x 20", n,
                         "", seconds(lambda A=A, B=B: A @ B), about))
+    return rows + own_energies(n, about)
+
+
+def bedding(r, F, X, t):
+    return 5e5 * ((r - X)**2).sum(axis=0)
+
+
+def bedding_of_a_point(r, F, X, t):
+    return 5e5 * ((r[0] - X[0])**2 + (r[1] - X[1])**2)
+
+
+def own_energies(n, about):
+    """Force and tangent of a beam alone, and with a bedding by an energy of one's own."""
+    unit = 1e6 * np.diag([1.0, 1.0, 0, 0, 0, 0])[:, :, None, None]
+    given = bedding, lambda r, F, X, t: (1e6 * (r - X), 0 * F), lambda r, F, X, t: unit
+    kinds = {"": (), ", bedding by psi": (bedding,), ", with its derivatives": given}
+    try:
+        from numba import njit
+        kinds[", by psi compiled"] = (njit(bedding_of_a_point),)
+    except ImportError:
+        pass
+    rows = []
+    for name, functions in kinds.items():
+        s = scene(PROBLEMS["5.2"], ElementBeamANCF(ORDER), n, "assumed")
+        if functions:
+            s.energy(*functions, scaled=False)
+        rows.append(row("iteration", CODE, f"ancf {ORDER}, assumed: force and tangent{name}", n,
+                        s.N, seconds(lambda s=s, u=bent(s): s.system.assemble(u)), about))
     return rows
 
 
