@@ -120,8 +120,9 @@ def own_energies(n, about):
         s = scene(PROBLEMS["5.2"], ElementBeamANCF(ORDER), n, "assumed")
         if functions:
             s.energy(*functions, scaled=False)
+        u = bent(s)
         rows.append(row("iteration", CODE, f"ancf {ORDER}, assumed: force and tangent{name}", n,
-                        s.N, seconds(lambda s=s, u=bent(s): s.system.assemble(u)), about))
+                        s.N, seconds(lambda s=s, u=u: s.system.assemble(u)), about))
     return rows
 
 
