@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_bvp
+from scipy.integrate import solve_bvp, trapezoid
 from scipy.optimize import minimize_scalar
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Energy,
@@ -301,6 +301,24 @@ def test_recovered_forces_know_a_body_force():
     for at in ((0.0, 0.0), (0.4, 0.0)):
         a, b = one.resultants(at), two.resultants(at)
         assert_allclose((b.M, b.Q), (a.M, a.Q), rtol=1e-6)
+
+
+def test_recovered_forces_of_linear_theory_and_of_time():
+    """The shear force at the clamp is what gravity leaves of that of the bedding."""
+    k, x = 1e3 * 0.005 * 0.01, np.linspace(0.0, 1.0, 201)
+    for scaled in (True, False):
+        scene = cantilever().gravity((0.0, -0.01)).energy(
+            lambda r, F, X, t: 0.5e3 * ((r - X)**2).sum(axis=0), scaled=scaled)
+        state = scene.solve_linear()
+        w = state.displacement(np.array([x, 0.0 * x]))[1]
+        for at in (0.0, 0.5):
+            load = np.where(x >= at, -0.01 * 1000.0 * 0.005 * 0.01 - k * w, 0.0)
+            Q = trapezoid(load[x >= at], x[x >= at])
+            assert float(state.resultants((at, 0.0)).Q) == pytest.approx(-abs(Q), rel=1e-3)
+    scene = cantilever(4, 0.05).energy(lambda r, F, X, t: -1e4 * t * r[1])
+    ramp = cantilever(4, 0.05).gravity((0.0, 10.0), amplitude=lambda t: t)
+    a, b = (s.integrate(0.02, 1e-3).state(-1).resultants((0.3, 0.0)) for s in (scene, ramp))
+    assert float(a.Q) == pytest.approx(float(b.Q), rel=1e-6)
 
 
 def test_it_depends_on_time():

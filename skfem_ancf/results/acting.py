@@ -81,13 +81,16 @@ def recover(state: Any, number: int, at: list[float], u: Array,
                             "it: its strain and stress are those of the elements")
     s = system.of(beam)
     try:
-        loads: list[Any] = [
-            (unit * state.load * load.factor(state.t),
-             load.spread((state if state.base is None else state.base).u_of(number)))
-            for load in system.loads if load.beam is beam]
-        loads += [(unit, element.load.spread(state.u_of(number))) for element in
-                  system.forces.elements if isinstance(element, Unscaled)
-                  and element.load.beam is beam]
+        acting = [(unit * state.load, load, state.t) for load in system.loads]
+        acting += [(unit, e.load, state.load if state.t is None else state.t)
+                   for e in system.forces.elements if isinstance(e, Unscaled)]
+        loads: list[Any] = []
+        for scale, load, t in acting:
+            if load.beam is beam:
+                at_rest = state.base is not None and not load.first_order
+                factor, now = load.acting(t)
+                loads.append((scale * factor, now.spread(
+                    (state.base if at_rest else state).u_of(number))))
         sampled, places = distributed(state, beam, unit)
         acceleration = viscous = None
         if state.acceleration is not None:
