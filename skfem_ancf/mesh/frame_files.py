@@ -12,14 +12,14 @@ import numpy as np
 
 from ..core.errors import (FileError, InputError, MeshError, require_finite, require_names,
                            require_path, shown)
-from .frame_graph import Net
+from .frame_graph import FrameGraph
 
 #: Kinds of cells of meshio that are lines: the ends first, then what is between them in order.
 LINE = re.compile("line([0-9]*)")
 
 
-def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
-                    tol: float | None = None) -> Net:
+def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
+                    tol: float | None = None) -> FrameGraph:
     """The lines of a mesh of meshio, each cell one, with its names.
 
     Parameters
@@ -33,7 +33,7 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     named
         Names that are asked for elsewhere.
     tol
-        As for :class:`Net`.
+        As for :class:`FrameGraph`.
     """
     mesh = _mesh_of(mesh)
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
@@ -77,7 +77,7 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
                             minlength=len(lines))
         beams = tuple(name for name, some in sets.items()
                       if name in named or np.all(taken[some] == 1))
-    return Net(points[used, :2], ends.reshape(-1, 2), sets, nodes, curves, tol, beams, lost)
+    return FrameGraph(points[used, :2], ends.reshape(-1, 2), sets, nodes, curves, tol, beams, lost)
 
 
 def _mesh_of(mesh):

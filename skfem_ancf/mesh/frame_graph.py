@@ -21,16 +21,16 @@ from .mesh_beam import MeshBeam
 from .numbering import default_tags
 from .places import is_point, points_of_rows, satisfying
 
-#: How far from a node a point may be that names it, relative to the size of the net.
+#: How far from a node a point may be that names it, relative to the size of the graph.
 NEAR = 1e-9
 #: How far apart points may be that are one node, if nothing else is given: relative to the size of
-#: the net, and to the longest line. Pairs apart by up to :data:`CLOSE` times that are warned of.
+#: the graph, and to the longest line. Pairs apart by up to :data:`CLOSE` times that are warned of.
 MERGED, OF_LONGEST, CLOSE = 1e-5, 1e-3, 10.0
 PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a function of the "
           "points x that returns truth values, or a list of these")
 
 
-class Net:
+class FrameGraph:
     """Points, lines between them, and names for both: the graph of a frame.
 
     Parameters

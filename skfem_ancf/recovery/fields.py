@@ -1,7 +1,7 @@
 """The table of fields: what can be drawn, written to files and asked for at points.
 
 One entry of :data:`FIELDS` says what a field is called, what it is computed from, its unit, whether
-it has a sign, and how many components it has. A field of your own is a function of
+it has a sign, and how many components it has. A user-defined field is a function of
 :class:`Values`, or a :class:`Field` made with one.
 """
 
@@ -116,7 +116,7 @@ class Values(Mapping):
     part
         The :class:`~skfem_ancf.beam.points.BeamPoints` with the points.
     u
-        Displacement of the coordinates that the part is numbered by, shape (N,); of a linear
+        Displacement of the degrees of freedom of the part, shape (N,); of a linear
         solution the :func:`~skfem_ancf.core.linear.step` from its base.
     find
         Returns the recovered field of the beam, or None; None for the field of the elements.
@@ -356,7 +356,7 @@ def _table():
     yield Field("energy", lambda v: v.energy, "strain energy density", "energy / volume", False)
     yield Field("stretch", _stretch, "stretch along the axis", one, neutral=1.0)
     yield Field("eps_1_direction", lambda v: v.principal[1],
-                "direction of the larger principal strain, stress-free body", one, False, 2,
+                "direction of the larger principal strain, reference configuration", one, False, 2,
                 "global")
     yield Field("sigma_1_direction", lambda v: v.principal_stress[1],
                 "direction of the larger principal stress, deformed body", one, False, 2, "global")

@@ -30,7 +30,7 @@ ALONG = 8
 #: step only, and the mean of both sides is right.
 UNBALANCED, UNBALANCED_MOTION = 0.02, 0.5
 
-#: Strains below this times the coordinates over the length of an element are round-off.
+#: Strains below this times the places over the length of an element are round-off.
 UNLOADED = 16 * np.finfo(float).eps
 #: Section forces below this part of those that eigenstrains have alone are round-off.
 BALANCED = 1e-4
@@ -70,7 +70,7 @@ class Sections:
         return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.X, self.e)[:2]
 
     def field(self, q: Array, slope: bool = False) -> Array:
-        """A field of element coordinates (ne, nb, 2), or its derivative by xi; (2, n, k)."""
+        """A field of element degrees of freedom (ne, nb, 2), or its derivative by xi; (2, n, k)."""
         def of(functions):
             return np.einsum("bnk,nbi->ink", functions, q[self.e], optimize=True)
 
@@ -325,6 +325,6 @@ def _snapped(stations):
 
 
 def _moments(q, force):
-    """Moments (ne,) of element vectors on the coordinates but r, (ne, nb, 2) both."""
+    """Moments (ne,) of element vectors on all degrees of freedom but r, (ne, nb, 2) both."""
     q, force = (np.moveaxis(x[:, 1:], -1, 0) for x in (q, force))
     return np.sum(cross(q, force), axis=-1)

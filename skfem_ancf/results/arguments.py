@@ -1,4 +1,4 @@
-"""What enters the equations of a scene from outside: states and coordinates."""
+"""What enters the equations of a scene from outside: states and degrees of freedom."""
 
 from __future__ import annotations
 

@@ -33,7 +33,8 @@ class Modes:
         negative number: minus its rate of growth. With :attr:`flutter` the array is complex: the
         real part is the angular frequency, and minus the imaginary part the rate of growth.
     shapes
-        Displacements of the coordinates, shape (k, N), of unit modal mass; complex with flutter.
+        Displacements of the degrees of freedom, shape (k, N), of unit modal mass; complex with
+        flutter.
     state
         The state about which the beam vibrates.
     eigenvalues
@@ -124,14 +125,14 @@ class Modes:
 
 @dataclass(repr=False)
 class Buckling:
-    """Load factors at which the stress-free state loses stability, the lowest first.
+    """Load factors at which the reference configuration loses stability, the lowest first.
 
     Attributes
     ----------
     factors
         Multiples of the loads of the scene, shape (k,).
     shapes
-        Displacements of the coordinates, shape (k, N).
+        Displacements of the degrees of freedom, shape (k, N).
     follower : bool
         The loads follow the body and have no potential: it may flutter at a lower factor, which
         these of divergence do not say; :func:`modes` about a state under load does.

@@ -62,7 +62,7 @@ class Path:
     Attributes
     ----------
     load, u
-        Load factors (n,), and displacements of the coordinates (n, N).
+        Load factors (n,), and displacements of the degrees of freedom (n, N).
     arc
         Arc length along the path, shape (n,).
     stable, negative

@@ -70,14 +70,14 @@ class State(Immutable, MaterialPoints):
         Internal force there, shape (N,), or None: it is computed when asked for.
     inertia, motion, origin
         Of an instant of a motion: the force of inertia and damping, shape (N,); its
-        :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the run kept.
+        :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the run stored.
     verdict
         What the solver knows of its stability, or None: it is found when asked for.
 
     Attributes
     ----------
     u
-        Displacement of the coordinates from the reference configuration, shape (N,).
+        Displacement of the degrees of freedom from the reference configuration, shape (N,).
     load
         Load factor.
     converged, iterations, message, steps
@@ -87,7 +87,7 @@ class State(Immutable, MaterialPoints):
     t
         Time, in a motion; else None.
     acceleration
-        Of the coordinates, shape (N,), in a motion and of a mode; else None.
+        Of the degrees of freedom, shape (N,), in a motion and of a mode; else None.
     doubt : str
         Where and how the way to it left the path from the reference configuration; empty if it did
         not.
@@ -182,7 +182,7 @@ class State(Immutable, MaterialPoints):
     def __str__(self):
         lines = [repr(self)[1:-1]]
         if self.base is not None:
-            about = "a state under load" if self.base.u.any() else "the stress-free state"
+            about = "a state under load" if self.base.u.any() else "the reference configuration"
             lines.append(f"  linear, for small displacements from {about}: no verdict on stability")
         elif self.t is None:
             lines.append(f"  equilibrium: {self.verdict}")
@@ -211,7 +211,7 @@ class State(Immutable, MaterialPoints):
     @property
     def negative_pivots(self) -> int | None:
         """Number of directions that give way: negative eigenvalues of the tangent at the free
-        coordinates, on the tangent space of the joints. None where :attr:`verdict` is.
+        degrees of freedom, on the tangent space of the joints. None where :attr:`verdict` is.
         """
         return None if self.verdict is None else self.verdict.negative_pivots
 
@@ -234,12 +234,12 @@ class State(Immutable, MaterialPoints):
 
     @property
     def q(self) -> Array:
-        """Absolute coordinates, beam after beam, shape (N,)."""
+        """Degrees of freedom in place, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.system.members]) + self.u
 
     @property
     def v(self) -> Array:  # type: ignore[override]
-        """Velocity of the coordinates, shape (N,); zero where there is no motion."""
+        """Velocity of the degrees of freedom, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
     def _contact_memory(self):
@@ -465,7 +465,7 @@ class State(Immutable, MaterialPoints):
 
     @property
     def internal_force(self) -> Array:
-        """Internal force on all coordinates, shape (N,)."""
+        """Internal force on all degrees of freedom, shape (N,)."""
         if self._force is None:
             with self._contact_memory():
                 self._force = (
@@ -511,7 +511,7 @@ class State(Immutable, MaterialPoints):
         return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
 
     def _support_force(self):
-        """What supports do to the coordinates, (N,): all other forces and inertia, negated."""
+        """What supports do to the scene, (N,): all other forces and inertia, negated."""
         system = self.system
         loads = system.external_force(self.u, self.t) if self.base is None else (
             linear_external_force(system, self.base.u, self.u - self.base.u))

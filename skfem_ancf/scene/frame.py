@@ -21,8 +21,8 @@ from ..core.errors import (InputError, require_finite, require_finite_scalar, re
                            require_positive, require_unmasked, shown)
 from ..core.types import Array, TimeFunction
 from ..elements import ElementBeamCable
-from ..mesh.frame_files import net_from_meshio
-from ..mesh.frame_graph import Net, mapping_of
+from ..mesh.frame_files import graph_from_meshio
+from ..mesh.frame_graph import FrameGraph, mapping_of
 from ..mesh.places import as_point
 from ..results.arguments import displacement
 from ..results.state import State
@@ -81,7 +81,7 @@ class Frame(Scene):
     Parameters
     ----------
     net
-        The lines, a :class:`~skfem_ancf.mesh.frame_graph.Net`.
+        The lines, a :class:`~skfem_ancf.mesh.frame_graph.FrameGraph`.
     beams
         A Beam with a chain for each line of a group, group after group, and then for the others.
     lines
@@ -100,7 +100,7 @@ class Frame(Scene):
     (True, 0.00124)
     """
 
-    def __init__(self, net: Net, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
+    def __init__(self, net: FrameGraph, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
         super().__init__(*beams)
         self.net, self._lines, self._hinged = net, lines, hinged
         ends = net.lines[:, lines].T.ravel()
@@ -180,8 +180,8 @@ class Frame(Scene):
         """
         require_options("Frame.from_lines", beam, ("points", "lines", "groups", "nodes", "hinges",
                                                    "curves", "elements", "sections", "tol", *BEAM))
-        return cls._made(Net(points, lines, groups, nodes, curves, tol), hinges, elements, sections,
-                         beam)
+        graph = FrameGraph(points, lines, groups, nodes, curves, tol)
+        return cls._made(graph, hinges, elements, sections, beam)
 
     @classmethod
     def from_meshio(cls, mesh: Any, hinges: Any = (), elements: Any = 1,
@@ -218,7 +218,7 @@ class Frame(Scene):
         require_options("Frame.from_meshio", beam,
                         ("mesh", "hinges", "elements", "sections", "groups", "tol", *BEAM))
         named = list(mapping_of("sections", sections))
-        return cls._made(net_from_meshio(mesh, groups, named, tol), hinges, elements, sections,
+        return cls._made(graph_from_meshio(mesh, groups, named, tol), hinges, elements, sections,
                          beam)
 
     @classmethod

@@ -76,7 +76,7 @@ class Section(Immutable):
     """The section of a beam: what lies across it. It does not change.
 
     Sections are made by :meth:`profile`, :meth:`layers` and :meth:`numbers`, and given to
-    ``Beam(mesh, element, section=...)``. A subclass of your own gives :meth:`layers_on`.
+    ``Beam(mesh, element, section=...)``. A user-defined subclass gives :meth:`layers_on`.
 
     Attributes
     ----------

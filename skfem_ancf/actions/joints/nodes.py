@@ -13,7 +13,7 @@ from ...beam.beam import Beam
 from ...beam.kinematics import direction
 from ...beam.layout import Layout
 from ...core.types import Array
-from ...mesh.frame_graph import Net
+from ...mesh.frame_graph import FrameGraph
 from .base import Joint
 from .settlements import HELD, Settlements
 
@@ -55,7 +55,7 @@ class Nodes(Joint):
 
     constant = False
 
-    def __init__(self, nodes: Array, hinged: Array, held: Array, net: Net, lines: Array,
+    def __init__(self, nodes: Array, hinged: Array, held: Array, net: FrameGraph, lines: Array,
                  settled: Settlements | None = None) -> None:
         self.nodes, self.hinged, self.held = nodes, hinged, held
         self.settled = Settlements(np.zeros(held.shape)) if settled is None else settled
