@@ -18,13 +18,11 @@ from .poses import taken_back
 from .tables import CUSTOM, STIFFNESS
 
 #: Parts of a way at which points are looked at, at most; points that are looked at together.
-MOST_PARTS, TOGETHER = 400, 200_000
-#: Of a cubic way: its length by the largest of the displacement and of what the rates at both ends
-#: would make, and by how much they differ from it.
-LONGER, BENT = 1.6, 0.3
-#: The way after which short steps are looked at again, and the depth that is said, in what is half
-#: of the thickness of an obstacle.
-AGAIN, DEEP = 1.0, 0.5
+MOST_PARTS, TOGETHER = 400, 50_000
+#: How much longer a cubic way is, by how much rates at both ends differ from the displacement.
+BENT = 0.3
+#: The depth that is said, in what is half of the thickness of an obstacle.
+DEEP = 0.5
 #: Cosine of the angle between the normals at both ends up to which a point is on another side: a
 #: chord that cuts a circle by a tenth of its radius has 0.62.
 ASIDE = 0.62
@@ -65,7 +63,7 @@ class CrossingGuard:
     def begin(self) -> None:
         """As if nothing had been looked at."""
         for path in self._paths:
-            path.deepest = path.gone = 0.0
+            path.deepest = 0.0
 
 
 class _Path:
@@ -75,67 +73,46 @@ class _Path:
         self._contacts, (self._which, self._group) = contacts, contacts.groups[k]
         self.obstacle = contacts.obstacles[self._which]
         self._numbers, group = contacts.numbers(self._which), self._group
-        self._dofs = group.first[:, None] + np.arange(2 * len(group.weights))
-        self._range = slice(int(self._dofs.min()), int(self._dofs.max()) + 1)
-        bound, half = np.abs(group.weights), len(group.weights) // 2
-        if len(group.slopes):  # normals turn by no more than twice the change of a slope
-            bound = bound + 2.0 * np.abs(group.offsets * group.slopes)
-        self._most = (bound[:half] + bound[half:]).max(axis=1)
-        self._by_time = self.obstacle.moves or self.obstacle.shape.kind == CUSTOM
-        self.deepest = self.gone = 0.0
+        self._dofs = group.first[::group.points, None] + np.arange(2 * len(group.weights))
+        self._weights = [w.reshape(len(w), group.elements, -1).transpose(1, 0, 2)
+                         for w in (group.weights, group.slopes) if len(w)]
+        self.deepest = 0.0
 
     def first(self, u, v, t):
         """The first step on which a point crosses the obstacle, or how many there are."""
-        steps = np.arange(len(t) - 1)
-        if not self._by_time:
-            steps, = np.nonzero(self._looked(LONGER * self._longest(u, v, t)))
-        size = max(1, TOGETHER // len(self._dofs))
-        for k in range(0, len(steps), size):
-            found = self._first_of(steps[k:k + size], u, v, t)
+        size = max(1, TOGETHER // len(self._group.first))
+        for k in range(0, len(t) - 1, size):
+            part = slice(k, k + size + 1)
+            found = self._first_of(u[part], None if v is None else v[part], t[part])
             if found is not None:
-                return found
+                return k + found
         return len(t) - 1
 
-    def _looked(self, ways):
-        """Which steps are looked at: long ones, and now and then one of many that are short."""
-        gone = self.gone + np.cumsum(ways)
-        part = AGAIN * self.obstacle.shape.inner
-        looked = (ways > 2.0 * self._group.depth) | (np.diff(gone // part, prepend=0.0) > 0.0)
-        self.gone = gone[-1] % part
-        return looked
-
-    def _longest(self, u, v, t):
-        """No less than the largest of displacements, and of what rates would make; shape (n,)."""
-        way = np.abs(np.diff(u[:, self._range], axis=0))
-        if v is not None:
-            rate = np.maximum(np.abs(v[:-1, self._range]), np.abs(v[1:, self._range]))
-            way = np.maximum(way, np.diff(t)[:, None] * rate)
-        size = way.reshape(len(way), -1, 2 * len(self._most)).max(axis=1)
-        return np.sqrt(2.0) * (size.reshape(len(way), -1, 2).max(axis=2) @ self._most)
-
-    def _first_of(self, steps, u, v, t):
+    def _first_of(self, u, v, t):
         """The first of some steps on which a point crosses the obstacle, or None."""
-        ends, depth = (steps, steps + 1), self._group.depth
-        x = [self._seen(u[at], t[at]) for at in ends]
-        gap = [self._gap(y, t[at]) for y, at in zip(x, ends)]
+        z, depth = self._vectors(u), self._group.depth
+        x = self._seen(z, t)
+        gap = self._gap(x, t)
         self.deepest = max(self.deepest, -float(np.min(gap)))
-        way = np.hypot(*np.moveaxis(x[1] - x[0], 1, 0))
+        way = np.hypot(*np.moveaxis(np.diff(x, axis=0), 1, 0))
         if v is not None:
-            h, change = (t[steps + 1] - t[steps])[:, None], u[steps + 1] - u[steps]
-            way += BENT * sum(self._sizes(h * v[at] - change) for at in ends)
-        most = depth + np.maximum(-np.minimum(*gap), 0.0)
-        long, inside = way - gap[0] - gap[1] > 2.0 * most, np.maximum(*gap) < -depth
+            h, change, rates = np.diff(t)[:, None, None], np.diff(z, axis=0), self._vectors(v)
+            way += BENT * sum(self._sizes(h * rate - change) for rate in (rates[:-1], rates[1:]))
+        most = depth + np.maximum(-np.minimum(gap[:-1], gap[1:]), 0.0)
+        long = way - gap[:-1] - gap[1:] > 2.0 * most
+        inside = np.maximum(gap[:-1], gap[1:]) < -depth
         for k in np.flatnonzero((long | inside).any(axis=1)):
             at, = np.nonzero(long[k] | inside[k])
-            of = slice(steps[k], steps[k] + 2)
+            of = slice(k, k + 2)
             if self._crosses(at, u[of], None if v is None else v[of], t[of], way[k, at],
                              most[k, at], long[k, at], inside[k, at]):
-                return int(steps[k])
+                return int(k)
         return None
 
     def _crosses(self, at, u, v, t, way, most, long, inside):
         """True if one of some points crosses the obstacle in a step."""
-        normals = [self._asked(x, s, True)[1:3] for x, s in zip(self._seen(u, t, at), t)]
+        normals = [self._asked(x[:, at], s, True)[1:3]
+                   for x, s in zip(self._seen(self._vectors(u), t), t)]
         cosine = np.sum(normals[0] * normals[1], axis=0)
         if np.any(inside & (cosine < 0.0)):
             return True  # through its middle
@@ -146,31 +123,33 @@ class _Path:
         parts = int(np.clip(np.ceil(way[chosen].max() / (2.0 * self._group.depth)), 2, MOST_PARTS))
         for s in np.arange(1, parts) / parts:
             time = t[:1] + s * (t[1] - t[0])
-            x = self._seen(_between(u, v, t, s)[None], time, at)
+            x = self._seen(self._vectors(_between(u, v, t, s)[None]), time)[..., at]
             if np.any(-self._gap(x, time) > most):
                 return True
         return False
 
-    def _sizes(self, u):
-        """How far points go by rates (k, N) at most, shape (k, points)."""
-        pairs = self._pairs(u, slice(None))
-        out = np.hypot(*np.einsum("kpac,ap->ckp", pairs, self._group.weights))
-        if len(self._group.slopes):
-            slopes = np.einsum("kpac,ap->ckp", pairs, self._group.slopes)
-            out += 2.0 * np.abs(self._group.offsets) * np.hypot(*slopes)
+    def _vectors(self, u):
+        """What u (k, N) adds to places of points and, of cables, slopes; (k, 2 or 4, points)."""
+        e, n = self._dofs.shape
+        of_elements = u[:, self._dofs].reshape(len(u), e, n // 2, 2).transpose(1, 0, 3, 2)
+        found = [of_elements.reshape(e, -1, n // 2) @ w for w in self._weights]
+        return np.concatenate([x.reshape(e, len(u), 2, -1).transpose(1, 2, 0, 3).reshape(
+            len(u), 2, -1) for x in found], axis=1)
+
+    def _sizes(self, z):
+        """How far points go by changes of their vectors at most, shape (k, points)."""
+        out = np.hypot(z[:, 0], z[:, 1])
+        if z.shape[1] > 2:
+            out += 2.0 * np.abs(self._group.offsets) * np.hypot(z[:, 2], z[:, 3])
         return out
 
-    def _pairs(self, u, at):
-        return u[:, self._dofs[at]].reshape(len(u), -1, len(self._group.weights), 2)
-
-    def _seen(self, u, t, at=slice(None)):
+    def _seen(self, z, t):
         """Points of the surface as the obstacle sees them that has not moved, (k, 2, points)."""
-        group, pairs = self._group, self._pairs(u, at)
-        x = group.starts[:2, at] + np.einsum("kpac,ap->kcp", pairs, group.weights[:, at])
-        if len(group.slopes):
-            d = group.starts[2:, at] + np.einsum("kpac,ap->kcp", pairs, group.slopes[:, at])
-            normals = np.stack([-d[:, 1], d[:, 0]], axis=1)
-            x += group.offsets[at] * normals / np.hypot(d[:, 0], d[:, 1])[:, None]
+        group, z = self._group, z + self._group.starts[:z.shape[1]]
+        x = z[:, :2]
+        if z.shape[1] > 2:
+            normals = np.stack([-z[:, 3], z[:, 2]], axis=1)
+            x = x + group.offsets * normals / np.hypot(z[:, 2], z[:, 3])[:, None]
         if self.obstacle.moves:
             x = np.array([taken_back(self._contacts.pose(self._which, float(s), False), y)
                           for s, y in zip(t, x)])
