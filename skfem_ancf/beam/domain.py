@@ -59,8 +59,8 @@ class Domain(Immutable):
 
     Notes
     -----
-    In the scene the DOFs are renumbered, by reverse Cuthill-McKee, so that matrices are narrow
-    bands; :meth:`of_basis` puts them into the order of the basis. The energy is the work of the
+    In the scene the DOFs are renumbered, by reverse Cuthill-McKee or along x or y, so that matrices
+    are narrow bands; :meth:`of_basis` puts them into the order of the basis. The energy is the work of the
     residual on the straight way from the reference configuration, by Gauss points: exact for
     polynomials, as of St. Venant-Kirchhoff. The mean of the residual over a time step, by which the
     energy-momentum scheme keeps the energy, is found in the same way (the averaged vector field).
@@ -108,7 +108,7 @@ class Domain(Immutable):
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass
         self.name = require_label("name", name)
         self.N: int = basis.N
-        self._order = _narrow(basis.element_dofs // 2, basis.N // 2)
+        self._order = _narrow(basis)
         self._rank = np.argsort(self._order)
         self._require_derivatives()
 
@@ -487,13 +487,19 @@ def _require_plane(basis):
                          "cell: for a part of it take mesh.restrict(elements)")
 
 
-def _narrow(pairs, n):
-    """Numbers of the DOFs in an order in which those of one cell are near to each other."""
-    pairs = pairs[::2]
+def _narrow(basis):
+    """Numbers of the DOFs in an order in which those of one cell are near to each other.
+
+    By reverse Cuthill-McKee, or along x or y: in cells of many nodes that may be narrower.
+    """
+    pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
     k = len(pairs)
     i, j = np.repeat(pairs, k, axis=0).ravel(), np.tile(pairs, (k, 1)).ravel()
-    graph = sparse.csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
-    order = reverse_cuthill_mckee(sparse.csr_matrix(graph), symmetric_mode=True)
+    graph = sparse.csr_matrix((np.ones(len(i)), (i, j)), shape=(n, n))
+    x, y = basis.doflocs[:, ::2]
+    orders = [reverse_cuthill_mckee(graph, symmetric_mode=True), np.lexsort((y, x)),
+              np.lexsort((x, y))]
+    order = min(orders, key=lambda order: np.max(np.ptp(np.argsort(order)[pairs], axis=0)))
     return (2 * order[:, None] + np.arange(2)).ravel()
 
 
