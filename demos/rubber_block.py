@@ -43,7 +43,7 @@ def residual(v, w):
 
 @BilinearForm
 def tangent(u, v, w):
-    F, G, volume = deformation(w)
+    _, G, volume = deformation(w)
     turned = mul(mul(G, transpose(grad(u))), G)
     return width * ddot(mu * grad(u) + (mu - lam * volume) * turned
                         + lam * trace(mul(transpose(G), grad(u))) * G, grad(v))
@@ -58,7 +58,8 @@ block = Domain(Basis(mesh, ElementVector(ElementQuad2())), residual, tangent,
 # All three in one scene: the rubber is welded to the top of the leaf and to the machine.
 
 machine = RigidBody(mass=20.0, inertia=0.15, position=(span / 2, thick / 2 + high + 0.06),
-                    name="machine", outline=[(-0.1, -0.06), (0.1, -0.06), (0.1, 0.06), (-0.1, 0.06)])
+                    name="machine",
+                    outline=[(-0.1, -0.06), (0.1, -0.06), (0.1, 0.06), (-0.1, 0.06)])
 scene = Scene(leaf, block, machine).pin("left", leaf).fix("right", "r^2", beam=leaf)
 scene.weld((block, "bottom"), (leaf, "top"))
 scene.weld((block, "top"), machine)

@@ -60,12 +60,14 @@ class Domain(Immutable):
     Notes
     -----
     In the scene the DOFs are renumbered, by reverse Cuthill-McKee or along x or y, so that matrices
-    are narrow bands; :meth:`of_basis` puts them into the order of the basis. The energy is the work of the
-    residual on the straight way from the reference configuration, by Gauss points: exact for
-    polynomials, as of St. Venant-Kirchhoff. The mean of the residual over a time step, by which the
-    energy-momentum scheme keeps the energy, is found in the same way (the averaged vector field).
-    Linear momentum is kept, too; the error of the angular momentum of a domain is of second order
-    in the step. A tangent that is not symmetric has no energy, and that scheme refuses it.
+    are narrow bands; :meth:`of_basis` puts them into the order of the basis.
+
+    The energy is the work of the residual on the straight way from the reference configuration, by
+    Gauss points: exact for polynomials, as of St. Venant-Kirchhoff. The mean of the residual over a
+    time step, by which the energy-momentum scheme keeps the energy, is found in the same way (the
+    averaged vector field). Linear momentum is kept, too; the error of the angular momentum of a
+    domain is of second order in the step. A tangent that is not symmetric has no energy, and that
+    scheme refuses it.
 
     References
     ----------
