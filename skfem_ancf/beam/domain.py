@@ -194,7 +194,13 @@ class Domain(Immutable):
         return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(WORK))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        """The mean of the internal force on the straight way from u0 to u1, (N,) each."""
+        """The mean of the internal force on a straight way.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements of the DOFs from which and to which, shape (N,).
+        """
         d = u1 - u0
         return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(STEP))), np.zeros(self.N))
 
