@@ -14,9 +14,6 @@ from ..core.types import Array, Rule
 from ..formulations import COMPONENTS
 from ..formulations.base import Term
 
-#: Points that are evaluated at once.
-CHUNK = 3072
-
 
 # Green-Lagrange strain of the derivatives a along the axis and b across it of the displacement,
 # pairs of arrays; (x, y) is the tangent of the axis in the reference configuration.
@@ -109,51 +106,36 @@ def _slope_matrix(n):
 
 
 class Gradients:
-    """The displacement gradient at points, each in an element of its own.
-
-    Parameters
-    ----------
-    beam, u, e
-        A beam, the displacement of its degrees of freedom (N,), and the elements (n,).
-    """
+    """The gradient of a displacement ``u`` (N,) at points of elements ``e`` (n,)."""
 
     def __init__(self, beam: Any, u: Array, e: Array) -> None:
         self.at: Array
         self.basis = basis = beam.interpolation
         self.e, ne = e, len(basis.lengths)
-        few = len(e) < ne
-        of, self.at = (e, np.arange(len(e))) if few else (np.arange(ne), e)
-        self._known: dict[float, Array] = {}
+        of, self.at = (e, np.arange(len(e))) if len(e) < ne else (np.arange(ne), e)
         c = basis.of_elements(u, of)
         if basis.is_general:  # every element contains its map from the reference cell
             c = np.concatenate([c, basis.of_elements(basis.start, of)], axis=2)
         self.by = np.array([np.tensordot(basis.by_xi, c, 1),
                             np.einsum("jk,pk...->pj...", basis.by_eta, c)])
 
-    def __call__(self, part: slice, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
-        """Derivatives along the axis and across it, and its tangent, at some of the points.
-
-        ``part`` says which; their places xi and eta are (n,), or one for all of them.
-        """
-        at, e, m = self.at[part], self.e[part], self.by.shape[2]
+    def __call__(self, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
+        """Derivatives along the axis and across it, and its tangent, at places, (n,) or numbers."""
+        e, at, basis = self.e, self.at, self.basis
         if np.ndim(xi):
             table, at = _sum(self.by.swapaxes(0, 1), xi, at), np.arange(len(at))
         else:
-            if xi not in self._known:
-                T = chebvander(2.0 * xi - 1.0, self.by.shape[1] - 1)
-                self._known[xi] = np.tensordot(T, self.by, (-1, 1))
-            table = self._known[xi].reshape(2, m, *self.by.shape[3:])
+            T = chebvander(2.0 * xi - 1.0, self.by.shape[1] - 1)[0]
+            table = np.tensordot(T, self.by, (0, 1))
         by_xi, by_eta = _sum(table.swapaxes(0, 1), eta, at)
-        basis = self.basis
         if not basis.is_general:
             return by_xi / basis.lengths[e], by_eta / basis.height, basis.tangents[:, e]
-        (*by_xi, a, b), (*by_eta, c, d) = by_xi, by_eta
+        (a, b), (c, d) = by_xi[2:], by_eta[2:]
         x, y = _sum(table[0, :, 2:], 0.5, at)
         size = np.sqrt(x * x + y * y)
         x, y, det = x / size, y / size, a * d - b * c
-        by_xi, by_eta = np.array(by_xi), np.array(by_eta)
-        return (((x * d - y * c) * by_xi + (a * y - b * x) * by_eta) / det,
-                ((a * x + b * y) * by_eta - (x * c + y * d) * by_xi) / det, (x, y))
+        return (((x * d - y * c) * by_xi[:2] + (a * y - b * x) * by_eta[:2]) / det,
+                ((a * x + b * y) * by_eta[:2] - (x * c + y * d) * by_xi[:2]) / det, (x, y))
 
 
 def _sum(tables, x, at):
@@ -171,30 +153,20 @@ def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
 
     Each component is sampled where the term of the formulation says, and interpolated between.
 
-    Parameters
-    ----------
-    beam, u
-        A :class:`~skfem_ancf.Beam`, and the displacement of its degrees of freedom, (N,).
-    e, X
-        Elements (n,) and reference points (2, n).
-    term
-        One of the terms of the beam, by default the first. What its law does not take is zero.
-    across
-        Points and weights across the section, for the mean over sections.
+    ``u`` (N,) is the displacement, ``e`` (n,) are elements and ``X`` (2, n) reference points. It is
+    that of the first term, or of another; what its law does not take is zero. With points and
+    weights ``across`` the section it is the mean over sections.
     """
     if not beam.has_sections:
         return _strain_of_cable(beam, u, e, X)
     rows = (0, 1, 2) if term is None else getattr(term.law, "rows", (0, 1, 2))
     samples = (term or beam.terms[0]).samples
     gradients, out = Gradients(beam, u, e), np.zeros((3, len(e)), np.result_type(u, float))
-    for first in range(0, len(e), CHUNK):
-        part = slice(first, first + CHUNK)
-        xi = X[0, part]
-        for eta, weight in ((X[1, part], 1.0),) if across is None else zip(*across):
-            for place, wanted in _places(samples, rows, xi):
-                a, b, t = gradients(part, xi if place is None else place, eta)
-                for row, w in wanted:
-                    out[row, part] += weight * w * STRAINS[row](a, b, *t)
+    for eta, weight in ((X[1], 1.0),) if across is None else zip(*across):
+        for place, wanted in _places(samples, rows, X[0]):
+            a, b, t = gradients(X[0] if place is None else place, eta)
+            for row, w in wanted:
+                out[row] += weight * w * STRAINS[row](a, b, *t)
     return out
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw
 from ..materials.base import Material
-from .base import Formulation, Term
-from .ecm import AXIS, split_moduli
+from .base import Term
+from .ecm import AXIS, EnhancedContinuum, split_moduli
 
 
-class StrainSplit(Formulation):
+class StrainSplit(EnhancedContinuum):
     """eps = a + s with a = eps(X, 0): stress D a + diag(E, E, k_s G) s.
 
     The energy is 1/2 int (a : D : a + 2 a : D : s + s : D_0 : s) dV with

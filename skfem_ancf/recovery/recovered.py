@@ -51,9 +51,6 @@ UNSETTLED, TINY = 0.01, 1e-12
 #: Sections nearer than this part of an element to a cut inside of it are at the cut.
 AT_CUT = 1e-8
 
-#: Points that are evaluated at once.
-CHUNK = 2048
-
 #: Points of an interval that is the whole section, at least; of one of several, more than the
 #: order N and at least; and of one whose width is a function, as the chord of a circle.
 ACROSS, MORE, FEW, ROUND = 7, 2, 5, 17
@@ -364,10 +361,9 @@ class Recovery:
             e, xi)
         out = np.empty((len(range(*rows.indices(7))), len(s)))
         for k in np.unique(segment):
-            on = np.flatnonzero(segment == k)
-            for part in np.split(on, range(CHUNK, len(on), CHUNK)):
-                values = self.segments[k].result(s[part])[:, rows]
-                out[:, part] = np.einsum("nrm,nm->rn", values, weights[part])
+            on = segment == k
+            values = self.segments[k].result(s[on])[:, rows]
+            out[:, on] = np.einsum("nrm,nm->rn", values, weights[on])
         return out
 
     @staticmethod
