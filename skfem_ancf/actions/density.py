@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.types import Array
 from .loads import Load
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..core.types import Array
 
 #: The six variables are r_0, r_1, F_00, F_01, F_10, F_11: by component, of r and of both slopes.
 VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])

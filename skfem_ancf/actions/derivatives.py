@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import MissingExtra
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: Steps of the imaginary part, and of the real part relative to the size of a variable.
 IMAGINARY, REAL = 1e-30, 1e-5

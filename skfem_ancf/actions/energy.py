@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, Sampled, Spread
+from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
 from ..beam.surfaces import LEFT, RIGHT, TOP, groups_of, surfaces_of
 from ..core.errors import (InputError, ask, require_finite, require_flag, require_function,
                            require_slope, shown)
 from ..core.quadrature import gauss, product_rule
+from ..core.types import Array, Place, TimeFunction
 from .density import Density, points_of
 from .derivatives import IMAGINARY, REAL, by_jax, by_loops
-from .item import beside
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..beam.beam import Beam
-    from ..beam.layout import Layout, WhichBeam
-    from ..core.types import Array, Place, TimeFunction
-    from .item import Item
+from .item import Item, beside
 
 _LOWER = np.tril_indices(6)
 #: Part of the energies that is round-off of their sums.

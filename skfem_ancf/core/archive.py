@@ -5,21 +5,18 @@ from __future__ import annotations
 import os
 import shutil
 import zipfile
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from io import BytesIO
 from pathlib import Path
 from secrets import token_hex
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .errors import FileError, MissingExtra
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from .types import Array, ArrayLike, StrPath
+from .types import Array, ArrayLike, StrPath
 
 #: Letters of a name that the one of a new file beside it has, at most: names may have 255.
 STEM = 100

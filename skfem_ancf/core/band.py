@@ -10,16 +10,14 @@ its place.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import blas, lapack
 
 from .source import F1, I1, indices, primitive, shaped, source
-
-if TYPE_CHECKING:
-    from .types import Array
+from .types import Array
 
 #: Zeros behind each column of a lower half: compiled code works on four columns at once, by
 #: vectors that may end there.

@@ -13,17 +13,15 @@ import os
 import pickle
 import sys
 import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    from .types import Array
+from .types import Array
 
 #: The filters of warnings belong to all threads: one at a time sets and restores them.
 _FILTERS = RLock()

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import blas, eigh, lapack
-from scipy.sparse import coo_matrix, issparse
+from scipy.sparse import coo_matrix, csc_matrix, issparse
 
 from .band import HALVES, SPARE, Band, solve
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-    from scipy.sparse import csc_matrix
-
-    from .types import Array
+from .types import Array
 
 #: Eigenvalue of a matrix of unit diagonal that is round-off.
 SINGULAR = 4.0 * np.finfo(float).eps

@@ -15,12 +15,11 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .types import Array, Law
+from .types import Array, Law
 
 #: The step, a power of two. Its square is round-off beside anything, its fifth power a number.
 STEP = 2.0**-200

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .errors import InputError, MissingExtra, shown
-
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 class _NoBar:

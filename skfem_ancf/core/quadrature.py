@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
-from .errors import InputError, require_finite, require_integer, shown
 from .caching import array_cache
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from .types import Array, Rule
+from .errors import InputError, require_finite, require_integer, shown
+from .types import Array, Rule
 
 #: Points of the largest rule.
 MAX_POINTS = 1000

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 from .errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: Environment variable: "0" leaves Numba out, as if it were not installed; "1" compiles at once;
 #: "auto", the default, for tasks that are large enough.

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import CheckpointError
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
+from ..core.types import Array
+from ..equations.system import System
 
 #: Part of a step up to which an acceleration is interpolated, where it is a difference.
 NEAR = 0.1

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,17 +15,12 @@ from ..core import archive
 from ..core.archive import find_h5py, write
 from ..core.errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
                            require_path, shown, warn)
-from .base import Motion, stored
+from ..core.types import Array, StrPath
+from ..equations.system import System
+from ..results.state import State
+from .base import Motion, Scheme, stored
 from .run import Run, task_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..core.types import Array, StrPath
-    from ..equations.system import System
-    from ..results.state import State
-    from .base import Scheme
-    from .sensors import Sensor
+from .sensors import Sensor
 
 FORMAT = "skfem-ancf checkpoint 10"
 #: Times of a motion at which functions of time are compared.

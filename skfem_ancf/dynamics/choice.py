@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ..equations.system import System
 from .base import Scheme
 from .energy_momentum import EnergyMomentum
 from .gauss import Gauss
 from .generalized_alpha import GeneralizedAlpha
 from .radau import Radau
-
-if TYPE_CHECKING:
-    from ..equations.system import System
 
 #: Tolerance up to which steps of high order are the cheaper ones.
 FINE = 1e-4

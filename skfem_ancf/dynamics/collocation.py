@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.types import Array
+from ..equations.system import System
 from .base import Motion, Scheme
 from .differences import derivative, difference_row, grown
 from .stage_records import Method
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
 
 #: Part of a step up to which accelerations are interpolated where something is driven.
 NEAR = 3e-3

@@ -7,18 +7,15 @@ nor does a kink at the end of a step spoil those of the next.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
 from ..core.sampling import sample
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
-    from ..equations.system import System
+from ..core.types import Array
+from ..equations.system import System
 
 #: Samples of a step from which rates are made.
 SAMPLES = np.linspace(0.0, 1.0, 5)

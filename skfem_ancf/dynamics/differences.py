@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from .base import Motion
+from ..core.types import Array
+from .base import Motion
 
 #: Growth from one derivative to the next, times the size of the step, at most.
 GROWTH = 2.0

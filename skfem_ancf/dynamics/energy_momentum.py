@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.errors import InputError
+from ..core.types import Array
+from ..equations.system import System
 from .base import Motion, Scheme
 from .differences import derivative, grown
-
-if TYPE_CHECKING:
-    from ..equations.system import System
-    from ..core.types import Array
 
 #: Parts of a step of fourth order, all of whose ends lie within it.
 LONG = 1.0 / (4.0 - 4.0**(1.0 / 3.0))

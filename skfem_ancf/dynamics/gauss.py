@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import TYPE_CHECKING
 
 from ..core.errors import require_integer
 from ..core.quadrature import gauss
+from ..core.types import Array
 from .collocation import Collocation
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 #: Factors of the estimated error by number of points, as measured: the more points, the more of
 #: the error is of vibrations that turn so far in a step that the estimate falls short of them.

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..core.errors import InputError, require_finite_scalar
-from .base import Scheme
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from .base import Motion
+from ..core.types import Array
+from .base import Motion, Scheme
 
 
 class GeneralizedAlpha(Scheme):

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
-                           require_finite_scalar, require_flag, require_function,
-                           require_positive, shown, warn)
+                           require_finite_scalar, require_flag, require_function, require_positive,
+                           shown, warn)
 from ..core.progress import progress_bar
 from ..core.switch import expecting
+from ..core.types import Array, StrPath
 from ..equations.stability import position_weights
-from .base import in_steps, same_scheme
+from ..equations.system import System
+from ..results.state import State
+from .base import Scheme, in_steps, same_scheme
 from .checkpoint import Checkpoint, same_problem
+from .history import History
 from .run import MAX_STEPS, Run, StepFailed, task_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array, StrPath
-    from ..equations.system import System
-    from ..results.state import State
-    from .base import Scheme
-    from .history import History
-    from .sensors import Sensor
+from .sensors import Sensor
 
 #: Steps after which a motion is looked at whether its body is turned inside out.
 LOOKED = 16

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.callbacks import handle_of
 from ..core.errors import CheckpointError, InputError, SupportError, require_positive, shown
 from ..core.linalg import halves
+from ..core.types import Array
 from ..equations.condensation import Condensed, CondensedMass
-from .base import Motion, in_steps, interpolate, stored
+from ..equations.system import System
+from .base import Motion, Scheme, in_steps, interpolate, stored
 from .convergence import FAILURES, new_state
 from .course import SAMPLES, Course, Given
 from .dampers import Dampers, Rows, solve_rows
@@ -24,13 +27,6 @@ from .rates import JointMotion, JointMotions
 from .records import Matrices, Rule, StepData, mass_factor, new_work
 from .steps import steps
 from .tangent import factors
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.types import Array
-    from ..equations.system import System
-    from .base import Scheme
 
 logger = logging.getLogger(__name__)
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..actions.tables import constraint, joint_directions
+from ..core.types import Array
+from ..equations.system import System
 from .course import rates
 from .rates import JointMotion, acceleration_of_joints, drive_rate
-
-if TYPE_CHECKING:
-    from ..equations.system import System
-    from ..core.types import Array
 
 
 class Joined:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..core.immutable import read_only
+from ..core.types import Array
 from .collocation import Collocation
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 
 POINTS = read_only(np.array([0.4 - 0.1 * np.sqrt(6.0), 0.4 + 0.1 * np.sqrt(6.0), 1.0]))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, ulp
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -12,20 +13,15 @@ import scipy
 from ..actions.forces.turns import Turns
 from ..core.errors import (AncfError, CheckpointError, InputError, ask_number, require_finite,
                            require_finite_scalar, require_positive, shown)
+from ..core.types import Array
+from ..equations.system import System
+from ..results.state import State
 from .base import Motion, Scheme, in_blocks, interpolate, stored
 from .history import COLUMNS, History, state_of
 from .integrator import DEPTH, Integrator, StepFailed
-from .sensors import Recorder
+from .sensors import Recorder, Sensor
 from .stage_integrator import StageIntegrator
 from .stepsize import StepSize
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..core.types import Array
-    from ..equations.system import System
-    from ..results.state import State
-    from .sensors import Sensor
 
 #: Steps of a motion, at most.
 MAX_STEPS = 10**9

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..core.errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown)
-from ..recovery.fields import FIELDS, find_field
-from ..core.immutable import Immutable
 from ..actions.joints.base import Joint
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..beam.points import Located
-    from ..results.state import State
-    from ..equations.system import System
-    from ..core.types import Array
-    from ..beam.layout import WhichBeam
-    from .base import Motion
+from ..beam.layout import WhichBeam
+from ..beam.points import Located
+from ..core.errors import CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown
+from ..core.immutable import Immutable
+from ..core.types import Array
+from ..equations.system import System
+from ..recovery.fields import FIELDS, find_field
+from ..results.state import State
+from .base import Motion
 
 #: What is read of the coordinates of many steps at once.
 MOVING = ("position", "displacement", "velocity", "acceleration")

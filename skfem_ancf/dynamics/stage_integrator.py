@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..beam.strain_energy import gradients_size
 from ..core.band import factorize, fix, solve
+from ..core.types import Array
 from .base import Motion
 from .collocation import Collocation
 from .course import Course
@@ -18,9 +19,6 @@ from .rates import JointMotions
 from .stage_records import Interval, new_points
 from .stage_tangent import solve_for
 from .stages import collocate
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 #: Samples of functions of time in a step: where Chebyshev's polynomials have their extrema.
 SAMPLES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)

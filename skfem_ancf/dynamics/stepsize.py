@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import InputError
-from .base import stored
+from ..core.types import Array
+from ..equations.system import System
+from .base import Motion, Scheme, stored
 from .course import Lookahead
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from ..equations.system import System
-    from .base import Motion, Scheme
-    from .integrator import Integrator
+from .integrator import Integrator
 
 #: The largest error of a point's displacement, over the root of the mean square that is added up:
 #: a tip moves twice as far as the mean, and errors grow on their way.

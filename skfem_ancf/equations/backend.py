@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy
 from functools import cached_property
 from threading import RLock
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .tables import Tables
 from ..beam.kernels.law import OWN
 from ..core import code_cache
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, expected, wanted
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+from .tables import Tables
 
 logger = logging.getLogger(__name__)
 

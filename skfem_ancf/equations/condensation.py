@@ -12,22 +12,17 @@ Statics, modes and motions use the same factors. In a motion kernels ask for the
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from ..actions.joints.nodes import chain_ends
-from ..core.linalg import NO_FACTORS, SMALL, Inertia
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..beam.beam import Beam
-    from ..actions.joints.nodes import Nodes
-    from ..core.linalg import BandMatrix
-    from ..core.types import Array
+from ..actions.joints.nodes import Nodes, chain_ends
+from ..beam.beam import Beam
+from ..core.linalg import NO_FACTORS, SMALL, BandMatrix, Inertia
+from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 

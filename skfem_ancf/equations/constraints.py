@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..actions.joints.base import Joint
 from ..actions.joints.director import UnitDirector
 from ..actions.joints.nodes import Nodes
 from ..actions.joints.part import Part
 from ..actions.joints.settlements import HELD
+from ..beam.beam import Beam
+from ..beam.rigid import RigidBody
+from ..core.errors import InputError, ModelWarning, SupportError, shown
+from ..core.origin import ours
+from ..core.types import Array
 from .mobility import advice, free_rigid_motions, who
 from .redundancy import repeated, shared
 from .signature import DENSE, FREE, first_dependent
-from ..beam.rigid import RigidBody
-from ..core.origin import ours
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from ..beam.beam import Beam
-    from ..core.types import Array
 
 #: Multipliers whose derivatives are dense matrices, at most.
 FEW = 96

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import proxy
 
 import numpy as np
@@ -17,13 +17,10 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..core.band import fix
-from ..core.linalg import NO_FACTORS, Inertia
+from ..core.linalg import NO_FACTORS, BandMatrix, Inertia
+from ..core.types import Array
 from .condensation import Condensed
 from .signature import determinant_sign, inertia_of, is_definite, null_basis
-
-if TYPE_CHECKING:
-    from ..core.linalg import BandMatrix
-    from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from .system import System
+from ..core.types import Array
+from .system import System
 
 
 def linear_force(system: System, base: Array, d: Array, load: float = 1.0) -> Array:

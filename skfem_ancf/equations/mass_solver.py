@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import proxy
 
 import numpy as np
@@ -11,14 +12,9 @@ from scipy.sparse.linalg import splu
 
 from ..core.band import factorize, fix, solve_dependent
 from ..core.errors import InputError, shown
-from ..core.linalg import dense
+from ..core.linalg import BandMatrix, dense
+from ..core.types import Array
 from .condensation import CondensedMass
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..core.linalg import BandMatrix
-    from ..core.types import Array
 
 #: Equations of the nodes of a frame above which steps of a motion eliminate them.
 MANY = 48

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -11,9 +12,6 @@ from ..actions.joints.nodes import chain_ends
 from ..beam.domain import Domain
 from ..beam.rigid import RigidBody
 from .signature import DENSE, null_space, row_sizes, unit_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def who(members: Any, k: int) -> str:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..beam.domain import Domain
-
-if TYPE_CHECKING:
-    from ..core.types import Array
-    from .system import System
+from ..core.types import Array
+from .system import System
 
 
 def momentum(system: System, v: Array) -> Array:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
+from ..core.types import Array
 from .signature import DEPENDENT, groups
-
-if TYPE_CHECKING:
-    from ..core.types import Array
 
 #: Part of the largest rest of a row beside those kept, from which on the first one is kept.
 MUCH = 0.5

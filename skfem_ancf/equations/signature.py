@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import scipy.linalg
@@ -11,11 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..core.linalg import SMALL, Inertia, beside_zero, dense
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from ..core.types import Array
+from ..core.types import Array
 
 #: Rest of a row beside those before it, relative to the row, that is round-off.
 DEPENDENT = 1e-9

@@ -10,21 +10,18 @@ from __future__ import annotations
 
 import logging
 from copy import copy
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 from scipy import sparse
+from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
-from .condensation import Condensed
-from ..core.errors import ConvergenceError, SupportError
 from ..actions.forces.kernels import add_elastic_force
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
-
-    from ..core.types import Array
+from ..core.errors import ConvergenceError, SupportError
+from ..core.types import Array
+from .condensation import Condensed
 
 #: Corrections of a solution; relative size of one that is the last, and of one that may be.
 REFINEMENTS, REFINED, ACCEPTED = 6, 1e-12, 1e-6

@@ -5,18 +5,15 @@ Kernels know the object by a handle, see :mod:`skfem_ancf.core.callbacks`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 from weakref import proxy
 
 import numpy as np
 
+from ..actions.loads import Load
 from ..core.linalg import dense
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..actions.loads import Load
-    from ..core.types import Array
+from ..core.types import Array
 
 
 class UserDefined:

@@ -1,23 +1,19 @@
 """The weak forms of a planar body, see :mod:`skfem_ancf.forms`."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from skfem.assembly import BilinearForm, Form, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.helpers import dot
 
 from ..core.errors import ask_field, require_finite, require_like, require_positive
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from ..materials.base import Material
-    from ..core.types import Array
+from ..core.types import Array
+from ..materials.base import Material
 
 
 # kinematics: grad[i, j] = d r_i / d X_j

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ...beam.layout import Layout
+from ...core.types import Array
 from ..places import Vector
 from .base import ForceElement
-
-if TYPE_CHECKING:
-    from ...beam.layout import Layout
-    from ...core.types import Array
 
 
 class Unscaled(ForceElement):

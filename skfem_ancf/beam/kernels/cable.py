@@ -11,20 +11,16 @@ Rows are those of d/dX, then of d^2/dX^2, at the points.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...core.linear import first_order
 from ...core.quadrature import gauss
+from ...core.types import Array
+from ...formulations.base import Formulation
+from ...sections import Across
 from .kernel import ElementKernel, strains
 from .law import NO_LAW
 from .tables import CABLE, StrainTables, apart, products_of
-
-if TYPE_CHECKING:
-    from ...core.types import Array
-    from ...formulations.base import Formulation
-    from ...sections import Across
 
 #: Stiffness against the mode that two points of a cubic axis miss, in EI over the square of the
 #: length of the beam: the third point has a quarter of it.

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...core.errors import InputError
 from ...core.linear import first_order, step
+from ...core.types import Array
+from ...elements.base import ElementBeam
+from ...mesh.mesh_beam import MeshBeam
 from . import arrays
 from .law import LINEAR, law_evaluate
 from .strain import (FORCE, GIVEN, GRADIENTS, MEAN, PUSH, PUSH_MEAN, PUSH_TANGENT, STRESS, TANGENT,
                      VISCOUS, evaluate)
 from .tables import StrainTables, apart, linearised, repeated, scaled
-
-if TYPE_CHECKING:
-    from ...core.types import Array
-    from ...elements.base import ElementBeam
-    from ...mesh.mesh_beam import MeshBeam
 
 #: Elements, about, whose energies are found at once.
 TOGETHER = 4096

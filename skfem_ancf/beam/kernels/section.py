@@ -6,22 +6,20 @@ Rows are those of d/dX, then of d/dY, each at the points where some strain takes
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.quadrature import product_rule
+from ...core.types import Array
+from ...elements.base import ElementBeam
+from ...formulations.base import Formulation, Term
+from ...mesh.mesh_beam import MeshBeam
+from ...sections import Across, Layer
 from .arrays import displaced
 from .kernel import ElementKernel
 from .law import LINEAR, law_tables
 from .tables import OF_FRAME, SECTION, StrainTables, products_of
-
-if TYPE_CHECKING:
-    from ...core.types import Array
-    from ...elements.base import ElementBeam
-    from ...formulations.base import Formulation, Term
-    from ...mesh.mesh_beam import MeshBeam
-    from ...sections import Across, Layer
 
 #: A modulus between samples that is smaller beside what it is a sum of is round-off.
 ORTHOGONAL = 1e-14
