@@ -23,19 +23,11 @@ GROUND = "ground"
 
 
 class Vector:
-    """A plane vector that depends affinely on the coordinates.
+    """A plane vector that depends affinely on the degrees of freedom (DOFs).
 
-    ``start + sum(u[dofs] * weights, axis=1)``: the position of a material point, the direction of a
-    section and that of a rigid body are such vectors, and so is a point of the ground.
-
-    Parameters
-    ----------
-    start
-        Its value in the stress-free state, shape (2,).
-    dofs
-        Numbers of the degrees of freedom of both components, shape (2, n); None if it is constant.
-    weights
-        Their weights, shape (2, n), or (n,) if they are those of both components.
+    ``start + sum(u[dofs] * weights, axis=1)``, as the position of a material point, or the
+    direction of a section or a rigid body. ``dofs`` (2, n) are those of both components, None if it
+    is constant; ``weights`` are (2, n), or (n,) for both.
     """
 
     def __init__(self, start: ArrayLike, dofs: Array | None = None,

@@ -295,12 +295,12 @@ class Beam(Immutable):
                 for _, k, m in self.element.functionals]
         return read_only(np.tile(np.repeat(node, 2), self.N // self.nd))
 
-    def rigid_motions(self, rows: Any = slice(None)) -> Array:
-        """Two translations and the rotation about :attr:`origin`, (N, 3), or some of the rows."""
+    def rigid_motions(self) -> Array:
+        """Two translations and the rotation about :attr:`origin`, (N, 3)."""
         out, q = np.zeros((self.N, 3)), self.q0_local
         out[::self.nd, 0] = out[1::self.nd, 1] = 1.0
         out[::2, 2], out[1::2, 2] = -q[1::2], q[::2]
-        return out[rows]
+        return out
 
     # fields
 

@@ -32,16 +32,9 @@ BOTTOM, TOP, AXIS, BODY = range(4)
 class Sampled:
     """A density of force, by its values at points of elements: a polynomial between them.
 
-    Attributes
-    ----------
-    where
-        BOTTOM or TOP, a face; AXIS; or BODY.
-    elements
-        Those on which it acts, numbers (n,).
-    xi, eta
-        Points along an element and, of a body, across it; shapes (p,) and (q,).
-    values
-        Force per xi, shape (2, ..., n, p); of a body per volume, shape (2, ..., n, p, q).
+    It acts ``where`` says (BOTTOM, TOP, AXIS or BODY) on ``elements`` (n,). ``values`` at the
+    points ``xi`` (p,) along an element are force per xi, (2, ..., n, p); of a body, with points
+    ``eta`` (q,) across, per volume, (2, ..., n, p, q).
     """
 
     where: int
@@ -113,24 +106,17 @@ class Spread:
 
     Attributes
     ----------
-    body
-        Force per volume of the reference configuration, shape (2,), or None.
-    gravity
-        Force per mass, shape (2,), or None.
+    body, gravity
+        Force per volume of the reference configuration, and per mass, shape (2,), or None.
     faces
-        For the bottom and the top the elements whose faces are loaded, two arrays (nelements,) of
-        truth values, or None.
-    traction
-        Force per undeformed area of the faces, (2,), or a function of the points x (2, ...).
-    pressure
-        Force per deformed area, normal to the faces, or None.
-    stations
-        Where it acts on a section or a point: element + xi.
-    sampled
-        Densities that are known at points.
+        Which elements' bottom and top are loaded, two arrays (nelements,) of truth values, or None.
+    traction, pressure
+        Force per undeformed area of the faces, (2,), or a function of the points x (2, ...); force
+        per deformed area, normal to them; or None.
+    stations, sampled
+        Where it acts on a section or a point: element + xi; densities that are known at points.
     eigen
-        A stress-free strain in place of a force: an
-        :class:`~skfem_ancf.actions.eigenstrain.EigenStrain`, or None.
+        A stress-free strain in place of a force, or None.
     """
 
     body: Array | None = None

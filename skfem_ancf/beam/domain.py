@@ -305,9 +305,9 @@ class Domain(Immutable):
             self.velocity_of(lambda x: one[::-1] + 0.0 * x),
             self.velocity_of(lambda x: turn @ (x - self.origin[:, None]))]))
 
-    def rigid_motions(self, rows: Any = slice(None)) -> Array:
-        """Two translations and the rotation about :attr:`origin`, (N, 3), or some of the rows."""
-        return self._rigid[rows]
+    def rigid_motions(self) -> Array:
+        """Two translations and the rotation about :attr:`origin`, (N, 3)."""
+        return self._rigid
 
     # boundaries
 

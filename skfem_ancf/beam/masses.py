@@ -23,19 +23,11 @@ TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 class Masses(NamedTuple):
     """Masses at points of the elements, of one where all are equal.
 
-    A cable may have more than the mass of its axis: its points off it move with ``v + Y v_X``, the
-    latter turned by 90 degrees, as long as the axis hardly stretches.
-
-    Attributes
-    ----------
-    functions
-        Local functions at points, shape (nb, nelements, npoints).
-    mass
-        Mass of the points, shape (nelements, npoints).
-    slopes
-        Derivatives of the functions along the axis, of the same shape, or None.
-    moments
-        Masses times Y and Y^2, shape (2, nelements, npoints), or None.
+    ``functions`` are local functions at points, (nb, nelements, npoints), ``mass`` the masses,
+    (nelements, npoints). A cable may have more than the mass of its axis: its points off it move
+    with ``v + Y v_X``, the latter turned by 90 degrees, as long as the axis hardly stretches. Then
+    ``slopes`` are derivatives of the functions along the axis, and ``moments`` masses times Y and
+    Y^2, (2, nelements, npoints).
     """
 
     functions: Array

@@ -154,12 +154,12 @@ class RigidBody(Immutable):
         n = np.array([-self.q0[3], self.q0[2]])
         return np.append(v[:, 0], n * (n @ (v[:, 1] - v[:, 0])) / self.size)
 
-    def rigid_motions(self, rows: Any = slice(None)) -> Array:
-        """Two translations and the rotation about :attr:`origin`, (4, 3), or some of the rows."""
+    def rigid_motions(self) -> Array:
+        """Two translations and the rotation about :attr:`origin`, (4, 3)."""
         out = np.zeros((4, 3))
         out[0, 0] = out[1, 1] = 1.0
         out[2:, 2] = -self.q0[3], self.q0[2]
-        return out[rows]
+        return out
 
     def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
         """Numbers of degrees of freedom by their names, shape (n,).

@@ -184,10 +184,9 @@ def _places(samples, rows, xi):
     return found.items()
 
 
-def stress_at(beam: Any, u: Array, e: Array, X: Array, strain: Array | None = None) -> Array:
-    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), (3, n), of a strain that may be known."""
-    E = (strain_at(beam, u, e, X) if strain is None else strain)[..., None]
-    at = X[:, :, None]
+def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
+    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) of the elements, shape (3, n)."""
+    E, at = strain_at(beam, u, e, X)[..., None], X[:, :, None]
     of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
           partial(_stress_of_cable, strain=E, X=at, tind=e))
     return beam.across.of_layers(at, E, [partial(of, layer) for layer in beam.layers], e)[..., 0]

@@ -19,21 +19,12 @@ BOTTOM, RIGHT, TOP, LEFT = range(4)
 
 
 class Surface(NamedTuple):
-    """Points of facets that are the same side of their elements.
+    """Points of facets that are the same side of their elements: BOTTOM, RIGHT, TOP or LEFT.
 
-    Attributes
-    ----------
-    side
-        BOTTOM, RIGHT, TOP or LEFT.
-    facets, elements
-        Numbers of the facets, shape (nf,), and of an element of each.
-    X
-        Reference points, shape (2, np).
-    along
-        Derivative of the place by the parameter of a facet, with the body on its left; shape (2,
-        nf, np).
-    weights
-        Those of the rule times the width, shape (nf, np).
+    ``facets`` and ``elements`` are the numbers of the facets, (nf,), and of an element of each;
+    ``X`` reference points (2, np); ``along`` the derivative of the place by the parameter of a
+    facet, with the body on its left, (2, nf, np); ``weights`` those of the rule times the width,
+    (nf, np).
     """
 
     side: int

@@ -35,18 +35,10 @@ MAX_ELEMENTS = 10**7
 
 @dataclass(frozen=True)
 class Refinement:
-    """What one round of an adaptive solution did to a beam.
+    """What one round of an adaptive solution did to a beam, by its number in the scene.
 
-    Attributes
-    ----------
-    beam
-        Number of the beam in the scene.
-    kind
-        "degree" if the degree along the axis was raised, "split" if elements were halved.
-    degree, elements
-        Degree along the axis and number of elements after it.
-    error
-        The estimate of the beam's part of the error that led to it.
+    ``kind`` is "degree" if the degree along the axis was raised, "split" if elements were halved;
+    ``degree`` and ``elements`` are those after it, ``error`` the estimate that led to it.
     """
 
     beam: int
@@ -61,21 +53,17 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
     """Solve with higher degrees or on finer meshes until the estimated error is small enough.
 
     With the goal "displacement" each round solves twice. Beams of an element that has a higher
-    degree (:meth:`~skfem_ancf.elements.ElementBeam.raised`: cables and
-    :class:`~skfem_ancf.ElementBeamANCFHermite`) are compared with the same of the next degree, as
-    long as each degree divides their error by ten and more: there the solution is smooth. All
-    others are compared with the same whose elements are halved. The difference is the estimate: in
-    the displacement of the beams' ends relative to the size of the scene, and relative in the
-    strain energy. Once the mesh resolves the solution, a method of order p leaves the finer
-    solution an error of 1 / (2^p - 1) of it, a third or less, and a higher degree a tenth of it.
-    On a curve, of which elements have cubics, only halving brings their axes closer to it.
-    Smooth beams take the higher degree for the next round; of the others the elements are halved
-    that contribute most to the difference in the energy norm.
+    degree (:meth:`~skfem_ancf.elements.ElementBeam.raised`) are compared with the same of the next
+    degree, as long as each degree divides their error by ten and more: there the solution is
+    smooth. All others are compared with the same whose elements are halved. The difference is the
+    estimate: in the displacement of the beams' ends relative to the size of the scene, and relative
+    in the strain energy. Smooth beams take the higher degree for the next round; of the others the
+    elements are halved that contribute most to the difference in the energy norm. On a curve only
+    halving brings the axes of elements closer to it.
 
     With the goal "strain" the estimate is the difference of the elements' strain and the recovered
     one (:mod:`skfem_ancf.recovery`), in the L2 norm over the body relative to that of the strain,
-    and the elements that contribute most to it are halved. It estimates the error of the elements'
-    strain; that of the recovered strain, which is what State.strain returns, is smaller.
+    and the elements that contribute most to it are halved.
 
     References
     ----------

@@ -283,10 +283,8 @@ class Frame(Scene):
 
         Parameters
         ----------
-        place
-            Nodes, see :meth:`nodes`.
-        *what
-            Of "x", "y" and "angle".
+        place, *what
+            Nodes, see :meth:`nodes`, and of "x", "y" and "angle".
         """
         return self._hold(place, require_names("what is held", list(what), HELD))
 
@@ -310,12 +308,10 @@ class Frame(Scene):
         ----------
         place
             Nodes, see :meth:`nodes`.
-        x, y
-            By how much, from where the nodes are in the stress-free state: a number, which grows
-            with the load of a static solution; or a function of time, in statics of the load
-            factor, for motions as well.
-        angle
-            The rotation in radians, counterclockwise, of any size; in the same way.
+        x, y, angle
+            By how much, from where the nodes are in the stress-free state, the rotation in radians,
+            counterclockwise: a number, which grows with the load of a static solution; or a
+            function of time, in statics of the load factor, for motions as well.
 
         Examples
         --------
@@ -345,32 +341,17 @@ class Frame(Scene):
             raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
 
     def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
-        """Hold nodes fast: their positions and, where a line is rigid there, their rotation.
+        """Hold nodes, see :meth:`nodes`: positions and, where a line is rigid, their rotation.
 
         That of the best straight line through a section, which may still warp and change its
-        thickness, as at the other nodes.
-
-        Parameters
-        ----------
-        boundary
-            Nodes, see :meth:`nodes`.
-        beam, thickness
-            Of a Scene; of a frame None and "free".
+        thickness. ``beam`` is None and ``thickness`` "free" for a frame.
         """
         _no_beam(beam)
         require_option("thickness at the nodes of a frame", thickness, ("free",))
         return self.hold(boundary, *HELD)
 
     def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
-        """Fix the positions of nodes, which may turn.
-
-        Parameters
-        ----------
-        boundary
-            Nodes, see :meth:`nodes`.
-        beam
-            Of a Scene; of a frame None.
-        """
+        """Fix the positions of nodes, see :meth:`nodes`, which may turn; ``beam`` is None here."""
         _no_beam(beam)
         return self.hold(boundary, "x", "y")
 
@@ -378,18 +359,9 @@ class Frame(Scene):
 
     def point_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                     amplitude: TimeFunction = None) -> Frame:
-        """A dead force on each of some nodes, or on a material point of a beam.
+        """A dead force on each of some nodes, see :meth:`nodes`, or on a material point of a beam.
 
-        Parameters
-        ----------
-        force
-            The force on each of them, shape (2,).
-        at
-            Nodes, see :meth:`nodes`; with ``beam`` a material point (x, y).
-        beam
-            The beam, its name or its number, for a point between nodes.
-        amplitude
-            A function of time by which the force is multiplied in a motion.
+        With ``beam`` a material point (x, y) may lie between nodes.
         """
         if beam is not None:
             super().point_force(force, at, beam, amplitude)
@@ -402,18 +374,9 @@ class Frame(Scene):
 
     def moment(self, boundary: Any, M: float, beam: WhichMember = None,
                amplitude: TimeFunction = None) -> Frame:
-        """A moment on each of some nodes.
+        """A moment on each of some nodes, see :meth:`nodes`, at which a line is rigid.
 
-        Parameters
-        ----------
-        boundary
-            Nodes, see :meth:`nodes`, at which a line is rigid.
-        M
-            The moment (force times length), counterclockwise.
-        beam
-            Of a Scene; of a frame None.
-        amplitude
-            A function of time by which the moment is multiplied in a motion.
+        ``beam`` is None for a frame.
         """
         _no_beam(beam)
         M = require_finite_scalar("M", M)
@@ -427,14 +390,7 @@ class Frame(Scene):
                        amplitude: TimeFunction = None, line: int | None = None) -> Frame:
         """A force that turns with the tangent of a line: a :class:`~skfem_ancf.FollowerForce`.
 
-        Parameters
-        ----------
-        force, at
-            The force in the reference configuration and its place (x, y), shape (2,).
-        beam, amplitude
-            As for :meth:`Scene.follower_force`.
-        line
-            The number of the line whose tangent it is, where several meet.
+        ``line`` is the number of the line whose tangent it is, where several meet.
         """
         points = self.system.points
         if line is not None:
@@ -448,15 +404,7 @@ class Frame(Scene):
                   amplitude: TimeFunction = None) -> Frame:
         """A dead force per length of the axis of lines.
 
-        Parameters
-        ----------
-        force
-            Force per length of the stress-free axis: constant, shape (2,), or a function of the
-            points x (2, ...) of the axis that returns (2, ...).
-        beam
-            The beam, its name or its number; or the name of a set of lines of the mesh.
-        amplitude
-            A function of time by which the force is multiplied in a motion.
+        ``beam`` may also be the name of a set of lines of the mesh.
         """
         known = [b.name for b in self.beams]
         if not isinstance(beam, str) or beam in known or beam not in self.net.groups:

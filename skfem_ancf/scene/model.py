@@ -56,15 +56,7 @@ def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
 
 
 class Entry(NamedTuple):
-    """An item of a scene.
-
-    Attributes
-    ----------
-    given
-        As it was given, with beams by number: it fits other meshes.
-    bound
-        What it is on the degrees of freedom of the scene.
-    """
+    """An item as it was given, with beams by number, and what it is on the DOFs of the scene."""
 
     given: Item
     bound: tuple[Any, ...]

@@ -18,18 +18,10 @@ DEPTH = 12
 class Critical:
     """A point at which the tangent stiffness is singular.
 
-    Attributes
-    ----------
-    kind : str
-        "limit", where the load turns, or "bifurcation", where another path crosses.
-    u, multipliers, load, force, arc, error
-        As for :class:`~skfem_ancf.solvers.tracing.Point`.
-    mode, multiplier_mode
-        The null vector, (N,) and (m,), of unit mean displacement over the size of the scene.
-    negative
-        Number of negative eigenvalues before it.
-    change
-        By how many that number changes there.
+    ``kind`` is "limit", where the load turns, or "bifurcation", where another path crosses;
+    ``mode`` and ``multiplier_mode`` the null vector, (N,) and (m,), of unit mean displacement over
+    the size of the scene; ``negative`` the number of negative eigenvalues before it, ``change`` by
+    how many that changes. The others are as for :class:`~skfem_ancf.solvers.tracing.Point`.
     """
 
     kind: str
@@ -118,8 +110,8 @@ def _bifurcation(tracer, p, a, b, tol):
                     best.error, v, m, before, change)
 
 
-def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = None,
-             iterations: int = 4) -> tuple[tuple[Array, Array], float]:
+def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = None
+             ) -> tuple[tuple[Array, Array], float]:
     """The eigenvalue next to zero of the tangent stiffness over its diagonal, and its vector.
 
     By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
@@ -129,7 +121,7 @@ def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = N
     D, none = np.abs(system.K.diagonal()) * system.constraints.mask, np.zeros(system.constraints.m)
     x = np.random.default_rng(0).standard_normal(system.N) if start is None else start[0]
     x, value = x * system.constraints.mask, np.nan
-    for _ in range(iterations + (8 if start is None else 0)):
+    for _ in range(12 if start is None else 4):
         x = x / np.sqrt(x @ (D * x))
         y, m = system.solver.solve(D * x, none)
         value = 1.0 / (x @ (D * y))

@@ -29,15 +29,10 @@ NEAR, SOON = 1e-2, 15
 class Route(NamedTuple):
     """How loads and supports come to their full values as the level goes from 0 to 1.
 
-    Attributes
-    ----------
-    u
-        Displacement at level 0, shape (N,).
-    gap
-        What is missing there to equilibrium under the full load, shape (N,), which is reduced to
-        nothing; None where the loads themselves are applied.
-    loads, times
-        Load factor, and time of supports and obstacles, at levels 0 and 1.
+    ``u`` is the displacement at level 0, (N,); ``gap`` what is missing there to equilibrium under
+    the full load, (N,), which is reduced to nothing, None where the loads themselves are applied;
+    ``loads`` and ``times`` the load factor, and the time of supports and obstacles, at levels 0 and
+    1.
     """
 
     u: Array
@@ -59,16 +54,9 @@ class Route(NamedTuple):
 
 
 class Options(NamedTuple):
-    """Of the iteration of a load step.
+    """Of the iteration of a load step: the method "mixed" or "newton", iterations at most.
 
-    Attributes
-    ----------
-    route
-        The :class:`Route`.
-    method, tol, most
-        "mixed" or "newton", tolerance of a correction, and iterations at most.
-    watched
-        Whether it is given up where the mixed iteration does not seem to converge.
+    ``watched``: it is given up where the mixed iteration does not seem to converge.
     """
 
     route: Route

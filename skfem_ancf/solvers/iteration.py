@@ -38,16 +38,10 @@ FIRST, WATCHED = 1, 2
 class Target(NamedTuple):
     """The equilibrium asked for.
 
-    Attributes
-    ----------
-    factors, before, scale
-        Of the tables of loads, the same for the first tangent, and of loads of one's own.
-    at, c, g
-        Time of the joints, and their tables at it.
-    gap
-        The force that may be missing, shape (N,).
-    prescribed
-        By how much the fixed coordinates have to change.
+    ``factors``, ``before`` and ``scale`` are those of the tables of loads, the same for the first
+    tangent, and of user-defined loads; ``at, c, g`` the time of the joints and their tables;
+    ``gap`` the force that may be missing, (N,); ``prescribed`` by how much fixed DOFs have to
+    change.
     """
 
     factors: F1
@@ -61,22 +55,12 @@ class Target(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """When it has converged.
+    """When it has converged, in so many ``iterations`` at most.
 
-    Attributes
-    ----------
-    mixed
-        1 if the geometric part takes carried stresses.
-    iterations
-        At most.
-    tol, floor, force_floor
-        Tolerance of a correction, and round-off of its work and of the residual.
-    solver
-        Handle of what solves the linear systems, see :mod:`skfem_ancf.core.callbacks`; 0 for the
-        band alone.
-    wary
-        When it ends because corrections do not get smaller: 0 never, :data:`FIRST` or
-        :data:`WATCHED`.
+    ``mixed`` is 1 if the geometric part takes independent stresses; ``tol`` the tolerance of a
+    correction, ``floor`` and ``force_floor`` the round-off of its work and of the residual;
+    ``solver`` the handle of what solves the linear systems, 0 for the band alone; ``wary`` when it
+    ends because corrections do not get smaller: 0 never, :data:`FIRST` or :data:`WATCHED`.
     """
 
     mixed: int

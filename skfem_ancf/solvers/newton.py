@@ -35,15 +35,9 @@ _NAMES = {"mixed": "the mixed iteration", "newton": "Newton's method"}
 
 
 class Steps(NamedTuple):
-    """Rules of load steps.
+    """Rules of load steps, as for :func:`solve_static`.
 
-    Attributes
-    ----------
-    method, tol, max_iterations, first_step, min_step
-        As for :func:`solve_static`.
-    few
-        Whether they are given up after :data:`FEW` iterations, or where the first :data:`CUT` do
-        not converge.
+    ``few``: they are given up after :data:`FEW` iterations, or where the first :data:`CUT` fail.
     """
 
     method: str
@@ -261,11 +255,10 @@ class Search:
         rules = self.rules._replace(method=method, **changes)
         return self._load_steps(route or self.route, start, rules)
 
-    def one_step(self, method: str, route: Route | None = None,
-                 start: StaticResult | None = None) -> StaticResult:
+    def one_step(self, method: str, route: Route | None = None) -> StaticResult:
         """As :meth:`load_steps`, at once or not at all."""
         route = route or self.route
-        result = start or self._beginning(route)
+        result = self._beginning(route)
         step = Increment(self.system, result, 1.0, self._options(route, method, watched=True))
         try:
             with np.errstate(all="ignore"):  # what overflows is seen in the residual

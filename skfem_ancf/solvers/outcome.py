@@ -30,16 +30,9 @@ class LoadStep:
 
 
 class Attempt(NamedTuple):
-    """A strategy that was tried.
+    """A strategy that was tried, its iterations, and why it was given up.
 
-    Attributes
-    ----------
-    strategy
-        Its name.
-    iterations
-        Linear systems solved, those of load steps that were given up included.
-    failure
-        Why it was given up; empty if it found the equilibrium.
+    Linear systems of load steps that were given up count; ``failure`` is empty if it succeeded.
     """
 
     strategy: str

@@ -24,23 +24,15 @@ class Failed(Exception):
 class Point:
     """One equilibrium of a path.
 
-    Parameters
-    ----------
-    u, multipliers, load, force
-        Displacement (N,), multipliers (m,), load factor and internal force (N,).
-    arc
-        Arc length from the start of the path.
-    error
-        Size of the last correction in the energy norm, relative to the work done.
-    iterations
-        Linear systems solved.
+    ``u``, ``multipliers``, ``load`` and ``force`` are displacement (N,), multipliers (m,), load
+    factor and internal force (N,); ``arc`` the arc length from the start of the path; ``error`` the
+    size of the last correction in the energy norm, relative to the work done; ``iterations`` the
+    linear systems solved.
 
     Attributes
     ----------
-    rate
-        Of the load with the arc length; zero at a limit point.
-    tangent
-        Of the displacement with the arc length, (N,).
+    rate, tangent
+        Of the load and of the displacement (N,) with the arc length.
     negative
         Number of negative eigenvalues of the tangent stiffness on the tangent space of the
         constraints; None where the loads have no potential.

@@ -66,6 +66,9 @@ class Joint(Item):
 
     Other Parameters
     ----------------
+    beam, name
+        The beam, by Beam, name or number, None where there is only one; what messages call the
+        joint.
     layout
         The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     u, v, t

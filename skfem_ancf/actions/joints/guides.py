@@ -21,12 +21,8 @@ class OnLine(Joint):
         The material point: its place (x, y) in the stress-free body.
     direction
         Direction of the line, shape (2,).
-    beam
-        The beam, by Beam, name or number; None where there is only one.
     through
         A point of the line, shape (2,); the material point's stress-free place by default.
-    name
-        What messages call the joint.
     """
 
     equations = ("force normal to the line",)
@@ -61,12 +57,8 @@ class OnCircle(Joint):
         The material point: its place (x, y) in the stress-free body.
     center
         Centre of the circle, shape (2,).
-    beam
-        The beam, by Beam, name or number; None where there is only one.
     radius
         Its radius; the distance of the stress-free point by default.
-    name
-        What messages call the joint.
     """
 
     equations = ("force away from the centre",)

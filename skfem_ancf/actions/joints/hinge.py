@@ -24,8 +24,6 @@ class Hinge(Joint):
     at
         The point, its place (x, y) in the stress-free bodies; or one point for each beam, if they
         are apart. None is the centre of mass of a rigid body.
-    name
-        What messages call the joint.
     """
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:

@@ -21,10 +21,6 @@ class PlaneSection(Joint):
     ----------
     at
         The end section, "left" or "right".
-    beam
-        The beam, by Beam, name or number; None where there is only one.
-    name
-        What messages call the joint.
     """
 
     def __init__(self, at: Place, beam: WhichBeam = None, name: str | None = None) -> None:

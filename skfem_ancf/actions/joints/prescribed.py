@@ -32,10 +32,6 @@ class PrescribedPosition(Joint):
         RigidBody, which may stand here too, its centre of mass if no point is given.
     r
         The motion: a function of time that returns the position (2,).
-    beam
-        The beam, by Beam, name or number; None where there is only one.
-    name
-        What messages call the joint.
     """
 
     equations = ("force along x", "force along y")
@@ -73,8 +69,6 @@ class PrescribedAngle(Joint):
         The angle in radians as a function of time, from the stress-free state, counterclockwise.
     beam
         The beam, by Beam, name or number; None where there is only one. Or a RigidBody.
-    name
-        What messages call the joint.
     """
 
     equations = ("moment",)
@@ -134,8 +128,6 @@ class PrescribedTurn(Joint):
         :class:`PrescribedAngle`. What turns, and from what its angle is measured.
     angle
         The angle in radians as a function of time, from the stress-free state, counterclockwise.
-    name
-        What messages call the joint.
     """
 
     equations = ("moment",)

@@ -69,8 +69,6 @@ class Sleeve(Joint):
         The beam along which it slides, its name or its number.
     angle
         Keep the angle: a sleeve that carries a moment.
-    name
-        What messages call the joint.
 
     References
     ----------
@@ -244,8 +242,6 @@ class Slot(Joint):
         A point of the line there, shape (2,); the material point by default.
     angle
         Keep the angle between the point's section and the line: a moment is carried.
-    name
-        What messages call the joint.
     """
 
     constant = False

@@ -31,8 +31,6 @@ class Weld(Joint):
     at
         The section of each beam, as ``("right", "left")``, or a material point (x, y), inside of an
         element too; or one place for all, as the point ``(1, 0)`` that they share.
-    name
-        What messages call the joint.
     apart
         Allow that the points are apart in the stress-free state: the weld draws them together.
     """
