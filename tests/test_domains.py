@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse.linalg import eigsh
-from skfem import (Basis, BilinearForm, ElementQuad1, ElementQuad2, ElementTetP1, ElementTriP2,
-                   ElementVector, LinearForm, MeshQuad, MeshTet, MeshTri, condense, solve)
+from skfem import (Basis, BilinearForm, ElementQuad1, ElementQuad2, ElementQuadP, ElementTetP1,
+                   ElementTriP2, ElementVector, LinearForm, MeshQuad, MeshQuad2, MeshTet, MeshTri,
+                   condense, solve)
 from skfem.helpers import ddot, dot, eye, grad, identity, mul, sym_grad, trace, transpose
 
 from skfem_ancf import (Beam, CallbackError, Domain, ElementBeamANCF, ElementBeamCable, InputError,
@@ -153,6 +154,34 @@ def test_gravity_and_prescribed_displacements_of_a_domain():
     strain = 0.01 + 0.5 * 0.01**2
     assert_allclose(state.strain_energy, 0.5 * E * strain**2 * H * WIDTH, rtol=1e-6)
     assert_allclose(state.reactions("right").force[0], E * strain * 1.01 * H * WIDTH, rtol=1e-6)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_elements_without_nodes_and_curved_cells(curved):
+    """A hierarchical element, and a quarter of a ring of quadratic quads."""
+    mesh = strip(0, 1, 8, 2)
+    if curved:
+        flat = MeshQuad2.from_mesh(MeshQuad.init_tensor(np.linspace(0, np.pi / 2, 9),
+                                                        np.linspace(0.95, 1.05, 3)))
+        angle, radius = flat.doflocs
+        mesh = MeshQuad2(np.array([radius * np.sin(angle), radius * np.cos(angle)]), flat.t)
+        mesh = mesh.with_boundaries({"left": lambda x: x[0] < 1e-6, "end": lambda x: x[1] < 1e-6})
+    states = []
+    for element in (ElementQuad2(), ElementQuadP(3)):
+        solid = domain_of(mesh, element)
+        states.append(Scene(solid).clamp("left").gravity((0, -0.5)).solve_static())
+        weight = 0.5 * RHO * WIDTH * H * (0.5 * np.pi if curved else 1.0)
+        assert_allclose(states[-1].reactions("left").force, (0, weight), rtol=1e-3, atol=1e-9)
+    at = (1.0, 0.0)
+    assert_allclose(*(state.displacement(at) for state in states), rtol=0.02)
+    if curved:
+        beam = Beam(MeshBeam.init_line([0, 0.5, 1], H, origin=at, angle=-np.pi / 2),
+                    ElementBeamANCF(2), StVenantKirchhoff(E, NU, RHO), WIDTH)
+        scene = Scene(beam, solid).clamp("left", solid).point_force((0, -0.1), (1, -1), beam)
+        scene.weld((solid, "end"), (beam, "left"))
+        hangs = scene.solve_static()
+        assert_allclose(hangs.reactions("left", solid).moment,
+                        0.1 * (1 + hangs.displacement((1, -1))[0]), rtol=1e-3)
 
 
 def test_a_domain_buckles_where_it_has_to():

@@ -500,15 +500,19 @@ class State(Immutable, MaterialPoints):
         total = np.where(system.constraints.free, 0.0, self._support_force()) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
         arm = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
-        arm[:, 0] -= arm[:, 0].mean(axis=0) if isinstance(member, Domain) else arm[0, 0].copy()
+        one, centre = np.ones(len(nodes)), arm[0, 0].copy()
+        if isinstance(member, Domain):  # a unit translation, of DOFs that are no positions too
+            one = member.rigid_motions()[::2, 0][nodes]
+            centre = one @ arm[:, 0] / one.sum()
+        arm[:, 0] -= one[:, None] * centre
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
         holds = (~system.constraints.free | touched)[s].reshape(-1, member.nd)[nodes].any(axis=0)
         names = {n: float(v) for n, v, held in zip(
-            member.dofnames, forces.sum(axis=0).ravel(), holds) if held}
+            member.dofnames, np.tensordot(one, forces, 1).ravel(), holds) if held}
         if frame is not None and not names:
             raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: what holds "
                              "the nodes of a frame is asked of nodes, without beam=")
-        return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
+        return Reaction(one @ forces[:, 0], float(moment), names)
 
     def _support_force(self):
         """What supports do to the scene, (N,): all other forces and inertia, negated."""

@@ -282,7 +282,9 @@ class Model:
         Parameters
         ----------
         *places
-            As for :meth:`hinge`; (beam, "right") is the axis at that end.
+            As for :meth:`hinge`; (beam, "right") is the axis at that end. Of a
+            :class:`~skfem_ancf.Domain` a boundary, as (domain, "right"), which moves with the end
+            or side of a beam, as (beam, "left"), or with a rigid body.
         name
             What messages call the joint.
         apart

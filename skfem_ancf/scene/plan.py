@@ -67,7 +67,7 @@ def _beams(s):
     beams = s.beams
     points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
     yield _item("strain energy", beams, f"{points} integration points, "
-                + _listed(b.formulation.name for b in beams), "rigid bodies alone")
+                + _listed(b.formulation.name for b in beams), "there are no beams")
     yield Item("tables", "constant", "one for all elements of a straight beam with equal elements"
                if all(b.kernel.shared for b in beams) else
                "one for each element: curved or unequal elements")

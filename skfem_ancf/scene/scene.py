@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 class Scene(Model):
-    """Beams and rigid bodies with supports and loads, and their solutions.
+    """Beams, rigid bodies and domains with supports and loads, and their solutions.
 
     Methods that add something return the scene, so that they can be chained, but for those of
     joints, which return the joint: ``state.joint_force(joint)`` is its force. Each adds an item:
@@ -52,8 +52,8 @@ class Scene(Model):
     Parameters
     ----------
     *beams
-        One or more :class:`~skfem_ancf.Beam`, and :class:`~skfem_ancf.RigidBody` among them. Bodies
-        are numbered behind the beams.
+        One or more :class:`~skfem_ancf.Beam`, :class:`~skfem_ancf.RigidBody` or
+        :class:`~skfem_ancf.Domain`, numbered in this order.
 
     Examples
     --------
@@ -75,6 +75,7 @@ class Scene(Model):
 
     def __repr__(self):
         bodies = f"{len(self.bodies)} rigid bodies, " if self.bodies else ""
+        bodies += f"{len(self.domains)} domain(s), " if self.domains else ""
         return (f"<Scene of {len(self.beams)} beam(s), {bodies}{len(self._fixed)} fixed "
                 f"coordinates, {len(self.loads)} load(s)>")
 

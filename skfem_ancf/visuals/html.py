@@ -39,6 +39,7 @@ def scene_html(scene: Any) -> str:
     """A table of what is in a Scene, and its reference configuration."""
     rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
     rows += [("rigid body", b) for b in scene.bodies]
+    rows += [("domain", d) for d in scene.domains]
     rows += [("item", one) for one in scene.items]
     table = "".join(f"<tr><td>{kind}</td><td>{html.escape(_short(thing))}</td></tr>"
                     for kind, thing in rows)

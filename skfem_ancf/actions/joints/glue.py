@@ -67,7 +67,9 @@ class Glue(Joint):
         rows, columns = domain.numbers(M.row), domain.numbers(M.col)
         keep = np.isin(rows, tests)
         row = np.searchsorted(tests, rows[keep])
-        size = np.bincount(row, M.data[keep])  # so that multipliers add up to the force
+        one = domain.rigid_motions()[:, :2].sum(axis=1)[columns[keep]]
+        size, largest = (np.bincount(row, v) for v in (M.data[keep] * one, np.abs(M.data[keep])))
+        size = np.where(size > 1e-6 * largest, size, largest)  # multipliers add up to the force
         found = [(row, first + columns[keep], M.data[keep])]
         if not is_ground(self.other):
             dofs, weights = self._surface(layout, np.reshape(basis.global_coordinates(), (2, -1)))
