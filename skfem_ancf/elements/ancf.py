@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -28,14 +26,6 @@ POINT_FAMILIES = {
     "gauss-lobatto": gauss_lobatto,
     "equispaced": lambda n: np.linspace(-1.0, 1.0, n),
 }
-
-
-@lru_cache(64)
-def _section(n: int, points: str) -> tuple[Array, SectionFunctions]:
-    """Places Y / h of the slopes, and the functions of the section."""
-    x = np.zeros(1) if n == 1 else (
-        np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
-    return read_only(0.5 * x), SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1)))
 
 
 class ElementBeamANCF(ElementBeam):
@@ -80,7 +70,10 @@ class ElementBeamANCF(ElementBeam):
         n = require_integer("the order of an ANCF beam element", order, 1, MAX_ORDER,
                             "polynomials of a higher degree have no digits left")
         require_option("family of section points", points, POINT_FAMILIES)
-        self.section_points, functions = _section(n, points)
+        x = np.zeros(1) if n == 1 else (
+            np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
+        self.section_points = read_only(0.5 * x)
+        functions = SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1)))
         names, functionals = self._coordinates()
         super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core.caching import ArrayKey
 from ..core.errors import require_like
 from ..core.immutable import Immutable, read_only
 from ..core.linear import stress_of
@@ -52,11 +51,6 @@ class Term:
         """Points (2, n) and weights (n,) for scikit-fem's Basis."""
         X, W = product_rule(self.axis, self.section)
         return read_only(X), read_only(W)
-
-    @cached_property
-    def _places(self) -> ArrayKey:
-        """Where it is sampled: places along of xx, yy and xy, and places across."""
-        return ArrayKey(*map(self.nodes, COMPONENTS), self.section_nodes)
 
     def nodes(self, component: str) -> Array:
         """Where along the axis a component is sampled, shape (m,)."""

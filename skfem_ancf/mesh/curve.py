@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import logging
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -174,7 +174,9 @@ def _stencil(s, s0, s1):
     c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
     x = (s - c) / d
     weights = np.zeros((len(STENCIL), len(x)))
-    for coefficients in _lagrange_derivatives().T:
+    # the inverse has the coefficients of Lagrange's polynomials, those of the highest powers first
+    slopes = np.array([np.polyder(c) for c in np.linalg.inv(np.vander(STENCIL)).T])
+    for coefficients in slopes.T:
         weights = weights * x + coefficients[:, None]
     return c + STENCIL[:, None] * d, weights, d
 
@@ -199,13 +201,6 @@ def _require_no_kink(s, p, beside):
             f"the curve has a kink of {np.rad2deg(narrow[k]):.3g} degrees at s = {s[k]:.9g}: give "
             "one beam for each smooth part, and weld them in a scene with "
             'scene.joint("weld", ...)')
-
-
-@cache
-def _lagrange_derivatives():
-    """Of each Lagrange polynomial of the stencil the coefficients of its derivative, (7, 6)."""
-    values = np.vander(STENCIL)  # of the powers, the highest first: their inverse has those of
-    return np.array([np.polyder(c) for c in np.linalg.inv(values).T])  # the polynomials
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import factorial
 from typing import Any
 
@@ -22,7 +22,6 @@ CLOSE, ITERATIONS = 1e-7, 30
 SAMPLES, WALK, CANDIDATES = 4, 3, 6
 
 
-@lru_cache(16)
 def _taylor(m):
     """From Hermite coefficients, of m derivatives a node, to those of powers of xi."""
     return np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d) for d in range(2 * m)])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,14 +51,9 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
     return float(np.max(heights)), heights, height
 
 
-@lru_cache(1)
-def _powers() -> Array:
-    return np.linalg.inv(np.vander(PLACES, increasing=True))
-
-
 def powers(heights: Array) -> Array:
     """Coefficients of 1, xi, xi^2, xi^3 from heights; both of shape (4, nelements)."""
-    return _powers() @ heights
+    return np.linalg.solve(np.vander(PLACES, increasing=True), heights)
 
 
 def halved(heights: Array, marked: Array) -> Array:
