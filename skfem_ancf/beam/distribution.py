@@ -173,6 +173,6 @@ def _where(element: ElementBeam, value: float) -> float | None:
         return float(round(value))
 
     def rest(xi: float) -> Any:
-        return element.local(np.array([[xi], [0.5]]), 1.0, element.nodal_dofs)[0][0] - value
+        return element.local(np.array([[xi], [0.5]]), 1.0)[0][element.nodal_dofs, 0] - value
 
     return scipy.optimize.brentq(rest, 0.0, 1.0, xtol=1e-15)

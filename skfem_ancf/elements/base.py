@@ -194,8 +194,8 @@ class ElementBeam(Immutable, Element):
             out[:, of_section] = S * P, dS * P, S * dP
         return out
 
-    def local(self, X: Array, h: float | Array, i: int | slice = slice(None),
-              rate: float | Array = 0.0) -> tuple[Array, Array, Array, Any]:
+    def local(self, X: Array, h: float | Array, i: slice = slice(None),
+              rate: float | Array = 0.0) -> tuple[Array, Array, Array, Array]:
         """Local functions on the reference cell, their derivatives, and their power of the length.
 
         Parameters
@@ -203,22 +203,14 @@ class ElementBeam(Immutable, Element):
         h, rate
             Height of the section and its derivative by xi; of a tapered one at each point, shape
             X.shape[1:], or of each element at the same points, shape (nelements, npoints).
-        i
-            Number of the local function, 0 to 2 nodal_dofs - 1, or a slice of them.
 
         Returns
         -------
         value, d_xi, d_eta
-            Arrays of shape X.shape[1:], or (n,) + X.shape[1:] of a slice; of the shape of h where
-            that has more axes.
+            Arrays (n,) + X.shape[1:]; of the shape of h where that has more axes.
         slope
             The power of L that a function takes: how many derivatives along X it belongs to.
         """
-        if not isinstance(i, slice):
-            if not 0 <= i < 2 * self.nodal_dofs:
-                self._index_error()
-            value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1), rate)
-            return value[0], d_xi[0], d_eta[0], int(slope)
         power, slope = self._factors[3:, i]
         unit = self._unit(X, i)
         if np.ndim(h) == unit.ndim - 1:  # the same points of each element
