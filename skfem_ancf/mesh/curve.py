@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 from collections.abc import Callable
 from functools import partial
@@ -150,11 +149,8 @@ def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[
 
 
 def _each(function, *parameters):
-    """What a function of parameters (n,) returns at those of arrays (...), asked once: (2, ...)."""
-    found = np.asarray(function(np.concatenate([s.ravel() for s in parameters])))
-    ends = [0, *itertools.accumulate(s.size for s in parameters)]
-    return [found[:, i:j].reshape(2, *s.shape)
-            for i, j, s in zip(ends, ends[1:], parameters)]
+    """What a function of parameters (n,) returns at those of arrays (...), (2, ...) each."""
+    return [np.asarray(function(s.ravel())).reshape(2, *s.shape) for s in parameters]
 
 
 def _angles(a, b):

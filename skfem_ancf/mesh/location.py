@@ -36,13 +36,13 @@ def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
 class Inverse:
     """The map from the body to the reference cell, by polynomials of xi.
 
-    ``axis`` and ``director``, that of the largest height, are Hermite coefficients (2, n, ne);
+    ``axis`` from ``start`` and ``director``, of the largest height, are Hermite coefficients;
     ``heights`` coefficients (4, ne) of heights over the largest, None where it is constant.
     """
 
-    def __init__(self, axis: Array, director: Array, height: float, heights: Array | None) -> None:
-        self.start, axis = axis[:, 0], axis.copy()
-        axis[:, [0, axis.shape[1] // 2]] -= axis[:, :1]  # from the first node: less round-off
+    def __init__(self, start: Array, axis: Array, director: Array, height: float,
+                 heights: Array | None) -> None:
+        self.start = start
         self.axis, self.director = (_taylor(c.shape[1] // 2) @ c for c in (axis, director))
         n, m = self.axis.shape[1], self.director.shape[1]
         #: Minus the cross product of both. Where the section is that holds a point does not depend

@@ -75,11 +75,13 @@ class MappingBeam(Mapping):
             (np.array(values)[:, :, m.t] * (m.lengths ** np.arange(len(values))[:, None])[
                 :, None, None]).transpose(1, 2, 0, 3).reshape(2, 2 * len(values), -1)
             for values in (axis[:k], directors[:n]))
-        return axis, m.height * directors
+        start = axis[:, 0].copy()
+        axis[:, [0, k]] -= start[:, None]  # from the first node: less round-off
+        return start, axis, m.height * directors
 
     def _coefficients(self, tind):
         """Axis (2, 4, ne) and director (2, 2 or 4, ne) coefficients of the elements ``tind``."""
-        axis, director = self._all_coefficients
+        _, axis, director = self._all_coefficients
         return (axis, director) if tind is None else (axis[:, :, tind], director[:, :, tind])
 
     def _axis(self, xi, derivative=0):
@@ -96,19 +98,6 @@ class MappingBeam(Mapping):
         if functions.ndim == 2:
             return np.einsum("ine,np->iep", coefficients, functions)
         return np.einsum("ine,nep->iep", coefficients, functions)
-
-    @cached_property
-    def _constant(self):
-        """Derivatives by xi and eta of straight elements of one height, (2, 2, ne), or None."""
-        m = self.mesh
-        if not m.is_straight or m.heights is not None or m.sections != "linear":
-            return None
-        return np.stack([m.p[:, m.t[1]] - m.p[:, m.t[0]], m.height * m.p_Y[:, m.t[0]]], 1)
-
-    def _everywhere(self, constant, X, tind):
-        """What is constant in each element, (2, 2, ne), at points."""
-        constant = constant if tind is None else constant[:, :, tind]
-        return np.repeat(constant[..., None], X.shape[-1], axis=-1)
 
     # heights
 
@@ -148,7 +137,8 @@ class MappingBeam(Mapping):
         """The points of the body of reference points, (2, nelements, npoints)."""
         axis, director = self._coefficients(tind)
         across = self._sum(director, (X[1] - 0.5) * self._director(X[0]))
-        return self._sum(axis, self._axis(X[0])) + self._relative(X[0], tind)[0] * across
+        start = self._all_coefficients[0][:, slice(None) if tind is None else tind, None]
+        return start + (self._sum(axis, self._axis(X[0])) + self._relative(X[0], tind)[0] * across)
 
     def _derivatives(self, X, tind):
         """Derivatives of :meth:`F` by xi and eta, and of the axis by xi, (2, ne, np) each."""
@@ -160,8 +150,6 @@ class MappingBeam(Mapping):
 
     def DF(self, X: Array, tind: Array | None = None) -> Array:
         """The Jacobian: derivatives of :meth:`F` by xi and eta, (2, 2, nelements, npoints)."""
-        if self._constant is not None:
-            return self._everywhere(self._constant, X, tind)
         return np.stack(self._derivatives(X, tind)[:2], 1)
 
     def detDF(self, X: Array, tind: Array | None = None) -> Array:
@@ -192,9 +180,6 @@ class MappingBeam(Mapping):
 
     def frame(self, X: Array, tind: Array | None = None) -> Array:
         """The tangent ``frame[:, 0]`` of the axis and its normal, (2, 2, nelements, npoints)."""
-        if self._constant is not None:
-            x, y = self._constant[:, 0] / self.mesh.lengths
-            return self._everywhere(np.array([[x, -y], [y, x]]), X, tind)
         d = self._sum(self._coefficients(tind)[0], self._axis(X[0], 1))
         x, y = d / np.hypot(*d)
         return np.array([[x, -y], [y, x]])
@@ -215,8 +200,8 @@ class MappingBeam(Mapping):
     @cached_property
     def inverse(self) -> Inverse:
         """The map from points of the body to those of the reference cell."""
-        axis, director = self._all_coefficients
-        return Inverse(axis, director, self.mesh.height,
+        start, axis, director = self._all_coefficients
+        return Inverse(start, axis, director, self.mesh.height,
                        None if self.mesh.heights is None else self.heights)
 
     def invF(self, x: Array, tind: Array | None = None) -> Array:
@@ -265,9 +250,6 @@ class MappingBeam(Mapping):
 
     def check(self) -> None:
         """Raise :class:`MeshError` where the body folds: the map is not one to one."""
-        J = self._constant
-        if J is not None and np.all(cross(J[:, 0], J[:, 1]) > 0.0):
-            return  # they are rectangles
         least = self.detDF(_FACES).min(axis=1)
         if not least.min() > 0.0:
             bad = np.nonzero(~(least > 0.0))[0]

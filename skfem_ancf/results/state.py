@@ -257,14 +257,10 @@ class State(Immutable, MaterialPoints):
         return self._places[self._dofs(beam)]
 
     @property
-    def _from_rest(self):
-        """True if it is linearised about the reference configuration without load."""
-        return self.base is not None and self.base.load == 0.0 and not self.base.u.any()
-
-    @property
     def _unit(self):
         """What factors of loads are times: of a linear solution from rest a step, else 1."""
-        return step(0.0, 1.0) if self._from_rest else 1.0
+        base = self.base
+        return 1.0 if base is None or base.load or base.u.any() else step(0.0, 1.0)
 
     @property
     def _acted(self):
