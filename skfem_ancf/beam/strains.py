@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
 from numpy.polynomial.polynomial import polyval
 
-from ..core.types import Array, Rule
+from ..core.types import Array, Law, Rule
 from ..formulations import COMPONENTS
 from ..formulations.base import Term
 
@@ -215,6 +215,12 @@ class BeamLayer:
 
     def __init__(self, beam: Any, layer: Any, terms: Sequence[Term]) -> None:
         self.beam, self.material, self.terms = beam, layer.material, terms
+        self._element = beam.across.element_of(layer)
+
+    @cached_property
+    def law(self) -> Law:
+        """The constitutive law, with the shear factor of the section."""
+        return self.material.law(self.material.shear_factor(self._element))
 
     def strain(self, term: Term, u: Array, X: Array, tind: Array | None = None,
                across: Rule | None = None) -> Array:
