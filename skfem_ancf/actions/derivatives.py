@@ -63,32 +63,33 @@ def by_loops(psi: Any, gradient: Any, hessian: Any,
 
     steps = REAL * np.array([height] * 2 + [1.0] * 4)
 
-    def stepped(r, F, x, t, z, out):
-        for k in range(6):
+    def stepped(r, F, x, t, z, first, out):
+        for k in range(first, 6):
             kept = z[k]
             z[k] += 1j * IMAGINARY
             out[k] = complex(psi(r, F, x, t)).imag / IMAGINARY
             z[k] = kept
 
-    def density(r, F, x, t, z, out):
+    def density(r, F, x, t, z, first, out):
         out[0] = psi(r, F, x, t)
 
-    def given(r, F, x, t, z, out):
+    def given(r, F, x, t, z, first, out):
         out[:2], b = gradient(r, F, x, t)
         out[2:] = b.copy().reshape(4)
 
-    def curvature(r, F, x, t, z, out):
+    def curvature(r, F, x, t, z, first, out):
         out[:] = hessian(r, F, x, t).copy().reshape(36)
 
-    def differences(r, F, x, t, z, out):
+    def differences(r, F, x, t, z, first, out):
         a = np.empty((2, 6))
         for k in range(6):
             kept = z[k]
             for side in range(2):
                 z[k] = kept + (2 * side - 1) * steps[k]
-                slope_of(r, F, x, t, z, a[side])
+                slope_of(r, F, x, t, z, k, a[side])
             z[k] = kept
-            out[k::6] = 0.5 * (a[1] - a[0]) / steps[k]
+            for i in range(k, 6):
+                out[6 * i + k] = out[6 * k + i] = 0.5 * (a[1, i] - a[0, i]) / steps[k]
 
     slope = stepped if gradient is None else given
     slope_of, kind = njit(slope), complex if gradient is None else float
@@ -101,7 +102,7 @@ def by_loops(psi: Any, gradient: Any, hessian: Any,
             r, F = z[:2], z[2:].reshape(2, 2)
             for p in range(y.shape[1]):
                 z[:], x[:] = y[:, p], X[:, p]
-                one(r, F, x, t, z, out[p])
+                one(r, F, x, t, z, 0, out[p])
 
         def of(r, F, X, t):
             y = np.concatenate([r, F.reshape(4, *r.shape[1:])]).reshape(6, -1)
