@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from skfem import LinearForm
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, InputError, Item, MeshBeam, Scene,
-                        StVenantKirchhoff, sweep)
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, Energy, FormLoad, InputError, Item, MeshBeam,
+                        Scene, StVenantKirchhoff, sweep)
 from skfem_ancf.actions.forces import point
 from skfem_ancf.actions.joints import JOINTS, Motor
 from skfem_ancf.dynamics import SCHEMES
@@ -147,7 +147,21 @@ class Lift(Tip):
         return self.r.row((0.0, 1.0), len(u))[None]
 
 
-CUSTOM = (Quartic, Pull, Bob, Rail, Lift)
+@LinearForm
+def across(v, w):
+    """A force that turns with the axis."""
+    return 100.0 * (w.F[0, 0] * v[1] - w.F[1, 0] * v[0])
+
+
+def unscaled():
+    return Energy(bedding, beam=0, scaled=False)
+
+
+def following():
+    return FormLoad(across, beam=0)
+
+
+CUSTOM = (Quartic, Pull, Bob, Rail, Lift, unscaled, following)
 
 
 def item_of(name):
