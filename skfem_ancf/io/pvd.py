@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-from ..actions.obstacles.pictures import obstacles_of
+from ..actions.obstacles.outlines import obstacles_of
 from ..core.archive import output_file
 from ..core.errors import require_options, require_path, require_text
 from ..core.types import StrPath

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.obstacles.pictures import around, outlines
+from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import find_h5py, new_file, put_in_place
 from ..core.errors import FileError, InputError, require_option, require_options, require_path
 from ..core.types import StrPath

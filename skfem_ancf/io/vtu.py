@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import meshio
 import numpy as np
 
-from ..actions.obstacles.pictures import around, outlines
+from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
                            require_option, require_path, warn)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.obstacles.pictures import AROUND
+from ..actions.obstacles.outlines import AROUND
 from ..beam.layout import WhichBeam
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.obstacles.pictures import around, outlines
+from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
                            require_options, require_path, require_text)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.obstacles.pictures import around, outlines
+from ..actions.obstacles.outlines import around, outlines
 from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
                            require_positive, require_unmasked, shown)
 from ..core.types import Array

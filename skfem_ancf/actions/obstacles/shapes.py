@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -85,7 +86,20 @@ class Shape(Immutable):
         return f"<{type(self).__name__}>"
 
 
-class Line(Shape):
+class Outline(Shape):
+    """A shape by a polygon with rounded corners; circles and lines are such."""
+
+    kind = OUTLINE
+
+    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
+        x = np.asarray(x, dtype=float)
+        out = np.zeros((6, int(np.prod(x.shape[1:]))))
+        outline(self.numbers, False, x.reshape(2, -1), out)
+        gap = out[0].reshape(x.shape[1:])
+        return -gap if self.hollow else gap
+
+
+class Line(Outline):
     """A straight wall without end.
 
     Parameters
@@ -103,8 +117,6 @@ class Line(Shape):
     1.5
     """
 
-    kind = OUTLINE
-
     def __init__(self, point: ArrayLike, normal: ArrayLike = (0.0, 1.0)) -> None:
         self.point = require_finite("point", point, (2,))
         self.normal = require_finite("normal", normal, (2,))
@@ -115,10 +127,6 @@ class Line(Shape):
         p, q = self._unit
         self.numbers = np.array([0.0, -FAR, FAR, *self.point, -q, p, 1.0])
 
-    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        x = np.asarray(x, dtype=float)
-        return self._unit[0] * (x[0] - self.point[0]) + self._unit[1] * (x[1] - self.point[1])
-
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
         return clipped(self.point, self._unit, box)
 
@@ -126,7 +134,7 @@ class Line(Shape):
         return f"<Line at {_pair(self.point)}, normal {_pair(self.normal)}>"
 
 
-class Circle(Shape):
+class Circle(Outline):
     """A disc, or the hole of a ring.
 
     Parameters
@@ -145,8 +153,6 @@ class Circle(Shape):
     2.0
     """
 
-    kind = OUTLINE
-
     def __init__(self, center: ArrayLike, radius: float, hollow: bool = False) -> None:
         self.center = require_finite("center", center, (2,))
         self.radius = require_positive("radius", radius)
@@ -155,11 +161,6 @@ class Circle(Shape):
         self.numbers = np.array([self.radius, 0.0, 1.0, *self.center, 0.0, 0.0, 1.0])
         self.bend = self.radius
         self.inner = np.inf if self.hollow else self.radius
-
-    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        x = np.asarray(x, dtype=float)
-        gap = np.hypot(x[0] - self.center[0], x[1] - self.center[1]) - self.radius
-        return -gap if self.hollow else gap
 
     def landmarks(self) -> Array:
         points, _ = circle(self.center, self.radius, 8)
@@ -172,7 +173,7 @@ class Circle(Shape):
         return f"<Circle about {_pair(self.center)}, radius {self.radius:g}>"
 
 
-class Polygon(Shape):
+class Polygon(Outline):
     """What is inside of a closed polygon, or outside of it.
 
     Parameters
@@ -194,8 +195,6 @@ class Polygon(Shape):
     [-0.25, 1.0]
     """
 
-    kind = OUTLINE
-
     def __init__(self, points: ArrayLike, radius: float = 0.0, hollow: bool = False) -> None:
         try:
             corners = np.array(points, dtype=float)
@@ -209,24 +208,16 @@ class Polygon(Shape):
         self.hollow = require_flag("hollow", hollow)
         _require_simple(corners)
         after = np.roll(corners, -1, axis=0)
-        if np.sum(corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0]) < 0.0:
+        if np.sum(_cross(corners, after)) < 0.0:
             corners = corners[::-1].copy()
         self.points, self.pivot = corners, corners.mean(axis=0)
         edges = np.roll(corners, -1, axis=0) - corners
         before = np.roll(edges, 1, axis=0)
-        turn = before[:, 0] * edges[:, 1] - before[:, 1] * edges[:, 0]
-        sides = np.where(turn >= 0.0, 1.0, -1.0)
+        sides = np.where(_cross(before, edges) >= 0.0, 1.0, -1.0)
         self.numbers = np.append([self.radius, 0.0, 1.0], np.column_stack([corners, edges, sides]))
         side = -1.0 if self.hollow else 1.0
         inner = _thin(corners, edges, side) + side * self.radius
         self.inner = inner if inner > 0.0 else np.inf
-
-    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        x = np.asarray(x, dtype=float)
-        out = np.zeros((6, int(np.prod(x.shape[1:]))))
-        outline(self.numbers, False, x.reshape(2, -1), out)
-        gap = out[0].reshape(x.shape[1:])
-        return -gap if self.hollow else gap
 
     def landmarks(self) -> Array:
         return self.points.T
@@ -271,17 +262,16 @@ def _require_simple(points):
         raise InputError(f"the corner {short[0]} of the polygon, {_pair(points[short[0]])}, and "
                          "the next are one place: leave one of them out")
 
-    def turn(a, b, c):
-        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
     for i in range(n):
         for j in range(i + 1, n):
             a, b, c, d = points[i], points[(i + 1) % n], points[j], points[(j + 1) % n]
             beside = j == i + 1 or (i == 0 and j == n - 1)
-            crosses = (turn(a, b, c) * turn(a, b, d) < 0 and turn(c, d, a) * turn(c, d, b) < 0)
+            crosses = (_cross(b - a, c - a) * _cross(b - a, d - a) < 0
+                       and _cross(d - c, a - c) * _cross(d - c, b - c) < 0)
             if beside:  # they may fold back on each other
                 shared, p, q = (b, a, d) if j == i + 1 else (a, b, c)
-                crosses = turn(shared, p, q) == 0.0 and (p - shared) @ (q - shared) > 0.0
+                p, q = p - shared, q - shared
+                crosses = _cross(p, q) == 0.0 and p @ q > 0.0
             if crosses:
                 raise InputError(f"the sides {i} and {j} of the polygon, from {_pair(a)} to "
                                  f"{_pair(b)} and from {_pair(c)} to {_pair(d)}, cross: give its "
@@ -357,10 +347,11 @@ class SignedDistance(Shape):
         """Its gradient at points, shape (2, n)."""
         if self.gradient is not None:
             return self._asked("gradient", x, t, (2,))
-        units = np.eye(2)[:, :, None]
-        if self._by_steps:
-            return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30 for e in units])
-        return self._differences(x, t)
+        return self._complex_steps(x, t) if self._by_steps else self._differences(x, t)
+
+    def _complex_steps(self, x, t):
+        return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30
+                         for e in np.eye(2)[:, :, None]])
 
     def _differences(self, x, t):
         step = STEP * self._scale
@@ -392,21 +383,15 @@ class SignedDistance(Shape):
                 f"{shown(x[:, worst].tolist())} it is {steep[worst]:.4g}. Divide it by its slope, "
                 "or by a bound of it")
         if made.gradient is None:
-            made._by_steps = made._takes_complex(x, rough)
+            with suppress(CallbackError, TypeError, ValueError, _COMPLEX), (
+                    warnings_as_errors(_COMPLEX)):
+                made._by_steps = bool(np.allclose(made._complex_steps(x, 0.0), rough, rtol=0.0,
+                                                  atol=1e-4))
         elif not np.allclose(made._slope(x, 0.0), rough, rtol=0.0, atol=1e-3):
             raise CallbackError("gradient(x, y) of a SignedDistance is not that of f: they differ "
                                 f"by {np.abs(made._slope(x, 0.0) - rough).max():.3g}")
         made.derivatives(x, 0.0)
         return made
-
-    def _takes_complex(self, x, rough):
-        """True if complex steps give the gradient that differences give."""
-        self._by_steps = True
-        try:
-            with warnings_as_errors(_COMPLEX):
-                return bool(np.allclose(self._slope(x, 0.0), rough, rtol=0.0, atol=1e-4))
-        except (CallbackError, TypeError, ValueError, _COMPLEX):
-            return False
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
         return contour(lambda x: self.distance(x, t), box)
