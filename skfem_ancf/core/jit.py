@@ -167,7 +167,7 @@ def entry(function: Any, args: Any) -> Any:
     args
         What it is called with: it takes arguments of these types only.
     """
-    names: dict[str, Any] = {"function": function}
+    names: dict[str, Any] = {"function": njit(inline="always", **OPTIONS)(function)}
     given = [f"a{k}" for k in range(len(args))]
     for k, x in enumerate(args):
         if isinstance(x, tuple):
