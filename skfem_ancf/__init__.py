@@ -18,8 +18,10 @@ from .beam.rigid import RigidBody
 from .core.errors import (AncfError, CallError, CallbackError, ConvergenceError, FileError,
                           InputError, MeshError, MissingExtra, ModelWarning, NameUnknown,
                           StabilityWarning, SupportError)
+from .core.steps import Ramp, Steps
 from .dynamics import EnergyMomentum, Gauss, GeneralizedAlpha, HHT, Newmark, Radau, Scheme
 from .dynamics.history import History
+from .dynamics.quasistatic import StepHistory
 from .elements import (ElementBeam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                        ElementBeamCable, ElementBeamPatelShabana)
 from . import forms
@@ -49,9 +51,11 @@ __all__ = [
     "Line", "LineLoad", "Load", "Material", "MeshBeam", "MeshError", "MissingExtra",
     "ModelWarning", "Modes", "Motor", "NameUnknown", "NeoHookean", "Newmark", "OnCircle",
     "OnLine", "Path", "Pin", "PlaneSection", "PointForce", "PointMass", "Polygon",
-    "PrescribedAngle", "PrescribedPosition", "PrescribedTurn", "Pressure", "Radau", "Reaction",
+    "PrescribedAngle", "PrescribedPosition", "PrescribedTurn", "Pressure", "Radau", "Ramp",
+    "Reaction",
     "Resultants", "RigidBody", "Scene", "Scheme", "Section", "SignedDistance", "Sleeve", "Slot",
-    "Spring", "StVenantKirchhoff", "StabilityWarning", "State", "Support", "SupportError",
+    "Spring", "StVenantKirchhoff", "StabilityWarning", "State", "StepHistory", "Steps",
+    "Support", "SupportError",
     "Temperature", "TorsionalSpring", "Traction", "Weight", "Weld", "check_derivatives", "forms",
     "reference_coordinates", "sweep",
 ]

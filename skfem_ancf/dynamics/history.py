@@ -115,7 +115,7 @@ class History(MaterialPoints):
         span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self) else ""
         cut = "".join(f", {n} {what}" for n, what in (
             (self.substeps, "substeps"), (self.rejected, "rejected")) if n)
-        return (f"<History of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
+        return (f"<{type(self).__name__} of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
                 f"{cut}, {self.iterations} iterations, {self.factorizations} factorisations>")
 
     def state(self, k: int) -> State:

@@ -76,6 +76,7 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
     """
     try:
         system.assemble(u, load)
+        t = system.clock if t is None else t
         system.solver.factorize(u, load if t is None else t, multipliers)
         return verdict_of_factors(system)
     except NO_FACTORS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from functools import cached_property
 from itertools import accumulate, count, pairwise
 from typing import TYPE_CHECKING, Any, cast
@@ -27,7 +28,7 @@ from .mass_solver import MassSolver, ModalDamping
 from .scales import Scales
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from ..actions.forces.base import ForceElement
     from ..actions.joints.base import Joint
@@ -84,6 +85,9 @@ class System:
         Force elements.
     symmetric : bool
         The tangent is symmetric, as all loads and force elements have a potential.
+    clock : float or None
+        The time at which statics takes functions of time, see :meth:`stopped_at`; None for full
+        size of loads.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
@@ -120,6 +124,7 @@ class System:
                              f"{domains[0]!r} do not know: give beams KelvinVoigt(time) as their "
                              "damping=, and the scene damping(modal=...) or damping(mass=...)")
         self._rest_modes = rest_modes
+        self.clock: float | None = None
         self._varying: list[Any] = []
         self.constant_force = np.zeros(self.N)
         for load in self.loads:
@@ -176,8 +181,18 @@ class System:
 
     # loads
 
+    @contextmanager
+    def stopped_at(self, t: float) -> Iterator[None]:
+        """Statics takes functions of time at the time t."""
+        before, self.clock = self.clock, t
+        try:
+            yield
+        finally:
+            self.clock = before
+
     def external_force(self, u: Array, t: float | None = None) -> Array:
         """The force of all loads at full size, shape (N,)."""
+        t = self.clock if t is None else t
         out = self.constant_force.copy()
         for load in self._varying:
             s, (factor, acting) = self.of(load), load.acting(t)
@@ -196,7 +211,7 @@ class System:
             The angles by which the sections of moments have turned, in the order of these, shape
             (k,); by default those of u, of which whole turns are counted along a beam only.
         """
-        total, number = 0.0, count()
+        t, total, number = self.clock if t is None else t, 0.0, count()
         for load in self.loads:
             factor, acting = load.acting(t)
             if turned is not None and load.turning:
@@ -348,6 +363,7 @@ class System:
             The internal force (N,), and the stresses (n,) that :meth:`carried_stress` takes.
         """
         self._require_displacement(u)
+        t = self.clock if t is None else t
         self.K.clear()
         self.solver.assembled_at(u, load if t is None else t)
         stresses = self.backend.tables.stresses
@@ -364,7 +380,7 @@ class System:
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=(None, None), geometric=True):
         """Run :func:`~skfem_ancf.equations.evaluation.evaluate`; returns the force."""
-        tables = self.backend.tables
+        tables, t = self.backend.tables, self.clock if t is None else t
         u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
         first = what == TANGENT and t is None and not geometric
         factors = tables.linear_factors(load) if first else tables.static_factors(load)

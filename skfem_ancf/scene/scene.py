@@ -15,6 +15,7 @@ from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
 from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite,
                            require_finite_scalar, require_label, require_positive, shown)
+from ..core.steps import Steps
 from ..core.types import Array, StrPath
 from ..dynamics import choose_scheme, get_scheme
 from ..dynamics.base import Scheme
@@ -22,6 +23,7 @@ from ..dynamics.checkpoint import resume
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
+from ..dynamics.quasistatic import StepHistory, run
 from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import SceneMatrices, matrices_of
 from ..equations.system import System
@@ -461,6 +463,65 @@ class Scene(Model):
             return integrate(self.system, t_end, dt, get_scheme(scheme), u,
                              velocity if self._velocities else None, start=start,
                              sensors=self._located(), **options)
+
+    def run(self, steps: Steps | ArrayLike, increments: int = 20, start: State | None = None, *,
+            tol: float = 1e-8, max_iterations: int = 30, min_step: float = 1e-4,
+            stable: bool = True, progress: bool | None = None) -> StepHistory:
+        """Quasi-static steps: equilibria over a time, each from the one before.
+
+        Loads, supports, temperatures, obstacles and joints follow their functions of time, as in a
+        motion, without inertia. Friction remembers the way. An increment that fails is cut. Where
+        the equilibrium gives way (a snap), the strategies of :meth:`solve_static` lead to another
+        one, and ``history.jumps`` says when.
+
+        Parameters
+        ----------
+        steps
+            :class:`~skfem_ancf.Steps` with names, or the time at the end, or several times at
+            which an increment ends.
+        increments
+            Increments of each step at least, if none is cut; each is an instant of the history.
+        start
+            A State to begin with, or None for the equilibrium at the time 0. An instant of a
+            history goes on from its time, other states from 0.
+        tol, max_iterations, stable, progress
+            As for :meth:`solve_static`.
+        min_step
+            The smallest increment, as a part of the largest.
+
+        Returns
+        -------
+        StepHistory
+
+        Raises
+        ------
+        ConvergenceError
+            If no equilibrium is found; its ``state`` is the StepHistory up to there.
+        Interrupted
+            On Ctrl-C; its ``state`` is the StepHistory up to there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, Steps, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+        >>> steps = Steps(load=1.0, unload=1.0)
+        >>> scene = Scene(beam).clamp("left").point_force(
+        ...     (0, -0.1), at="right", amplitude=steps.ramp(load=1.0, unload=0.0))
+        >>> history = scene.run(steps, increments=4)
+        >>> history.displacement((1, 0)).shape, bool(abs(history.u[-1]).max() < 1e-9)
+        ((9, 2), True)
+        """
+        with self._lock:
+            system = self.system
+            system.constraints.require_independent_joints()
+            if system.constraints.adrift:
+                system.constraints.require_supports()
+            u = None if start is None else displacement(system, start)
+            return run(system, steps, increments, start, u, self._located(), tol=tol,
+                       max_iterations=max_iterations, min_step=min_step, stable=stable,
+                       progress=progress)
 
     def sensor(self, name: str, what: str | Callable[[State], Any], at: Any = None,
                beam: WhichBeam = None, recover: bool = False, line: int | None = None) -> Self:

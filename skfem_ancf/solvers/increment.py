@@ -42,9 +42,9 @@ class Route(NamedTuple):
 
     def acting(self, level: float) -> tuple[float, float]:
         """Load factor and time at a level."""
-        if self.gap is not None:
-            return 1.0, 1.0
         (a, b), (c, d) = self.loads, self.times
+        if self.gap is not None:
+            return 1.0, d
         return a + level * (b - a), c + level * (d - c)
 
     @property
@@ -193,8 +193,10 @@ class Increment:
     def _target(self, tables, u):
         """The :class:`~skfem_ancf.solvers.iteration.Target` of the level."""
         constraints, route = self.system.constraints, self.options.route
-        gap = route.gap
+        gap, clock = route.gap, self.system.clock
         values, fixed = constraints.values(self.time), constraints.fixed
+        if clock is not None:
+            values = constraints.values(self.load, self.time)
         if gap is None:
             gap = np.zeros(self.system.N)
         else:
@@ -204,7 +206,10 @@ class Increment:
         factors = first = tables.static_factors(self.load)
         if tables.prestressed:
             first = tables.static_factors(self.load, route.acting(self.start.load)[0])
-        return Target(factors, first, self.load, self.time, *tables.at(self.time), gap,
+        if clock is not None:
+            factors = first = self.load * tables.factors(np.array([clock]))[0]
+        when = np.nan if clock is None else clock
+        return Target(factors, first, self.load, when, self.time, *tables.at(self.time), gap,
                       values - u[fixed])
 
     def _require_converged(self, status, n, rules):

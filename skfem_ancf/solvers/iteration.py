@@ -39,7 +39,7 @@ class Target(NamedTuple):
     """The equilibrium asked for.
 
     ``factors``, ``before`` and ``scale`` are those of the tables of loads, the same for the first
-    tangent, and of user-defined loads; ``at, c, g`` the time of the joints and their tables;
+    tangent, and of user-defined loads; ``when`` the time of loads, NaN for full size; ``at, c, g`` the time of the joints and their tables;
     ``gap`` the force that may be missing, (N,); ``prescribed`` by how much fixed DOFs have to
     change.
     """
@@ -47,6 +47,7 @@ class Target(NamedTuple):
     factors: F1
     before: F1
     scale: float
+    when: float
     at: float
     c: F1
     g: F1
@@ -194,7 +195,8 @@ def _tangent(e, target, rules, x, w, k):
         body_carry(e.body, w.before, w.du, x.stresses, x.carried)
     body_tangent(e.body, x.u, x.force, x.carried, mixed, x.stresses, e.K)
     add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
-    factors, t = (target.factors, np.nan) if k > 0 else (target.before, np.inf)
+    factors, t = (target.factors, target.when) if k > 0 else (
+        target.before, np.inf if np.isnan(target.when) else target.when)
     add_load_stiffness(e.loads, factors, t, target.scale, x.u, e.K)
     add_element_tangent(e.forces, target.at, x.u, e.K)
     diagonal(e.K, w.scale)
@@ -208,7 +210,7 @@ def _tangent(e, target, rules, x, w, k):
 @source
 def _residual(e, target, x, w):
     """The residual at free coordinates; returns how far joints are open, over their sizes."""
-    external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
+    external_force(e.loads, target.factors, target.when, target.scale, x.u, w.load)
     clear(w.push)
     opening = 0.0
     if w.phi.size > 0:

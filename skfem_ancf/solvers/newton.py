@@ -144,13 +144,14 @@ class Search:
         self._folded: StaticResult | None = None
         self._failure: Exception | None = None
         self._spent, self._unstable = 0, False
-        contacts = system.forces.contacts
-        memory = contacts.begin(np.zeros(system.N) if u is None else u, 0.0 if u is None else 1.0,
+        contacts, clock = system.forces.contacts, system.clock
+        times = (0.0, 1.0) if clock is None else (clock, clock)
+        memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
                                 memory)
-        self.route = Route(np.zeros(system.N))
+        self.route = Route(np.zeros(system.N), times=times)
         if u is not None:
             missing = system.external_force(u) - system.internal_force(u)
-            self.route = Route(u.copy(), missing * system.constraints.mask)
+            self.route = Route(u.copy(), missing * system.constraints.mask, times=times)
         self._memory = memory
 
     def find(self) -> StaticResult:
@@ -315,7 +316,7 @@ class Search:
 
     def _wanted(self, route):
         """Whether the end of a route has to be stable."""
-        return self.stable and route.acting(1.0) == (1.0, 1.0)
+        return self.stable and route.acting(1.0) == (1.0, self.route.times[1])
 
     def _require_good(self, result):
         """Raise StepFailed unless what is free is held, and no axis turns back in an element."""
@@ -337,7 +338,9 @@ class Search:
 
     def _firm(self, found, step, eased):
         """What is found in contact: on obstacles that are hard enough."""
-        memory = self.system.forces.contacts.begin(found.u, 1.0) if eased else self._memory
+        memory = self._memory
+        if eased:
+            memory = self.system.forces.contacts.begin(found.u, self.route.times[1])
         start = replace(self._beginning(self.route), u=found.u, multipliers=found.multipliers,
                         memory=memory)
         loads, times = ((x, x) for x in step.options.route.acting(1.0))

@@ -1,0 +1,121 @@
+"""Named steps of a quasi-static run, and functions of its time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import InputError, NameUnknown, require_finite, require_positive
+from .immutable import Immutable
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .types import Array
+
+
+class Ramp(Immutable):
+    """A function of time, linear from one time to the next, constant before and behind.
+
+    Parameters
+    ----------
+    times
+        Ascending times, shape (n,).
+    values
+        Numbers, shape (n,), or vectors, (n, k).
+
+    Examples
+    --------
+    >>> Ramp([0, 1, 3], [0, 10, 0])(2.0)
+    5.0
+    """
+
+    def __init__(self, times: ArrayLike, values: ArrayLike) -> None:
+        self.times = require_finite("times", times, (None,))
+        self.values = np.asarray(values, dtype=float)
+        require_finite("values", self.values, self.values.shape)
+        if not len(self.times) or np.any(np.diff(self.times) <= 0.0):
+            raise InputError(f"the times of a Ramp must ascend, got {self.times.tolist()}")
+        if len(self.values) != len(self.times) or self.values.ndim > 2:
+            raise InputError(f"a Ramp with {len(self.times)} times has as many numbers or vectors, "
+                             f"got values of shape {self.values.shape}")
+
+    def __call__(self, t: Any) -> Any:
+        """The value at a time: a number, or (k,); of times (n,) shape (n,) or (k, n)."""
+        if self.values.ndim == 1:
+            found = np.interp(t, self.times, self.values)
+            return found if np.ndim(t) else float(found)
+        return np.array([np.interp(t, self.times, one) for one in self.values.T])
+
+
+class Steps(Immutable):
+    """Steps of a quasi-static run, one after the other: their names and durations.
+
+    What acts in a scene takes functions of time: ``amplitude`` of loads and temperatures,
+    ``position`` and ``angle`` of obstacles, displacements of supports, angles of motors.
+    :meth:`ramp` makes them of the values at the ends of steps.
+
+    Parameters
+    ----------
+    **durations
+        The duration of each step by its name, positive.
+
+    Attributes
+    ----------
+    names : tuple of str
+    ends : ndarray
+        The time at the end of each step, shape (n,).
+
+    Examples
+    --------
+    >>> steps = Steps(press=1.0, hold=0.5, release=1.0)
+    >>> steps.ends.tolist()
+    [1.0, 1.5, 2.5]
+    >>> force = steps.ramp(press=20.0, release=0.0)
+    >>> [force(t) for t in (0.5, 1.0, 1.2, 2.0)]
+    [10.0, 20.0, 20.0, 10.0]
+    """
+
+    def __init__(self, **durations: float) -> None:
+        if not durations:
+            raise InputError("Steps(press=1.0, release=1.0): name at least one step")
+        self.names = tuple(durations)
+        self.ends = np.cumsum([require_positive(name, x) for name, x in durations.items()])
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __repr__(self) -> str:
+        return "Steps(" + ", ".join(f"{name}={dt:g}" for name, dt in zip(
+            self.names, np.diff(self.ends, prepend=0.0))) + ")"
+
+    def ramp(self, start: ArrayLike | None = None, /, **values: ArrayLike) -> Ramp:
+        """A function of time by its values at the ends of steps, linear within each.
+
+        Parameters
+        ----------
+        start
+            The value at the time 0: a number or a vector; zero by default.
+        **values
+            Values at the ends of steps by their names; in a step that is not named it stays what
+            it was.
+
+        Raises
+        ------
+        NameUnknown
+            If there is no such step.
+        """
+        for name in values:
+            if name not in self.names:
+                raise NameUnknown("step", name, self.names)
+        shape = np.shape(next(iter(values.values()), 0.0))
+        last: Any = np.zeros(shape) if start is None else require_finite("start", start, shape)
+        rows = [last]
+        for name in self.names:
+            rows.append(require_finite(name, values.get(name, rows[-1]), shape))
+        return Ramp(np.append(0.0, self.ends), np.array(rows))
+
+    def step_at(self, t: Array) -> Array:
+        """Numbers of the steps at times, shape (n,); at the end of a step its own."""
+        return np.minimum(np.searchsorted(self.ends, t - 1e-12 * self.ends[-1]), len(self) - 1)

@@ -1,0 +1,184 @@
+"""Quasi-static runs: loads, supports and obstacles over a time without inertia."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..actions.forces.turns import Turns
+from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown,
+                           require_finite, require_flag, require_integer, require_positive)
+from ..core.progress import progress_bar
+from ..core.steps import Steps
+from ..core.switch import expecting
+from ..solvers.newton import Steps as Rules
+from ..solvers.outcome import StaticResult, StepFailed
+from ..solvers.quasistatic import JUMPED, Instant, follow
+from .base import Motion, Scheme
+from .history import COLUMNS, History, state_of
+from .sensors import Recorder
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..core.types import Array
+    from ..equations.system import System
+    from ..results.state import State
+    from .sensors import Sensor
+
+logger = logging.getLogger(__name__)
+
+#: Iterations that an increment takes, about.
+ITERATIONS = 8
+
+
+class QuasiStatic(Scheme):
+    """Equilibria without inertia; what the states of a :class:`StepHistory` name as their scheme.
+
+    A motion may go on from one of them, from rest.
+    """
+
+    name = "quasi-static"
+
+    def __repr__(self) -> str:
+        return "QuasiStatic()"
+
+
+class StepHistory(History):
+    """A quasi-static run: its equilibria over the time of its steps.
+
+    It is read as any History: positions, strains, reactions, sensors, pictures, films and files.
+    Velocities and accelerations are zero.
+
+    Attributes
+    ----------
+    plan : Steps or None
+        The named steps.
+    found_by : list of str
+        How each equilibrium was found: "followed" from the one before, or "jumped by ..." where
+        the path gave way and a strategy of statics led to another equilibrium.
+    iterations_at : ndarray
+        Linear systems solved for each, shape (nt,).
+    """
+
+    plan: Steps | None
+    found_by: list[str]
+    iterations_at: Array
+
+    @property
+    def jumps(self) -> Array:
+        """Times of the equilibria to which the scene has jumped, shape (n,)."""
+        return self.t[[way.startswith(JUMPED) for way in self.found_by]]
+
+    def during(self, step: str) -> Array:
+        """Numbers of the instants of a step, from its begin to its end."""
+        if self.plan is None:
+            raise InputError("the run had no named steps: scene.run(Steps(press=1, pull=1))")
+        if step not in self.plan.names:
+            raise NameUnknown("step", step, self.plan.names)
+        k, ends = self.plan.names.index(step), np.append(0.0, self.plan.ends)
+        slack = 1e-12 * ends[-1]
+        return np.nonzero((self.t >= ends[k] - slack) & (self.t <= ends[k + 1] + slack))[0]
+
+
+def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
+        start: State | None = None, u: Array | None = None,
+        sensors: Sequence[tuple[str, Sensor]] = (), *, tol: float = 1e-8,
+        max_iterations: int = 30, min_step: float = 1e-4, stable: bool = True,
+        progress: bool | None = None) -> StepHistory:
+    """Equilibria over the time of steps, see :meth:`skfem_ancf.Scene.run`.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    steps, increments, start, tol, max_iterations, min_step, stable, progress
+        As there.
+    u
+        The displacement of ``start``, shape (N,).
+    sensors
+        Names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
+    """
+    ends = steps.ends if isinstance(steps, Steps) else np.unique(
+        require_finite("steps", np.atleast_1d(np.asarray(steps, dtype=float)), (None,)))
+    increments = require_integer("increments", increments, 1, 100000)
+    rules = Rules("auto", require_positive("tol", tol),
+                  require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
+                  require_positive("min_step", min_step))
+    require_flag("stable", stable)
+    t_start, begin, turns = 0.0, None, Turns(system)
+    if start is not None:
+        t_start = float(start.t or 0.0)
+        begin = Instant(t_start, StaticResult(
+            start.u, start.multipliers, 1.0, np.zeros(system.N), [], True, "given",
+            memory=system.forces.contacts.of_state(start)), "given")
+    if not len(ends) or ends[-1] <= t_start:
+        raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "
+                         f"after the start at t = {t_start:g}")
+    made = _Record(system, steps if isinstance(steps, Steps) else None, sensors, turns)
+    count = increments * len(ends)
+    try:
+        with (system.forces.contacts.lent(), expecting(ITERATIONS * count),
+              progress_bar(progress, total=ends[-1] - t_start, desc="time") as bar):
+            for instant in follow(system, ends, increments, begin, t_start, rules, stable):
+                bar.update(instant.t - made.t)
+                made.add(instant)
+    except (StepFailed, ConvergenceError) as failure:
+        raise ConvergenceError(
+            f"no equilibrium found after t = {made.t:.6g}: {failure}. The error's state is the "
+            "history up to there; a motion with damping (scene.integrate) goes through what has "
+            "no equilibrium", made.history()) from None
+    except KeyboardInterrupt:
+        raise Interrupted(f"stopped at t = {made.t:.6g}; the exception's state is the history up "
+                          "to there", made.history()) from None
+    return made.history()
+
+
+class _Record:
+    """What has been found so far."""
+
+    def __init__(self, system: System, plan: Steps | None,
+                 sensors: Sequence[tuple[str, Sensor]], turns: Turns) -> None:
+        self.system, self.plan, self.scheme, self._turns = system, plan, QuasiStatic(), turns
+        self._instants: list[Instant] = []
+        self._motions: list[Motion] = []
+        self._recorder = Recorder(sensors, system, lambda y: state_of(system, self.scheme, y))
+        self.t = 0.0
+
+    def add(self, instant: Instant) -> None:
+        u, zero = instant.result.u, np.zeros(self.system.N)
+        before = self._motions[-1].turns if self._motions else None
+        turns = self._turns.begin(u) if before is None else self._turns.follow(before, u[None])[0]
+        contacts, memory = self.system.forces.contacts, instant.result.memory
+        if memory is None and contacts.obstacles:
+            memory = np.zeros(contacts.tables.memory.size)
+        y = Motion(instant.t, u, zero, zero, zero, instant.result.multipliers,
+                   instant.result.multipliers, 0.0, np.nan if contacts.anchored else 0.0,
+                   memory, turns)
+        self._motions.append(y)
+        self._instants.append(instant)
+        self._recorder.record([y])
+        self.t = instant.t
+
+    def history(self) -> StepHistory:
+        empty = np.zeros((0, self.system.N))
+        columns: dict[str, Any] = {name: np.array(
+            [_stored(getattr(y, name)) for y in self._motions]) for name in COLUMNS}
+        if not self._motions:
+            columns |= dict.fromkeys(("u", "v", "acceleration"), empty)
+        results = [instant.result for instant in self._instants]
+        history = StepHistory(
+            self.system, self.scheme, columns, (None, None), self._recorder.readings(),
+            event=None, steps=len(results) - 1, substeps=0, rejected=0,
+            iterations=sum(x.iterations for x in results), factorizations=0, plan=self.plan,
+            found_by=[x.way for x in self._instants],
+            iterations_at=np.array([x.iterations for x in results], dtype=int))
+        return history
+
+
+def _stored(value):
+    return np.zeros(0) if value is None else value

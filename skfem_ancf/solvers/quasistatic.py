@@ -1,0 +1,119 @@
+"""Quasi-static runs: equilibria from one time to the next, each from the one before."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.types import Array
+from ..equations.system import System
+from .increment import Increment, Options, Route
+from .newton import Search
+from .newton import Steps as Rules
+from .outcome import StaticResult, StepFailed
+
+logger = logging.getLogger(__name__)
+
+#: Iterations of an increment up to which the next one may be larger, by how much, and what is left
+#: of one that has failed.
+FEW, LARGER, CUT = 10, 1.5, 0.25
+FOLLOWED, JUMPED = "followed", "jumped"
+
+
+class Instant(NamedTuple):
+    """An equilibrium at a time.
+
+    Attributes
+    ----------
+    t, result
+        The time, and a :class:`~skfem_ancf.solvers.outcome.StaticResult`.
+    way
+        How it was found: the name of a strategy.
+    """
+
+    t: float
+    result: StaticResult
+    way: str
+
+
+def follow(system: System, ends: Array, increments: int, begin: Instant | None, t_start: float,
+           rules: Rules, stable: bool) -> Iterator[Instant]:
+    """Equilibria from the start on, one after the other.
+
+    Each is looked for from the one before, by the mixed iteration and by Newton's method. An
+    increment that fails is cut. Where the smallest fails, because the equilibrium gives way there,
+    the strategies of :func:`~skfem_ancf.solvers.newton.solve_static` lead from the last one to
+    another, as under loads that stay.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    ends
+        Times at which an increment has to end, ascending.
+    increments
+        Increments from one end to the next at least.
+    begin, t_start
+        An equilibrium to begin with, or None for the reference configuration, and its time.
+    rules, stable
+        Of each increment, as for :func:`~skfem_ancf.solvers.newton.solve_static`.
+
+    Raises
+    ------
+    StepFailed, ConvergenceError
+        If an equilibrium is not found; what was found before has been given.
+    """
+    if begin is None:
+        with system.stopped_at(t_start):
+            result = Search(system, None, None, rules, stable, False).find()
+        begin = Instant(t_start, result, result.attempts[-1].strategy)
+    yield begin
+    for end in ends[ends > begin.t]:
+        most = (end - begin.t) / increments
+        size = most
+        while begin.t < end:
+            t = end if begin.t + 1.001 * size >= end else begin.t + size
+            smallest = size <= rules.min_step * most
+            try:
+                found = _next(system, begin, t, rules, stable, smallest)
+            except StepFailed as failure:
+                logger.info("t = %.6g failed (%s), increment cut", t, failure)
+                size *= CUT
+                continue
+            if found.result.iterations <= FEW:
+                size = min(LARGER * size, most)
+            begin = found
+            yield begin
+
+
+def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
+          smallest: bool) -> Instant:
+    """The equilibrium at t; by all strategies where the increment is the smallest."""
+    route = Route(last.result.u, None, (1.0, 1.0), (last.t, t))
+    start = replace(last.result, load=0.0, steps=[], rejected=0, unstable=False, doubt="",
+                    diverging=False)
+    failed: Any = None
+    with system.stopped_at(t), system.forces.contacts.lent():
+        for method in ("mixed", "newton"):
+            options = Options(route, method, rules.tol, rules.max_iterations, method == "mixed")
+            step = Increment(system, start, 1.0, options)
+            try:
+                with np.errstate(all="ignore"):  # what overflows is seen in the residual
+                    found = step.solve(stable)
+            except StepFailed as failure:
+                failed = failure
+                continue
+            contacts = system.forces.contacts
+            contacts.settle(found.u, t)
+            result = replace(start, steps=[step.record], load=1.0, converged=True,
+                             memory=contacts.remember(), **found._asdict())
+            return Instant(t, result, FOLLOWED)
+        if not smallest:
+            raise failed
+        logger.info("t = %.6g: %s, going on to another equilibrium", t, failed)
+        result = Search(system, last.result.u, last.result.memory, rules, stable, False).find()
+    return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")
