@@ -115,8 +115,9 @@ class History(MaterialPoints):
         span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self) else ""
         cut = "".join(f", {n} {what}" for n, what in (
             (self.substeps, "substeps"), (self.rejected, "rejected")) if n)
-        return (f"<{type(self).__name__} of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
-                f"{cut}, {self.iterations} iterations, {self.factorizations} factorisations>")
+        return (f"<{type(self).__name__} of {len(self)} instants{span}, {self.scheme!r}, "
+                f"{self.steps} steps{cut}, {self.iterations} iterations, "
+                f"{self.factorizations} factorisations>")
 
     def state(self, k: int) -> State:
         """The instant ``k`` as a State: strain, reactions (inertia included), plots, files.
@@ -333,6 +334,52 @@ class History(MaterialPoints):
                              f"at least one; got {shown(times)}")
         instants = np.unique(np.argmin(np.abs(self.t - wanted[:, None]), axis=1))
         return plot_state(list(self.states(instants)), field, **options)
+
+    def plot_curve(self, x: Any, y: Any, **options: Any) -> Any:
+        """Draw one quantity against another, as a force over a displacement.
+
+        Parameters
+        ----------
+        x, y
+            "t"; the name of a sensor with one number at each instant; a pair of the name and the
+            component of one with more, as ("tip", 1); or an array (nt,).
+        **options
+            ``ax``, ``xlabel``, ``ylabel``, ``title``, ``filename``, ``dpi``; others go to
+            matplotlib's ``Axes.plot``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamCable(),
+        ...             StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
+        >>> scene = Scene(beam).pin("left").gravity((0, -9.81)).sensor("tip", "position", (1, 0))
+        >>> scene.integrate(0.1, 0.01).plot_curve("t", ("tip", 1)).get_ylabel()
+        'tip 1'
+        """
+        from ..visuals.matplotlib import plot_curve
+
+        (x, one), (y, two) = (self._curve(name, z) for name, z in (("x", x), ("y", y)))
+        return plot_curve(x, y, **{"xlabel": one, "ylabel": two, **options})
+
+    def _curve(self, name, of):
+        """Numbers at all instants, and what to call them."""
+        if not isinstance(of, (str, tuple)):
+            return require_finite(name, np.asarray(of, dtype=float), (None,)), ""
+        if of == "t":
+            return self.sensors.t if len(self.sensors.t) else self.t, "t"
+        sensor, *parts = (of,) if isinstance(of, str) else of
+        values = self.sensors[sensor]
+        for part in parts:
+            values = values.reshape(len(values), -1)[:, part]
+        if values.ndim != 1:
+            raise InputError(f"the sensor {sensor!r} reads numbers of shape {values.shape[1:]}: "
+                             f"give a pair of its name and a component, as ({sensor!r}, 1)")
+        return values, " ".join(map(str, (sensor, *parts)))
 
     def animate(self, filename: StrPath, field: Any = "eps_yy", **options: Any) -> Any:
         """Write a film; see :func:`skfem_ancf.visuals.animation.animate`.

@@ -13,6 +13,7 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknow
 from ..core.progress import progress_bar
 from ..core.steps import Steps
 from ..core.switch import expecting
+from ..results.arguments import displacement
 from ..solvers.newton import Steps as Rules
 from ..solvers.outcome import StaticResult, StepFailed
 from ..solvers.quasistatic import JUMPED, Instant, follow
@@ -86,9 +87,8 @@ class StepHistory(History):
 
 
 def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
-        start: State | None = None, u: Array | None = None,
-        sensors: Sequence[tuple[str, Sensor]] = (), *, tol: float = 1e-8,
-        max_iterations: int = 30, min_step: float = 1e-4, stable: bool = True,
+        start: State | None = None, sensors: Sequence[tuple[str, Sensor]] = (), *,
+        tol: float = 1e-8, max_iterations: int = 30, min_step: float = 1e-4, stable: bool = True,
         progress: bool | None = None) -> StepHistory:
     """Equilibria over the time of steps, see :meth:`skfem_ancf.Scene.run`.
 
@@ -98,13 +98,11 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         A :class:`~skfem_ancf.equations.system.System`.
     steps, increments, start, tol, max_iterations, min_step, stable, progress
         As there.
-    u
-        The displacement of ``start``, shape (N,).
     sensors
         Names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
     """
     ends = steps.ends if isinstance(steps, Steps) else np.unique(
-        require_finite("steps", np.atleast_1d(np.asarray(steps, dtype=float)), (None,)))
+        require_finite("steps", np.atleast_1d(steps), (None,)))
     increments = require_integer("increments", increments, 1, 100000)
     rules = Rules("auto", require_positive("tol", tol),
                   require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
@@ -114,7 +112,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     if start is not None:
         t_start = float(start.t or 0.0)
         begin = Instant(t_start, StaticResult(
-            start.u, start.multipliers, 1.0, np.zeros(system.N), [], True, "given",
+            displacement(system, start), start.multipliers, 1.0, np.zeros(system.N), [], True, "given",
             memory=system.forces.contacts.of_state(start)), "given")
     if not len(ends) or ends[-1] <= t_start:
         raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "

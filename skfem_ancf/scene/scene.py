@@ -518,8 +518,7 @@ class Scene(Model):
             system.constraints.require_independent_joints()
             if system.constraints.adrift:
                 system.constraints.require_supports()
-            u = None if start is None else displacement(system, start)
-            return run(system, steps, increments, start, u, self._located(), tol=tol,
+            return run(system, steps, increments, start, self._located(), tol=tol,
                        max_iterations=max_iterations, min_step=min_step, stable=stable,
                        progress=progress)
 

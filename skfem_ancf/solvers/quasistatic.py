@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.types import Array
+from ..equations import stability
 from ..equations.system import System
 from .increment import Increment, Options, Route
 from .newton import Search
@@ -18,10 +19,15 @@ from .outcome import StaticResult, StepFailed
 
 logger = logging.getLogger(__name__)
 
-#: Iterations of an increment up to which the next one may be larger, by how much, and what is left
-#: of one that has failed.
-FEW, LARGER, CUT = 10, 1.5, 0.25
+#: Iterations of an increment, over those at most, up to which the next one may be larger; by how
+#: much, and what is left of one that has failed.
+FEW, LARGER, CUT = 0.7, 1.5, 0.25
 FOLLOWED, JUMPED = "followed", "jumped"
+#: Jumps one after the other, each of the smallest increment.
+JUMPS = 3
+#: Largest displacement of a node in an increment that is not the smallest: in the first relative to
+#: the scene's size, then over that at the rate of the increment before, or relative to the size.
+FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
 
 
 class Instant(NamedTuple):
@@ -33,11 +39,14 @@ class Instant(NamedTuple):
         The time, and a :class:`~skfem_ancf.solvers.outcome.StaticResult`.
     way
         How it was found: the name of a strategy.
+    rate
+        The largest displacement of a node since the one before, over the time between; or None.
     """
 
     t: float
     result: StaticResult
     way: str
+    rate: float | None = None
 
 
 def follow(system: System, ends: Array, increments: int, begin: Instant | None, t_start: float,
@@ -45,9 +54,10 @@ def follow(system: System, ends: Array, increments: int, begin: Instant | None, 
     """Equilibria from the start on, one after the other.
 
     Each is looked for from the one before, by the mixed iteration and by Newton's method. An
-    increment that fails is cut. Where the smallest fails, because the equilibrium gives way there,
-    the strategies of :func:`~skfem_ancf.solvers.newton.solve_static` lead from the last one to
-    another, as under loads that stay.
+    increment that fails is cut, and one that moves the scene far: several equilibria may be near.
+    Where the smallest fails, because the equilibrium gives way there, the strategies of
+    :func:`~skfem_ancf.solvers.newton.solve_static` lead from the last one to another, as under
+    loads that stay.
 
     Parameters
     ----------
@@ -72,6 +82,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant | None, 
             result = Search(system, None, None, rules, stable, False).find()
         begin = Instant(t_start, result, result.attempts[-1].strategy)
     yield begin
+    jumps = 0
     for end in ends[ends > begin.t]:
         most = (end - begin.t) / increments
         size = most
@@ -84,7 +95,11 @@ def follow(system: System, ends: Array, increments: int, begin: Instant | None, 
                 logger.info("t = %.6g failed (%s), increment cut", t, failure)
                 size *= CUT
                 continue
-            if found.result.iterations <= FEW:
+            jumps = jumps + 1 if found.way.startswith(JUMPED) else 0
+            if jumps > JUMPS:
+                raise StepFailed(f"at t = {t:.6g} even the smallest increments do not lead from "
+                                 "one equilibrium to the next")
+            if found.result.iterations <= FEW * rules.max_iterations:
                 size = min(LARGER * size, most)
             begin = found
             yield begin
@@ -97,6 +112,9 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     start = replace(last.result, load=0.0, steps=[], rejected=0, unstable=False, doubt="",
                     diverging=False)
     failed: Any = None
+    far = FAR * system.size
+    if last.rate is not None:
+        far = max(NEAR * system.size, FASTER * last.rate * (t - last.t))
     with system.stopped_at(t), system.forces.contacts.lent():
         for method in ("mixed", "newton"):
             options = Options(route, method, rules.tol, rules.max_iterations, method == "mixed")
@@ -107,13 +125,24 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             except StepFailed as failure:
                 failed = failure
                 continue
+            moved = _largest(system, found.u - last.result.u)
+            if moved > far and not smallest:
+                failed = StepFailed(f"a node moves by {moved:.3g}")
+                break
             contacts = system.forces.contacts
             contacts.settle(found.u, t)
             result = replace(start, steps=[step.record], load=1.0, converged=True,
                              memory=contacts.remember(), **found._asdict())
-            return Instant(t, result, FOLLOWED)
+            return Instant(t, result, FOLLOWED if moved <= far else f"{JUMPED} by {method}",
+                           moved / (t - last.t))
         if not smallest:
             raise failed
         logger.info("t = %.6g: %s, going on to another equilibrium", t, failed)
         result = Search(system, last.result.u, last.result.memory, rules, stable, False).find()
     return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")
+
+
+def _largest(system: System, du: Array) -> float:
+    """The largest displacement of a node."""
+    places = np.nonzero(stability.position_weights(system))[0]
+    return float(np.hypot(*du[places].reshape(-1, 2).T).max(initial=0.0))

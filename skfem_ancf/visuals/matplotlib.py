@@ -207,6 +207,43 @@ def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam =
     return ax
 
 
+def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", ylabel: str = "",
+               title: str | None = None, filename: StrPath | None = None, dpi: float = 200,
+               **options: Any) -> Any:
+    """Draw a curve of numbers.
+
+    Parameters
+    ----------
+    x, y
+        Shape (n,) each.
+    ax, title, filename, dpi
+        As for :func:`plot_state`.
+    xlabel, ylabel
+        Labels of the axes.
+    **options
+        Of matplotlib's ``Axes.plot``.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    Figure = figure_class()
+    x, y = np.asarray(x), np.asarray(y)
+    if x.shape != y.shape:
+        raise InputError(f"x and y of a curve are at the same instants, got {x.shape} and "
+                         f"{y.shape} numbers: sensors read all steps, arrays of the history its "
+                         "stored instants")
+    filename, dpi = page(ax, title, filename, dpi)
+    if ax is None:
+        ax = Figure(figsize=(5.5, 4.0), layout="constrained").subplots()
+    ax.plot(x, y, **{"lw": 1.6, **options})
+    dress(ax, title)
+    ax.set_xlabel(xlabel, fontsize=9, color=INK)
+    ax.set_ylabel(ylabel, fontsize=9, color=INK)
+    save(ax, filename, dpi=dpi)
+    return ax
+
+
 def figure_class() -> Any:
     """matplotlib's Figure, which needs no window."""
     try:

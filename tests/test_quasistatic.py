@@ -1,0 +1,216 @@
+"""Quasi-static steps: against closed forms of snaps, friction and cycles."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, Circle, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
+                        InputError, MeshBeam, NameUnknown, Ramp, Scene, Section, StepHistory,
+                        Steps, StVenantKirchhoff, SupportError)
+
+SOFT = StVenantKirchhoff(2e8, 0.3, 7800)
+
+
+def cantilever(n=5):
+    mesh = MeshBeam.init_line(np.linspace(0, 1, n), height=0.01)
+    return Beam(mesh, ElementBeamANCF(2), SOFT, width=0.01)
+
+
+# functions of time
+
+
+def test_ramps_take_numbers_vectors_and_many_times():
+    steps = Steps(press=1.0, hold=0.5, release=2.0)
+    force = steps.ramp(press=4.0, release=0.0)
+    assert [force(t) for t in (0.0, 0.5, 1.0, 1.25, 2.5, 9.0)] == [0.0, 2.0, 4.0, 4.0, 2.0, 0.0]
+    assert np.array_equal(force(np.array([0.5, 2.5])), [2.0, 2.0])
+    place = steps.ramp((1.0, 0.0), press=(3.0, 2.0))
+    assert np.array_equal(place(0.5), [2.0, 1.0]) and place(np.zeros(4)).shape == (2, 4)
+    assert np.array_equal(steps.step_at(np.array([0.0, 1.0, 1.1, 3.5])), [0, 0, 1, 2])
+    assert repr(steps) == "Steps(press=1, hold=0.5, release=2)"
+
+
+@pytest.mark.parametrize("wrong, error, says", [
+    (lambda: Steps(), InputError, "name at least one step"),
+    (lambda: Steps(press=0.0), InputError, "press"),
+    (lambda: Steps(press=1.0).ramp(pres=2.0), NameUnknown, "press"),
+    (lambda: Steps(press=1.0).ramp(press=np.nan), InputError, "press"),
+    (lambda: Ramp([0, 0], [1, 2]), InputError, "ascend"),
+    (lambda: Ramp([0, 1], [1, 2, 3]), InputError, "as many"),
+])
+def test_wrong_steps_are_explained(wrong, error, says):
+    with pytest.raises(error, match=says):
+        wrong()
+
+
+# loads that come and go
+
+
+def test_a_run_ends_where_statics_does_and_comes_back():
+    steps = Steps(load=1.0, unload=1.0)
+    scene = Scene(cantilever()).clamp("left").sensor("tip", "displacement", at=(1, 0))
+    loaded = scene.point_force((0, -0.5), at="right", amplitude=steps.ramp(load=1.0, unload=0.0))
+    history = loaded.run(steps, increments=6)
+    assert isinstance(history, StepHistory) and history.plan is steps
+    there = history.during("load")[-1]
+    assert history.t[there] == 1.0 and history.during("unload")[0] == there
+    # Mattiasson (1981), Numerical results from large deflection beam and frame problems analysed by
+    # means of elliptic integrals: P L^2 / (E I) = 3
+    assert np.allclose(history.displacement((1, 0))[there], (-0.25442, -0.60325), atol=5e-3)
+    assert np.allclose(history.reactions("left").force[there], (0, 0.5), atol=1e-8)
+    assert abs(history.u[-1]).max() < 1e-8 and not len(history.jumps)
+    assert history.iterations == history.iterations_at.sum() > 0
+    assert np.array_equal(history.sensors["tip"], history.displacement((1, 0)))
+    assert np.allclose(history.kinetic_energy, 0.0)
+
+
+def test_loads_that_stay_act_from_the_start():
+    history = Scene(cantilever()).clamp("left").line_load((0, -0.8)).run(1.0, increments=2)
+    assert np.allclose(history.reactions("left").force, [[0, 0.8]] * 3, atol=1e-8)
+
+
+def test_joints_follow_their_functions():
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.05)
+    beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.0, 7800), width=0.05)
+    scene = Scene(beam).clamp("left")
+    end = scene.joint("position", at=(1, 0), r=lambda t: (1.0, 2e-4 * t))
+    history = scene.run([1.0, 2.0], increments=2)
+    assert np.allclose(history.t, [0, 0.5, 1, 1.5, 2])
+    expected = 3 * 2e8 * 0.05**4 / 12 * 2e-4 * history.t  # 3 E I / L^3
+    assert np.allclose(history.joint_force(end)[:, 1], expected, atol=0.03 * expected[-1])
+
+
+def test_a_motion_goes_on_from_a_run_and_a_run_from_an_instant():
+    scene = Scene(cantilever()).clamp("left").point_force(
+        (0, -0.2), at="right", amplitude=Ramp([0.0, 1.0], [0.0, 1.0]))
+    history = scene.run(1.0, increments=4)
+    motion = scene.integrate(1.02, 2e-3, start=history.state(-1 % len(history)))
+    assert motion.t[0] == 1.0 and abs(motion.u - history.u[-1]).max() < 1e-6
+    more = scene.run([1.5], increments=2, start=history.state(2))
+    assert more.t[0] == history.t[2] and np.allclose(more.u[-1], history.u[-1], atol=1e-8)
+
+
+# snaps
+
+
+def test_a_truss_snaps_through_at_its_limit_loads():
+    rise, span, E, A = 0.3, 1.0, 1e6, 0.03
+    length = np.hypot(rise, span)
+    mesh = MeshBeam.init_line([0, length / 2, length], 0.3, angle=np.arctan2(rise, span))
+    bar = Beam(mesh, ElementBeamANCF(1), StVenantKirchhoff(E, 0.0, 1000.0), width=0.1)
+    limit = E * A * rise**3 / (3 * np.sqrt(3) * length**3)
+    steps = Steps(down=1.0, up=1.0)
+    load = steps.ramp(down=1.5, up=-1.5)
+    scene = Scene(bar).pin("left").fix("right", "r^1").point_force(
+        (0, -limit), at="right", amplitude=load)
+    history = scene.run(steps)
+    z = rise + history.displacement((span, rise))[:, 1]
+    force = E * A * z * (rise**2 - z**2) / (2 * length**3)
+    assert np.allclose(force, load(history.t) * limit, atol=1e-7 * limit)
+    assert np.allclose(load(history.jumps), (1.0, -1.0), atol=1e-3)
+    assert np.allclose([np.diff(z).min(), np.diff(z).max()], [-0.52, 0.52], atol=0.01)
+
+
+def shallow_arch(span, height, rise, slope, modes=39):
+    """Temperatures at which a pinned sine arch snaps that heat bends, by its sine modes.
+
+    ``w_k = (a k^4 w0_k - T q_k) / (a k^4 + N k^2)`` with ``4 N = sum k^2 (w_k^2 - w0_k^2)``: T of
+    the thrust N has a maximum, or N reaches -4 a, where the first antisymmetric mode buckles.
+    """
+    k, a = np.arange(1, modes + 1, 2.0), height**2 / 12
+    w0 = np.where(k == 1, rise, 0.0)
+    q = a * 4 / np.pi * (span / np.pi) ** 2 * slope * k
+
+    def temperatures(N):
+        d = a * k**4 + N * k**2
+        A, B = a * k**4 * w0 / d, -q / d
+        return np.roots([np.sum(k**2 * B * B) / 4, np.sum(k**2 * A * B) / 2,
+                         np.sum(k**2 * (A * A - w0**2)) / 4 - N])
+
+    T = np.sort(np.real_if_close([temperatures(N) for N in a * np.linspace(-3.9999, -1.01, 4000)]))
+    return T[:, 1].max(), T[:, 0].min()
+
+
+def test_a_thermostat_switches_back_at_a_lower_temperature():
+    span, height, rise, alpha = 30.0, 0.2, 0.25, 9e-6
+    below, above = (StVenantKirchhoff(E=1.4e5, nu=0.3, thermal_expansion=x)
+                    for x in (alpha, -alpha))
+    mesh = MeshBeam.init_curve(lambda s: (span * s, rise * np.sin(np.pi * s)),
+                               np.linspace(0, 1, 9), height)
+    strip = Beam(mesh, ElementBeamANCFCubic(2), section=Section.layers(
+        (height / 2, below), (height / 2, above), width=4.0))
+    steps = Steps(heat=1.0, cool=1.0)
+    heat = steps.ramp(heat=45.0, cool=-15.0)
+    scene = Scene(strip).pin("left").pin("right").temperature(1.0, amplitude=heat)
+    history = scene.run(steps, increments=8, min_step=1e-3)
+    # Timoshenko: two layers of one modulus bend by 3/2 of the difference of strains over the height
+    there, back = shallow_arch(span, height, rise, 1.5 * 2 * alpha / height)
+    assert np.allclose(heat(history.jumps), (there, back), atol=0.3)
+
+
+# contact
+
+
+def test_a_snap_fit_is_pressed_in_and_pulled_out_against_friction():
+    mesh = MeshBeam.init_line(np.linspace(0, 20, 9), height=lambda s: 2.0 - s / 20.0)
+    arm = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(2000.0, 0.35, 1e-9), width=5.0)
+    steps = Steps(insert=1.0, pull=1.0)
+    stroke = steps.ramp(insert=8.0, pull=0.0)
+
+    def run(friction):
+        scene = Scene(arm).clamp("left").obstacle(
+            Circle((22.5, -1.5), 1.5), friction=friction, points=60,
+            position=lambda t: (-stroke(t), 0.0))
+        return scene.run(steps, increments=10)
+
+    def angle(history):
+        Fx, Fy = history.reactions("left").force.T
+        return np.arctan2(Fx, -Fy)
+
+    smooth, rough = run(0.0), run(0.2)
+    for step, sign in (("insert", 1), ("pull", -1)):
+        at = [k for k in rough.during(step) if 5.5 < stroke(rough.t[k]) < 7.5]
+        turned = angle(rough)[at] - np.interp(rough.t[at], smooth.t, angle(smooth))
+        assert len(at) > 1 and np.allclose(np.tan(turned), sign * 0.2, atol=0.02)
+    assert abs(rough.reactions("left").force[-1]).max() < 1e-9
+
+
+# what goes wrong
+
+
+def test_what_has_converged_is_kept():
+    scene = Scene(cantilever()).clamp("left").point_force(
+        (0, -0.5), at="right", amplitude=Ramp([0.0, 1.0], [0.0, 1.0]))
+    with pytest.raises(ConvergenceError, match="history up to there") as caught:
+        scene.run(1.0, max_iterations=1)
+    kept = caught.value.state
+    assert isinstance(kept, StepHistory) and len(kept) >= 1 and kept.t[-1] < 1e-3
+
+
+@pytest.mark.parametrize("steps, options, says", [
+    (-1.0, {}, "not after the start"), ([], {}, "not after the start"),
+    (1.0, {"increments": 0}, "increments"), ("press", {}, "steps"),
+    (1.0, {"min_step": 0.0}, "min_step"),
+])
+def test_wrong_runs_are_explained(steps, options, says):
+    with pytest.raises(InputError, match=says):
+        Scene(cantilever()).clamp("left").run(steps, **options)
+    with pytest.raises(SupportError):
+        Scene(cantilever()).run(1.0)
+
+
+def test_curves_of_sensors_are_drawn():
+    pytest.importorskip("matplotlib")
+    scene = Scene(cantilever()).clamp("left").sensor("tip", "displacement", at=(1, 0))
+    scene.sensor("force", lambda state: state.reactions("left").force[1])
+    scene.point_force((0, -0.5), at="right", amplitude=Ramp([0.0, 1.0], [0.0, 1.0]))
+    history = scene.run(1.0, increments=3)
+    ax = history.plot_curve(("tip", 1), "force", label="up")
+    line, = ax.get_lines()
+    assert np.array_equal(line.get_ydata(), history.sensors["force"])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("tip 1", "force")
+    with pytest.raises(InputError, match="a pair of its name and a component"):
+        history.plot_curve("t", "tip")
+    with pytest.raises(NameUnknown, match="force"):
+        history.plot_curve("t", "forse")
+    with pytest.raises(InputError, match="same instants"):
+        history.plot_curve("t", [1.0, 2.0])
