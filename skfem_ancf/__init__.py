@@ -21,7 +21,7 @@ from .core.errors import (AncfError, CallError, CallbackError, ConvergenceError,
 from .core.steps import Ramp, Steps
 from .dynamics import EnergyMomentum, Gauss, GeneralizedAlpha, HHT, Newmark, Radau, Scheme
 from .dynamics.history import History
-from .dynamics.quasistatic import StepHistory
+from .scene.quasistatic import StepHistory
 from .elements import (ElementBeam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                        ElementBeamCable, ElementBeamPatelShabana)
 from . import forms

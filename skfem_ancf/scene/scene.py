@@ -23,7 +23,7 @@ from ..dynamics.checkpoint import resume
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
-from ..dynamics.quasistatic import StepHistory, run
+from .quasistatic import StepHistory, run
 from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import SceneMatrices, matrices_of
 from ..equations.system import System

@@ -40,8 +40,8 @@ class Target(NamedTuple):
 
     ``factors``, ``before`` and ``scale`` are those of the tables of loads, the same for the first
     tangent, and of user-defined loads; ``when`` the time of loads, NaN for full size; ``at, c, g``
-    the time of the joints and their tables; ``gap`` the force that may be missing, (N,); ``prescribed`` by how much fixed DOFs have to
-    change.
+    the time of the joints and their tables; ``gap`` the force that may be missing, (N,);
+    ``prescribed`` by how much fixed DOFs have to change.
     """
 
     factors: F1

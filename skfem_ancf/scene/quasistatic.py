@@ -17,9 +17,9 @@ from ..results.arguments import displacement
 from ..solvers.newton import Steps as Rules
 from ..solvers.outcome import StaticResult, StepFailed
 from ..solvers.quasistatic import JUMPED, Instant, follow
-from .base import Motion, Scheme
-from .history import COLUMNS, History, state_of
-from .sensors import Recorder
+from ..dynamics.base import Motion, Scheme
+from ..dynamics.history import COLUMNS, History, state_of
+from ..dynamics.sensors import Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..core.types import Array
     from ..equations.system import System
     from ..results.state import State
-    from .sensors import Sensor
+    from ..dynamics.sensors import Sensor
 
 logger = logging.getLogger(__name__)
 
@@ -112,8 +112,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     if start is not None:
         t_start = float(start.t or 0.0)
         begin = Instant(t_start, StaticResult(
-            displacement(system, start), start.multipliers, 1.0, np.zeros(system.N), [], True, "given",
-            memory=system.forces.contacts.of_state(start)), "given")
+            displacement(system, start), start.multipliers, 1.0, np.zeros(system.N), [], True,
+            "given", memory=system.forces.contacts.of_state(start)), "given")
     if not len(ends) or ends[-1] <= t_start:
         raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "
                          f"after the start at t = {t_start:g}")
