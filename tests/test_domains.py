@@ -4,11 +4,13 @@ import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh
 from skfem import (Basis, BilinearForm, ElementQuad1, ElementQuad2, ElementQuadP, ElementTetP1,
                    ElementTriP2, ElementVector, LinearForm, MeshQuad, MeshQuad2, MeshTet, MeshTri,
                    condense, solve)
-from skfem.helpers import ddot, dot, eye, grad, identity, mul, sym_grad, trace, transpose
+from skfem.helpers import (ddot, det, dot, eye, grad, identity, inv, mul, sym_grad, trace,
+                           transpose)
 
 from skfem_ancf import (Beam, CallbackError, Domain, ElementBeamANCF, ElementBeamCable, InputError,
                         MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
@@ -396,6 +398,39 @@ def test_files_and_pictures_show_both(tmp_path):
     assert len(coloured[0]) > 32 * 9
     shown = state.plot("S_xx").collections  # grey where the stress is not known
     assert any(len(c.get_paths()) == 4 * 32 for c in shown)
+
+
+def test_rubber_on_a_graded_mesh():
+    """A neo-Hookean law in plane strain, stretched between rigid ends, against its formula."""
+    mu, lam = 1.0, 9.0
+
+    def parts(w):
+        F = identity(grad(w["u"])) + grad(w["u"])
+        return transpose(inv(F)), np.log(det(F))
+
+    @LinearForm
+    def residual(v, w):
+        G, volume = parts(w)
+        return ddot(mu * (identity(G) + grad(w["u"]) - G) + lam * volume * G, grad(v))
+
+    @BilinearForm
+    def tangent(u, v, w):
+        G, volume = parts(w)
+        return ddot(mu * grad(u) + (mu - lam * volume) * mul(mul(G, transpose(grad(u))), G)
+                    + lam * trace(mul(transpose(G), grad(u))) * G, grad(v))
+
+    mesh = MeshQuad.init_tensor(np.append(0, np.geomspace(1e-7, 1, 9)), [0, 0.5, 1])
+    mesh = mesh.with_boundaries({"left": lambda x: x[0] == 0, "right": lambda x: x[0] == 1,
+                                 "bottom": lambda x: x[1] == 0})
+    solid = Domain(Basis(mesh, ElementVector(ElementQuad1())), residual, tangent)
+    scene = Scene(solid).fix("left", "u^1").fix("bottom", "u^2").fix("right", "u^1", 0.5)
+    state = scene.solve_static()
+    across = brentq(lambda s: mu * (s - 1 / s) + lam * np.log(1.5 * s) / s, 0.5, 1.0)
+    force = mu * (1.5 - 1 / 1.5) + lam * np.log(1.5 * across) / 1.5
+    assert_allclose(state.displacement((0.7, 1.0)), (0.35, across - 1), rtol=1e-8)
+    assert_allclose(state.reactions("right").force[0], force, rtol=1e-8)
+    energy = 0.5 * mu * (1.5**2 + across**2 - 2 - 2 * np.log(1.5 * across))
+    assert_allclose(state.strain_energy, energy + 0.5 * lam * np.log(1.5 * across)**2, rtol=1e-8)
 
 
 # what is refused
