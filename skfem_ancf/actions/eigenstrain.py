@@ -25,7 +25,7 @@ from ..core.types import Array, TimeFunction
 from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes_time
-from .loads import Load
+from .loads import Amplitude, Load
 from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
 
 #: Products of a function of place and one of time that a function of both may be.
@@ -98,7 +98,8 @@ class EigenStrain(Load):
         for name, f in timed.items():
             for g, c in products(self.given[name], f, beam):
                 only = {**dict.fromkeys(given), name: g}
-                out.append(self._with(beam=k, amplitude=c.times(self.amplitude), **only))
+                amplitude = Amplitude(c.times(self.amplitude))
+                out.append(self._with(beam=k, amplitude=amplitude, **only))
         if not timed or any(f is not None for name, f in given.items() if name not in timed):
             out.append(self._with(beam=k, **dict.fromkeys(timed)))
         return out

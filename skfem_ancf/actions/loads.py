@@ -120,6 +120,7 @@ class Load(Item):
 
     constant = True
     beam: Any
+    amplitude: Amplitude | None = None
     linear = False
     turning = False
     scaled = True
@@ -138,7 +139,9 @@ class Load(Item):
         return not ours(self)
 
     def __init__(self, beam: WhichMember = None, amplitude: TimeFunction = None) -> None:
-        self.beam, self.amplitude = beam, amplitude
+        self.beam = beam
+        self.amplitude = amplitude if amplitude is None or isinstance(amplitude, Amplitude) else (
+            Amplitude(amplitude))
 
     def expand(self, layout: Layout) -> Sequence[Item]:
         return (self._with(beam=layout.number(self.beam)),)
@@ -150,15 +153,6 @@ class Load(Item):
         bound to other beams later.
         """
         return self._with(beam=beam)
-
-    @property
-    def amplitude(self) -> Amplitude | None:
-        return getattr(self, "_amplitude", None)
-
-    @amplitude.setter
-    def amplitude(self, function):
-        self._amplitude = (function if function is None or isinstance(function, Amplitude) else
-                           Amplitude(function))
 
     def factor(self, t: float | None) -> float:
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""

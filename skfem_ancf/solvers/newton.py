@@ -400,7 +400,9 @@ class Search:
                 bar.update(size)
                 # one assignment: who interrupts finds the old result or the new one
                 result = self._followed(result, step, found)
-                self._keep(result, route)
+                if route is self.route and (self.furthest is None
+                                            or result.load > self.furthest.load):
+                    self.furthest = result  # what an error has
                 cuts = 0
                 logger.info("load %.6g converged in %d iterations", load, step.record.iterations)
                 if step.record.iterations <= max(8, rules.max_iterations // 3):
@@ -408,11 +410,6 @@ class Search:
                 if rules.few and spent >= few and result.load < 1.0 and not result.doubt:
                     raise StepFailed(f"the full load was not reached in {spent} iterations")
         return result
-
-    def _keep(self, result, route):
-        """The result of the highest load is what an error has."""
-        if route is self.route and (self.furthest is None or result.load > self.furthest.load):
-            self.furthest = result
 
 
 def _listed(attempts):

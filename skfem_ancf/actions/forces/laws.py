@@ -81,8 +81,30 @@ class Law:
         return f"<{self.name} {shown(self.function)}>"
 
 
-def number_or_law(name: str, given: Any, of: str) -> float | Law:
-    """A number that is not negative as it is, a function as a :class:`Law`."""
+class Proportional(float):
+    """A number as a law: the force in proportion to it."""
+
+    def __call__(self, s: float) -> float:
+        return self * s
+
+    def potential(self, s: float) -> float:
+        return 0.5 * self * s * s
+
+    def work(self, a: float, b: float) -> float:
+        return 0.5 * self * (b - a) * (b + a)
+
+    def mean(self, a: float, b: float) -> float:
+        return 0.5 * self * (a + b)
+
+    def slope(self, s: float, scale: float = 1.0) -> float:
+        return float(self)
+
+    def __repr__(self) -> str:
+        return f"{self:g}"
+
+
+def number_or_law(name: str, given: Any, of: str) -> Proportional | Law:
+    """A number that is not negative, or a function, as a law."""
     if isinstance(given, Law):
         return given
     if callable(given) or isinstance(given, (tuple, list)):
@@ -91,34 +113,4 @@ def number_or_law(name: str, given: Any, of: str) -> float | Law:
             raise InputError(f"{name} is a force of the {of}, and must be 0 where that is 0, got "
                              f"{law(0.0):g}")
         return law
-    return require_not_negative(name, given)
-
-
-def said(k: float | Law) -> str:
-    """A number or a Law in few letters."""
-    return repr(k) if isinstance(k, Law) else f"{k:g}"
-
-
-def force_of(k: float | Law, s: float) -> float:
-    """What a number times s is, or the law at s."""
-    return k(s) if isinstance(k, Law) else k * s
-
-
-def potential_of(k: float | Law, s: float) -> float:
-    """Its integral from zero."""
-    return k.potential(s) if isinstance(k, Law) else 0.5 * k * s * s
-
-
-def work_of(k: float | Law, a: float, b: float) -> float:
-    """Its integral between two states of one step."""
-    return k.work(a, b) if isinstance(k, Law) else 0.5 * k * (b - a) * (b + a)
-
-
-def mean_of(k: float | Law, a: float, b: float) -> float:
-    """Its mean between two states of one step, whose product with b - a is its integral."""
-    return k.mean(a, b) if isinstance(k, Law) else 0.5 * k * (a + b)
-
-
-def slope_of(k: float | Law, s: float, scale: float) -> float:
-    """Its derivative."""
-    return k.slope(s, scale) if isinstance(k, Law) else k
+    return Proportional(require_not_negative(name, given))

@@ -15,7 +15,7 @@ from ...mesh.places import points_of_rows
 from ..places import GROUND, Vector, both_of, named_place, point, section
 from .base import ForceElement, Part
 from .kernels import SPRING, TINY, TORSION, turned, turning
-from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
+from .laws import Law, number_or_law
 
 #: Rate beside which the step of a difference of a dashpot's law is small.
 STILL = 1e-3
@@ -86,33 +86,31 @@ class Spring(ForceElement):
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         length, n = self._along(x)
-        return -(force_of(self.k, length - self._length) + force_of(self.damping, v[0] @ n)) * n[
-            None]
+        return -(self.k(length - self._length) + self.damping(v[0] @ n)) * n[None]
 
     def potential(self, x: Array) -> float:
-        return potential_of(self.k, self._along(x)[0] - self._length)
+        return self.k.potential(self._along(x)[0] - self._length)
 
     def gain(self, x: Array, y: Array, t: float) -> float:
-        return work_of(self.k, *(self._along(z)[0] - self._length for z in (x, y)))
+        return self.k.work(*(self._along(z)[0] - self._length for z in (x, y)))
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         a, b = self._along(x)[0], self._along(y)[0]
-        return -mean_of(self.k, a - self._length, b - self._length) / (a + b) * (x + y)
+        return -self.k.mean(a - self._length, b - self._length) / (a + b) * (x + y)
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         length, n = self._along(x)
         s, along = length - self._length, np.outer(n, n)
-        K = slope_of(self.k, s, self._length) * along + force_of(self.k, s) / length * (
-            np.eye(2) - along)
+        K = self.k.slope(s, self._length) * along + self.k(s) / length * (np.eye(2) - along)
         return -K.reshape(1, 2, 1, 2)
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         _, n = self._along(x)
-        c = slope_of(self.damping, float(v[0] @ n), STILL)
+        c = self.damping.slope(float(v[0] @ n), STILL)
         return -c * np.outer(n, n).reshape(1, 2, 1, 2)
 
     def __repr__(self) -> str:
-        return f"<Spring {said(self.k)} between {shown(self.between)}>"
+        return f"<Spring {self.k!r} between {shown(self.between)}>"
 
 
 class TorsionalSpring(ForceElement):
@@ -180,24 +178,23 @@ class TorsionalSpring(ForceElement):
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         g = self._turning(np.asarray(x))
-        return -(force_of(self.k, self._angle(x)) + force_of(
-            self.damping, float(np.sum(g * v)))) * g
+        return -(self.k(self._angle(x)) + self.damping(float(np.sum(g * v)))) * g
 
     def potential(self, x: Array) -> float:
-        return potential_of(self.k, self._angle(x))
+        return self.k.potential(self._angle(x))
 
     def gain(self, x: Array, y: Array, t: float) -> float:
-        return work_of(self.k, self._angle(x), self._angle(y))
+        return self.k.work(self._angle(x), self._angle(y))
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         g = np.empty((4, 1))
         mean_turning(x.reshape(4, 1), y.reshape(4, 1), g)
-        return -mean_of(self.k, self._angle(x), self._angle(y)) * g.reshape(2, 2)
+        return -self.k.mean(self._angle(x), self._angle(y)) * g.reshape(2, 2)
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         g = self._turning(np.asarray(x))
-        c = slope_of(self.damping, float(np.sum(g * v)), STILL)
+        c = self.damping.slope(float(np.sum(g * v)), STILL)
         return -c * np.multiply.outer(g, g)
 
     def __repr__(self) -> str:
-        return f"<TorsionalSpring {said(self.k)} at {shown(self.at)}>"
+        return f"<TorsionalSpring {self.k!r} at {shown(self.at)}>"

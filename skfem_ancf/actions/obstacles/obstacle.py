@@ -275,7 +275,8 @@ class Obstacle(ForceElement):
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
         return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
                      offsets.ravel(), starts.reshape(4, -1), n, m,
-                     _deepest(self.shape, h), h, numbers, firmest)
+                     np.inf if self.shape.inner == np.inf else THROUGH * min(h, self.shape.inner),
+                     h, numbers, firmest)
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
@@ -289,11 +290,6 @@ def _joined(groups):
     numbers = np.max([group.numbers for group in groups], axis=0)  # but for the radius the same
     return first._replace(**arrays, numbers=numbers,
                           elements=sum(group.elements for group in groups))
-
-
-def _deepest(shape, h):
-    """How deep a way may cut a shape; infinite of one that has no other side."""
-    return np.inf if shape.inner == np.inf else THROUGH * min(h, shape.inner)
 
 
 def _default(E, mesh):
