@@ -33,7 +33,7 @@ class FollowerForce(Load):
     force
         The force in the stress-free state, shape (2,).
     at
-        The point: its place (x, y) in the stress-free body, shape (2,).
+        The point: its place (x, y) in the reference configuration, shape (2,).
     beam
         The beam, its name or its number, where several have the point; or a RigidBody.
     amplitude

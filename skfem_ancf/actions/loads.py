@@ -304,8 +304,8 @@ class PointForce(Load):
     force
         The force, shape (2,).
     at
-        The point: its place (x, y) in the stress-free body, shape (2,), or "right" for the axis at
-        that end; of a rigid body also None, for its centre of mass.
+        The point: its place (x, y) in the reference configuration, shape (2,), or "right" for the
+        axis at that end; of a rigid body also None, for its centre of mass.
     beam
         The beam, its name or its number, where several have the point; or a RigidBody.
     amplitude
@@ -352,8 +352,8 @@ class Traction(Load):
     boundary
         A place, see :func:`skfem_ancf.mesh.places.facets_of`.
     t
-        Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
-        that returns (2, ...).
+        Force per area of the reference configuration, shape (2,), or a function of the points x (2,
+        ...) that returns (2, ...).
     beam, amplitude
         As for :class:`Load`.
     """

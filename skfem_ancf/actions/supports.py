@@ -25,10 +25,10 @@ class Support(Item):
     Parameters
     ----------
     boundary
-        A place: the name of a boundary; a point (x, y) of the stress-free body, which means the
-        section of a node; a function of the points x that returns truth values; or numbers of
-        facets as an array of integers. See :func:`skfem_ancf.mesh.places.facets_of`. A RigidBody
-        is held as a whole.
+        A place: the name of a boundary; a point (x, y) of the reference configuration, which means
+        the section of a node; a function of the points x that returns truth values; or numbers of
+        facets as an array of integers. See :func:`skfem_ancf.mesh.places.facets_of`. A RigidBody is
+        held as a whole.
     names
         As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
     displacement

@@ -189,7 +189,7 @@ def push(loads, what, factors, u, v, out, flat, ld):
 
 @source
 def external_force(loads, factors, t, scale, u, out):
-    """The force of all loads; ``scale`` is on those of one's own, the others have factors."""
+    """The force of all loads; ``scale`` is on user-defined ones, the others have factors."""
     _dead_force(loads, factors, out)
     add_moments(loads.moments, _of_moments(loads, factors), u, out)
     if loads.rows.size > 0:

@@ -230,7 +230,7 @@ def body_mean(body, u0, u1, f):
 
 @source
 def body_mixed(body, mean, u0, u1, f, carried, stresses):
-    """As :func:`body_force` at u1, or :func:`body_mean`, but of carried stresses.
+    """As :func:`body_force` at u1, or :func:`body_mean`, but of independent stresses.
 
     The stresses of the strain are written.
     """

@@ -35,7 +35,7 @@ CUTS = 3
 #: Iterations of a descent.
 DESCENT = 200
 #: Largest radius of a descent, and displacement over the size of the scene from which it is lost.
-LARGEST, ASTRAY = 0.5, 20.0
+LARGEST, LOST = 0.5, 20.0
 #: How often a correction of a descent is halved that leads through an obstacle.
 HALVED = 8
 
@@ -104,7 +104,7 @@ class Descent:
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:
         """Solve for a correction; False if there is none."""
-        if np.max(np.abs(u / self._sizes)) > ASTRAY:
+        if np.max(np.abs(u / self._sizes)) > LOST:
             return False
         found = self._bounded(lambda: self.system.solver.factorize(u, t, multipliers), R, phi)
         if found is None:

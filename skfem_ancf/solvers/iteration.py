@@ -26,8 +26,8 @@ CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
 LEAST = 2
 #: What joints may be open by, over the sizes of their equations.
 CLOSED = 1e-12
-#: Work of the third correction, as a root over that of all forces, of an iteration that is astray.
-ASTRAY = 0.9
+#: Work of the third correction, as a root over that of all forces, of an iteration that diverges.
+DIVERGING = 0.9
 #: The same of the second, of a scene so soft that the first was far too large; and of one after
 #: the eighth, of an iteration that is not seen to converge.
 SOFT, LATE, LARGE = 10.0, 8, 3.0
@@ -74,7 +74,7 @@ class Rules(NamedTuple):
 
 
 class Unknowns(NamedTuple):
-    """What is found: displacement, multipliers, internal force, stresses and those carried."""
+    """What is found: displacement, multipliers, internal force, stresses and independent ones."""
 
     u: F1
     multipliers: F1
@@ -155,16 +155,16 @@ def equilibrium(e, target, rules, x, w, record):
             x.multipliers[i] += w.dm[i]
         reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
-        if rules.wary > 0 and _astray(rules.wary, k, record[k, 1]):
+        if rules.wary > 0 and _diverging(rules.wary, k, record[k, 1]):
             return NOT_CONVERGED, k + 1
     return NOT_CONVERGED, rules.iterations
 
 
 @source
-def _astray(wary, k, work):
+def _diverging(wary, k, work):
     """True if correction k says that an iteration will not converge."""
     if wary == FIRST:
-        return k == 2 and work > ASTRAY
+        return k == 2 and work > DIVERGING
     return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
 
 

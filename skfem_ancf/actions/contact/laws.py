@@ -1,7 +1,7 @@
 """Laws of contact, of numbers and arrays alike.
 
 Of the penetration ``a`` each point has the potential ``k A S(a)`` with its area A in the
-stress-free body and::
+reference configuration and::
 
     S(a) = (<a>^3 - <a - w>^3) / (6 w),   <a> = max(a, 0)
 

@@ -1,4 +1,4 @@
-"""Force elements: springs, dashpots, foundations, drag, masses, and those of one's own."""
+"""Force elements: springs, dashpots, foundations, drag, masses, and user-defined ones."""
 
 from ..places import point, section
 from .base import ForceElement, bind_force

@@ -20,7 +20,7 @@ from ..places import Vector
 
 #: Relative step of differences, where a force takes no complex numbers.
 STEP = 1e-6
-#: Where an element of one's own is tried besides the stress-free state: off by so much.
+#: Where a user-defined element is tried besides the stress-free state: off by so much.
 ASIDE = 0.01
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 

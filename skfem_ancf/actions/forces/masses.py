@@ -20,7 +20,7 @@ class PointMass(ForceElement):
     mass
         Zero or positive.
     at
-        The point: its place (x, y) in the stress-free body, or the name of an end.
+        The point: its place (x, y) in the reference configuration, or the name of an end.
     inertia
         Moment of inertia, zero or positive, of what turns with the section of a node, which the
         point then has to be on.

@@ -1,4 +1,4 @@
-"""The force elements of a scene in its equations: their tables, and elements of one's own."""
+"""The force elements of a scene in its equations: their tables, and user-defined elements."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class OnLine(Joint):
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the stress-free body.
+        The material point: its place (x, y) in the reference configuration.
     direction
         Direction of the line, shape (2,).
     through
@@ -54,7 +54,7 @@ class OnCircle(Joint):
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the stress-free body.
+        The material point: its place (x, y) in the reference configuration.
     center
         Centre of the circle, shape (2,).
     radius

@@ -28,8 +28,8 @@ class PrescribedPosition(Joint):
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the stress-free body, or the name of an end; of a
-        RigidBody, which may stand here too, its centre of mass if no point is given.
+        The material point: its place (x, y) in the reference configuration, or the name of an end;
+        of a RigidBody, which may stand here too, its centre of mass if no point is given.
     r
         The motion: a function of time that returns the position (2,).
     """
