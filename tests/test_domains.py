@@ -275,6 +275,18 @@ def test_springs_and_hinges_hold_points_of_a_domain():
     assert state.displacement((1, 0))[1] < -0.1
 
 
+def test_a_hinge_between_a_domain_and_a_beam():
+    """A light load: the hinge carries half of a beam's weight, and no moment."""
+    solid, beam = domain_of(strip(0, 1, 8)), beam_of(1, 2, 8)
+    scene = Scene(beam, solid).clamp("left", solid).fix("right", "r^2", beam=beam)
+    hinge = scene.hinge((solid, (1, 0)), (beam, "left"))
+    state = scene.gravity((0, -1e-3), beam=beam).solve_static()
+    half = 0.5e-3 * RHO * H * WIDTH
+    assert_allclose(state.joint_force(hinge), (0, -half), rtol=1e-3, atol=1e-3 * half)
+    tip = half / (3 * E * H**3 * WIDTH / 12)
+    assert_allclose(state.displacement((1, 0), solid)[1], -tip, rtol=0.02)
+
+
 # vibrations, buckling, motion
 
 
