@@ -192,15 +192,14 @@ class EigenStrain(Load):
             E0[1] -= np.where(which == k, unmatched(beam, self, layer, X, e), 0.0)
         E = on_grid(strain_at, beam, u, X, e) if self.grows else 0.0 * factor * E0
         laws = [partial(stress_of, layer.law) for layer in beam.layers]
-        return beam.across.of_layers(
-            X, E, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
+        return beam.across.of_layers(X, E, lambda k: laws[k](E) - laws[k](E - factor * E0), e)
 
     def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
         """What a cable's nominal stress, force per stress-free area, is less by, (3, n, m)."""
         E0 = factor * self.strain_at(X, e) * np.array([1.0, 0.0, 0.0])[:, None, None]
-        return self.beam.across.of_layers(X, E0, [
-            lambda layer=layer: layer.material.axial_modulus * E0
-            for layer in self.beam.across.layers], e)
+        layers = self.beam.across.layers
+        return self.beam.across.of_layers(
+            X, E0, lambda k: layers[k].material.axial_modulus * E0, e)
 
 
 class Temperature(EigenStrain):

@@ -189,7 +189,7 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
     E, at = strain_at(beam, u, e, X)[..., None], X[:, :, None]
     of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
           partial(_stress_of_cable, strain=E, X=at, tind=e))
-    return beam.across.of_layers(at, E, [partial(of, layer) for layer in beam.layers], e)[..., 0]
+    return beam.across.of_layers(at, E, lambda k: of(beam.layers[k]), e)[..., 0]
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:

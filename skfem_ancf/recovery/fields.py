@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -214,9 +214,9 @@ class Values(Mapping):
         across = self.beam.across
         if across.plain:
             return ask(self.beam.material)
-        return across.of_layers(self._part.at, np.zeros((self.n, 1), self._u.dtype), [
-            partial(_column, ask, layer.material) for layer in across.layers], self._part.e,
-            graded)[:, 0]
+        return across.of_layers(
+            self._part.at, np.zeros((self.n, 1), self._u.dtype),
+            lambda k: ask(across.layers[k].material)[:, None], self._part.e, graded)[:, 0]
 
     @cached_property
     def F(self) -> Array:
@@ -297,10 +297,6 @@ class Values(Mapping):
     def principal_stress(self) -> tuple[Array, Array]:
         """Principal Cauchy stresses in the plane, (2, n), and the direction of the larger."""
         return _principal(self.sigma)
-
-
-def _column(ask, material):
-    return ask(material)[:, None]
 
 
 def _principal(tensor):

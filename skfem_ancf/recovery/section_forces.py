@@ -92,8 +92,8 @@ class Sections:
     def density(self) -> Array:
         """Mass per volume, (n, k)."""
         across, zero, X = self.beam.across, np.zeros(self.X.shape[1:]), beside(self.X)
-        return zero + across.of_layers(X, zero, [partial(across.density, layer, X, self.e)
-                                                for layer in across.layers], self.e, graded=False)
+        return zero + across.of_layers(
+            X, zero, lambda k: across.density(across.layers[k], X, self.e), self.e, graded=False)
 
 
 class SectionForces:

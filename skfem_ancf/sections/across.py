@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property, partial, reduce
 from typing import Any
@@ -193,28 +193,28 @@ class Across(Immutable):
         tops = np.array([s.measure.high for s in self.layers[:-1]])
         return np.searchsorted(tops - EDGE, np.asarray(X[1]), side="right")
 
-    def of_layers(self, X: Array, like: Array, values: Sequence[Callable[[], Array]],
-                 tind: Array | None = None, graded: bool = True) -> Array:
+    def of_layers(self, X: Array, like: Array, of: Callable[[int], Array],
+                  tind: Array | None = None, graded: bool = True) -> Array:
         """A field that each layer has by its own law.
 
         Parameters
         ----------
         like
             An array of the shape of the field, (..., nelements, npoints).
-        values
-            For each layer a function without arguments that returns the field as if all were of it.
+        of
+            Returns the field as if all were of the layer of a number.
         graded
             It is proportional to the energy.
         """
         if len(self.layers) == 1:
             graded = graded and self.layers[0].grade is not None
-            return values[0]() * self.grade(self.layers[0], X, tind) if graded else values[0]()
+            return of(0) * self.grade(self.layers[0], X, tind) if graded else of(0)
         which = np.broadcast_to(self.which(X, tind), like.shape[-2:])
         out = np.empty(like.shape, like.dtype)
-        for k, (layer, value) in enumerate(zip(self.layers, values)):
+        for k, layer in enumerate(self.layers):
             on = which == k
             if np.any(on):
-                found = value() * (self.grade(layer, X, tind) if graded else 1.0)
+                found = of(k) * (self.grade(layer, X, tind) if graded else 1.0)
                 out[..., on] = np.broadcast_to(found, like.shape)[..., on]
         return out
 
