@@ -146,10 +146,9 @@ def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
 def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
     """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
     found = Vector(start, dofs + layout.offset(member), weights)
-    size = np.maximum.reduce(np.abs(found.weights)) * member.sizes.take(dofs[0])
-    keep = size > 1e-14 * np.maximum.reduce(size)
-    if not np.logical_and.reduce(keep):
-        found.dofs, found.weights = found.dofs[:, keep], found.weights[:, keep]
+    size = np.max(np.abs(found.weights), axis=0) * member.sizes[dofs[0]]
+    keep = size > 1e-14 * np.max(size)
+    found.dofs, found.weights = found.dofs[:, keep], found.weights[:, keep]
     return found
 
 

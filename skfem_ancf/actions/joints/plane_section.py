@@ -9,7 +9,8 @@ from ...beam.layout import Layout, WhichBeam
 from ...core.errors import require_label
 from ...core.types import Array, Place
 from ...mesh.places import node_of
-from .base import Joint
+from ..places import Vector
+from .base import Joint, gradients
 
 
 class PlaneSection(Joint):
@@ -34,14 +35,12 @@ class PlaneSection(Joint):
         self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
         first = layout.offset(beam) + node * beam.nd
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
-        parts = [c for c in (0, 1) if self.direction[c]]
-        dofs = np.array([[first + 2 * k + c for c in parts] for k in held])
-        self.found = (np.array([row for row in range(len(held)) for _ in parts]), dofs.ravel(),
-                      np.array([self.direction[c] for c in parts] * len(held)))
-        self.dofs, self.along = dofs, self.direction[parts]
+        self.slopes = [Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0)
+                       for k in held]
+        self.found = gradients(*([(slope, self.direction)] for slope in self.slopes))
 
     def value(self, u: Array, t: float) -> Array:
-        return u.take(self.dofs).dot(self.along)
+        return np.array([self.direction @ slope(u) for slope in self.slopes])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
