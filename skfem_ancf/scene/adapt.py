@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actions.joints.nodes import chain_ends
 from ..beam.beam import Beam
-from ..core.errors import (ConvergenceError, InputError, NameUnknown, require_integer,
+from ..core.errors import (ConvergenceError, InputError, require_integer, require_option,
                            require_positive)
 from ..core.quadrature import gauss
 from ..core.types import Array
@@ -73,9 +73,7 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
     tol = require_positive("adapt", tol)
     max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
     max_degree = require_integer("max_degree", max_degree, 1, DEGREES[-1])
-    if goal not in GOALS:
-        raise NameUnknown("goal", goal, GOALS)
-    if goal == "strain":
+    if require_option("goal", goal, GOALS) == "strain":
         return _solve_for_strain(scene, tol, max_elements, **options)
     rounds = _Rounds(scene, tol, max_degree)
     while True:
@@ -99,13 +97,7 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
 
 
 class _Rounds:
-    """The beams of an adaptive solution: which have a higher degree next, and which are split.
-
-    Parameters
-    ----------
-    scene, tol, max_degree
-        As for :func:`solve_adaptive`.
-    """
+    """The beams of an adaptive solution: which have a higher degree next, and which are split."""
 
     def __init__(self, scene: Any, tol: float, max_degree: int) -> None:
         self.scene, self.tol, self._most = scene, tol, max_degree

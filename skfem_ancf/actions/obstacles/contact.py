@@ -60,15 +60,12 @@ def contact_of(state: Any, obstacle: Any = None) -> Contact:
         raise InputError("the scene has no obstacle: scene.obstacle(Circle((0, -1), 0.5)) adds one")
     which = None if obstacle is None else require_index("obstacle", obstacle,
                                                         len(contacts.obstacles))
-    found: list[list[Array]] = [[np.zeros((2, 0))], [np.zeros((2, 0))], [np.zeros(0)],
-                                [np.zeros(0)]]
-    nearest = np.inf
+    found, nearest = [], np.inf
     t = state.load if state.t is None else state.t
     v = None if state.t is None else np.array(state.v)
     for k, *values in contacts.pushes(np.array(state.u), v, t):
         if which is None or k == which:
             nearest = min(nearest, float(values[3].min()))
-            for column, x in zip(found, values):
-                column.append(x[..., values[2] > 0.0])
-    places, force, pressure, gap = (np.concatenate(column, axis=-1) for column in found)
+            found.append([x[..., values[2] > 0.0] for x in values])
+    places, force, pressure, gap = (np.concatenate(x, axis=-1) for x in zip(*found))
     return Contact(places, force, pressure, gap, nearest)
