@@ -13,6 +13,7 @@ from ..beam.layout import WhichBeam
 from ..core.errors import require_index
 from ..core.types import Array
 from ..equations.system import System
+from .points import MaterialPoints
 from .state import State
 
 
@@ -49,7 +50,7 @@ class CriticalPoint:
         return f"<{self.kind} point at load {self.load:.8g}, arc length {self.arc:.6g}>"
 
 
-class Path:
+class Path(MaterialPoints):
     """The equilibria that a continuation found.
 
     Parameters
@@ -112,15 +113,10 @@ class Path:
         p = self.points[require_index("k", k, len(self.points))]
         return self._state(p, f"point {k}", p.iterations)
 
-    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
-        """Displacement of material points along the path, (n, 2), or (n, 2, m) of many.
-
-        Parameters
-        ----------
-        point, beam
-            One point, shape (2,), or many, as for :meth:`State.displacement`.
-        """
-        return self.system.points.find(point, beam).displacement(self.u)
+    @property
+    def v(self) -> Array:  # type: ignore[override]
+        """Velocity of the degrees of freedom, shape (n, N): zero."""
+        return np.zeros_like(self.u)
 
     def limit_points(self) -> Array:
         """Load factors at the turning points of the load, in the order of the path."""
