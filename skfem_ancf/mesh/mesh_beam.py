@@ -381,7 +381,7 @@ class MeshBeam(NumberedMesh):
             return np.full(self.t.shape[1], self.lengths.sum())
         return np.bincount(self.chains, self.lengths)[self.chains]
 
-    @property
+    @cached_property
     def chains(self) -> Array:
         """Number of the chain that each element is in, shape (nelements,)."""
         return np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
