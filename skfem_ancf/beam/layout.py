@@ -89,8 +89,8 @@ def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
         return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
     if not beams:
-        raise InputError("this is asked of beams, the scene has rigid bodies alone: name one of "
-                         f"them, by itself, its name or its number; got {shown(beam)}")
+        raise InputError("this is asked of beams, and the scene has none: name one of its "
+                         f"members, by itself, its name or its number; got {shown(beam)}")
     if beam is None:
         raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
     if isinstance(beam, (RigidBody, Domain)):

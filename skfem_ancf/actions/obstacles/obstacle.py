@@ -172,8 +172,8 @@ class Obstacle(ForceElement):
 
     def bind(self, layout: Layout) -> list[Vector]:
         if not layout.beams:
-            raise InputError("an obstacle is touched by surfaces of beams, the scene has rigid "
-                             "bodies alone: hold them by one-sided springs, or add a beam")
+            raise InputError("an obstacle is touched by surfaces of beams, and the scene has "
+                             "none: hold what there is by one-sided springs, or add a beam")
         beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.options["tolerance"] or TOLERANCE * height
