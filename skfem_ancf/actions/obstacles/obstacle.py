@@ -177,9 +177,7 @@ class Obstacle(ForceElement):
         beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.options["tolerance"] or TOLERANCE * height
-        groups = []
-        for beam in beams:
-            groups += self._groups_of(beam, layout.offset(beam))
+        groups = [self._group(beam, layout.offset(beam)) for beam in beams]
         places = np.concatenate([group.starts[:2] for group in groups], axis=1)
         self.shape = self.shape.fitted(places, height)
         self.groups = tuple(groups)
@@ -213,18 +211,30 @@ class Obstacle(ForceElement):
 
     # points of the surface
 
-    def _groups_of(self, beam, first):
-        """The group of bottom, top and both ends, which count as an element each."""
-        xi, along = self._along(beam)
-        sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], len(xi))]), np.tile(along, 2)
-        m, last = 2 * len(xi), beam.mesh.nelements - 1
+    def _group(self, beam, first):
+        """The points of bottom, top and both ends, which count as an element each."""
+        mesh, (xi, along) = beam.mesh, self._along(beam)
+        m, h = 2 * len(xi), mesh.height
         eta, across = _lobatto(ACROSS)  # as many points as an element has: some are shared
         which = np.arange(m) % ACROSS
         eta, across = eta[which], across[which] / np.bincount(which)[which]
-        ends = [(np.array([np.full(m, end), eta]), across, np.array([e]))
-                for end, e in ((0.0, 0), (1.0, last))]
-        return [_joined([self._group(beam, first, *sides, None)] + [
-            self._group(beam, first, *end) for end in ends])]
+        parts = [self._points(beam, first, np.array([np.tile(xi, 2), np.repeat([0, 1], len(xi))]),
+                              np.tile(along, 2), None)]
+        parts += [self._points(beam, first, np.array([np.full(m, end), eta]), across, np.array([e]))
+                  for end, e in ((0.0, 0), (1.0, mesh.nelements - 1))]
+        nodes, weights, slopes, areas, offsets, starts = (
+            np.concatenate(arrays, axis=-1) for arrays in zip(*parts))
+        places = starts[:2].reshape(2, -1, m)
+        radius = np.hypot(*(places - places.mean(axis=2, keepdims=True))).ravel() + np.abs(offsets)
+        E, density = _stiffest(beam.across, np.arange(mesh.nelements))
+        k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
+        firmest = 1.0 if self.penalty or augmented else max(1.0, E / (h * k))
+        numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
+                            HARDER * density * h * augmented, radius.max(),
+                            -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
+        return Group(nodes, weights, slopes, areas, offsets, starts, mesh.nelements + 2, m,
+                     np.inf if self.shape.inner == np.inf else THROUGH * min(h, self.shape.inner),
+                     h, numbers, firmest)
 
     def _along(self, beam):
         """Points and weights along the elements of a beam."""
@@ -242,10 +252,11 @@ class Obstacle(ForceElement):
                 "it is, or a larger points=", ModelWarning)
         return rule
 
-    def _group(self, beam, first, X, w, tind):
+    def _points(self, beam, first, X, w, tind):
+        """Of points of both sides of all elements, or of an end, what a Group has of each."""
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         elements = np.arange(mesh.nelements) if tind is None else tind
-        h, n, m = mesh.height, len(elements), X.shape[1]
+        n, m = len(elements), X.shape[1]
         offsets, slopes = np.zeros((n, m)), np.zeros((0, n * m))
         at, starts = X, np.zeros((4, n, m))
         if not beam.has_sections:
@@ -263,33 +274,12 @@ class Obstacle(ForceElement):
             areas = w * length * np.concatenate(width, axis=1)
         else:
             areas = w * mapping.height(X[0], elements)[0] * beam.across.outline(X, elements)
-        areas = np.broadcast_to(areas, (n, m))
         nodes = first + mesh.t[0, elements] * beam.nd
-        middle = starts[:2].mean(axis=2, keepdims=True)
-        radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
-        E, density = _stiffest(beam.across, elements)
-        k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
-        firmest = 1.0 if self.penalty or augmented else max(1.0, E / (h * k))
-        numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
-                            HARDER * density * h * augmented, radius,
-                            -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
-        return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
-                     offsets.ravel(), starts.reshape(4, -1), n, m,
-                     np.inf if self.shape.inner == np.inf else THROUGH * min(h, self.shape.inner),
-                     h, numbers, firmest)
+        return (np.repeat(nodes, m), weights.reshape(-1, n * m), slopes,
+                np.broadcast_to(areas, (n, m)).ravel(), offsets.ravel(), starts.reshape(4, -1))
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
-
-
-def _joined(groups):
-    """Some groups of one beam as one."""
-    first = groups[0]
-    arrays = {name: np.concatenate([getattr(group, name) for group in groups], axis=-1)
-              for name in ("first", "weights", "slopes", "areas", "offsets", "starts")}
-    numbers = np.max([group.numbers for group in groups], axis=0)  # but for the radius the same
-    return first._replace(**arrays, numbers=numbers,
-                          elements=sum(group.elements for group in groups))
 
 
 def _default(E, mesh):
