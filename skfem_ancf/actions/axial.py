@@ -70,7 +70,9 @@ class FollowerForce(Load):
             bound._stations, bound._start = (), beam.q0[2:]
             bound._along, bound._slopes = beam.direction()
         else:
-            e, X = _place(beam, self.at, self.line)
+            found = Points([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
+                                                         self.line, ask=True).parts[0]
+            e, X = int(found.e[0]), found.X[:, 0]
             bound._dofs, weights = probe(beam, self.at, (e, X))
             bound._stations, bound._along = (e + float(X[0]),), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
@@ -103,13 +105,6 @@ class FollowerForce(Load):
 
     def spread(self, u: Array) -> Spread:
         return Spread(stations=self._stations)
-
-
-def _place(beam, at, line):
-    """Element and reference point (2,) of a point; asks for the line where several meet."""
-    point = as_point(at, beam.mesh)
-    part, = Points([beam], [slice(beam.N)]).find(point, beam, line, ask=True).parts
-    return int(part.e[0]), part.X[:, 0]
 
 
 class LineLoad(Load):

@@ -283,15 +283,10 @@ class Forces:
                 out[places] -= found.ravel()
 
 
-def _no_tables():
-    """The tables of no elements."""
-    x, i = np.zeros(0), np.zeros(0, np.int64)
-    return ForceTables(x, i, i, x, 0, np.zeros(KINDS + 1, np.int64), x, 0, i, i, x, i, i, 0,
-                       NO_CONTACTS)
-
-
+_X, _I = np.zeros(0), np.zeros(0, np.int64)
 #: Of scenes without force elements.
-NO_FORCES = _no_tables()
+NO_FORCES = ForceTables(_X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I,
+                        0, NO_CONTACTS)
 
 
 def _resists(part):

@@ -322,6 +322,9 @@ def _repeated(x, w, pieces):
 
 
 def _options(options):
+    if options.pop("slip_speed", None) is not None:
+        warn("slip_speed= has no effect any more, leave it out: in a motion points stick as they "
+             "do in statics", DeprecationWarning)
     for name in options:
         require_option("option of an obstacle", name, KNOWN)
     return {name: None if options.get(name) is None else require_positive(name, options[name])
