@@ -54,6 +54,24 @@ def pushed_frame(n=5):
     return frame.clamp(number[0]).point_force((2000, 0), at=number[1:, 0]).solve_static()
 
 
+def portal(filename):
+    """The portal of paraview.md, before it is solved and after."""
+    from matplotlib.figure import Figure
+
+    frame = Frame.from_lines(
+        [(0, 0), (0, 3), (4, 3), (4, 0)], [(0, 1), (1, 2), (2, 3)], elements=4, hinges=[2],
+        groups={"left": [0], "girder": [1], "right": [2]},
+        material=StVenantKirchhoff(E=2.1e11, nu=0.3), height=0.12, width=0.1)
+    frame.clamp(0).pin(3).point_force((2000, 0), at=1).line_load((0, -1500), "girder")
+    frame.moment(1, -900).spring(5e4, [("girder", (2, 3)), ("ground", (2, 2))])
+    frame.obstacle(Circle((3.1, 1.2), 0.4))
+    figure = Figure(figsize=(11, 4.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    frame.plot(left, names=True)
+    frame.solve_static().plot("S_xx", ax=right, scale="auto", loads=True, supports=True, unit="Pa")
+    figure.savefig(filename, dpi=110, bbox_inches="tight")
+
+
 def main(folder=DOCS):
     """Write cantilever.png (64 elements), cantilever_16.png (not recovered), frames, others."""
     folder = Path(folder)
@@ -61,6 +79,7 @@ def main(folder=DOCS):
         with_root(cantilever(elements), folder / name, recover)
     on_a_cylinder().plot("eps_xx", thickness=1, filename=folder / "obstacles.png", dpi=110)
     pushed_frame().plot("eps_xx", thickness=6, filename=folder / "frames.png", dpi=110)
+    portal(folder / "model.png")
     for demo in ("rollup", "spring"):
         figure = runpy.run_path(str(DEMOS / f"{demo}.py"))["fig"]
         figure.savefig(folder / f"{demo}.png", dpi=150, bbox_inches="tight")

@@ -1,5 +1,6 @@
 """Pictures: what is drawn, without a display."""
 
+import pickle
 import sys
 
 import numpy as np
@@ -7,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 from test_io import affine, bent, turn
 
-from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra, NameUnknown,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, Frame, InputError,
+                        MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.recovery.fields import DRAWN, FIELDS
 from skfem_ancf.visuals.matplotlib import plot_state
 
-STEEL = StVenantKirchhoff(E=1e6, nu=0.3)
+STEEL = StVenantKirchhoff(E=1e6, nu=0.3, density=1.0)
 
 
 def drawn(ax):
@@ -82,6 +83,9 @@ def test_limits_clip_with_arrows(state):
     (dict(limits=1), InputError, "two numbers"),
     (dict(limits=(np.nan, 1)), InputError, "finite"),
     (dict(subdivide=(0, 1)), InputError, "positive integers"),
+    (dict(scale=0), InputError, "scale must be positive"),
+    (dict(scale="large"), InputError, "scale must be a number"),
+    (dict(loads=1), InputError, "loads must be True or False"),
 ])
 def test_bad_options(state, options, error, message):
     with pytest.raises(error, match=message):
@@ -126,3 +130,167 @@ def test_several_states_share_a_picture():
     for wrong in (["x"], [], 0.3, [-1e-3, 0.1]):
         with pytest.raises(InputError, match="times"):
             history.plot(times=wrong)
+
+
+# symbols, and displacements that are magnified
+
+def line(n=8, element=None, **options):
+    return Beam(MeshBeam.init_line(np.linspace(0, 2, n + 1), height=0.1, **options),
+                element or ElementBeamANCF(2), STEEL, width=0.1, name="arm")
+
+
+def marked(ax, kind):
+    """The artists of a kind of symbol."""
+    return ax.findobj(lambda artist: artist.get_gid() == kind)
+
+
+def arrows(ax, kind="force"):
+    """Tail and tip of each arrow; of a moment all points of its arc."""
+    return [np.array(a.get_path().vertices) if a._path_original is None else
+            a._path_original.vertices for a in marked(ax, kind)
+            if type(a).__name__ == "FancyArrowPatch"]
+
+
+def texts(ax, kind=None):
+    return [t.get_text() for t in ax.texts if kind in (None, t.get_gid())]
+
+
+def test_a_scene_is_drawn_before_it_is_solved():
+    scene = (Scene(line()).clamp("left").point_force((0, -2.5), at=(2, 0))
+             .point_force((0, -5), at=(1, 0)).moment("right", -3))
+    ax = scene.plot()
+    (tail, tip), (far, middle) = arrows(ax)
+    assert_allclose([tip, middle], [(2, 0), (1, 0)], atol=1e-12)
+    assert_allclose([tail[0], far[0]], [2, 1], atol=1e-12)
+    assert far[1] > tail[1] > 0.1  # from above, the larger force by the longer arrow
+    arc, = arrows(ax, "moment")
+    assert_allclose(np.hypot(*(arc - [2, 0]).T), np.hypot(*(arc[0] - [2, 0])))
+    turned = np.unwrap(np.arctan2(*(arc - [2, 0]).T[::-1]))
+    assert turned[-1] < turned[0] - np.pi  # clockwise
+    assert texts(ax, "force") == ["2.5", "5"] and texts(ax, "moment") == ["3"]
+    assert not texts(ax, "name") and not marked(ax, "node")
+    support = np.vstack([a.get_xydata() for a in marked(ax, "support")])
+    assert support[:, 0].max() < 1e-9 and abs(support[:, 1]).max() < 0.15
+    ax = scene.plot(names=True, nodes=True, loads=False)
+    assert texts(ax) == ["arm"] and not arrows(ax)
+    assert_allclose(marked(ax, "node")[0].get_xydata()[:, 0], np.linspace(0, 2, 9))
+    low, high = ax.get_xlim()
+    assert low < support[:, 0].min() and high > 2
+
+
+def test_a_force_that_pulls_at_an_end_is_drawn_outside():
+    (tail, tip), = arrows(Scene(line()).clamp("left").point_force((4, 0), at=(2, 0)).plot())
+    assert_allclose(tail, (2, 0), atol=1e-12)
+    assert tip[0] > 2.1
+
+
+def test_distributed_loads_are_rows_of_arrows():
+    ax = Scene(line()).clamp("left").line_load(lambda x: np.array([0 * x[0], -x[0]])).plot()
+    found = np.array(arrows(ax))
+    assert_allclose(found[:, 1], np.stack([found[:, 1, 0], np.zeros(len(found))], 1), atol=1e-12)
+    length = found[:, 0, 1]
+    assert_allclose(length / length.max(), found[:, 1, 0] / 2, atol=1e-12)  # as the load
+    assert len(found) == 8 and texts(ax) == ["2"]
+    below = np.array(arrows(Scene(line()).clamp("left").pressure("bottom", 7.0).plot()))
+    assert len(below) == 9 and np.all(below[:, 0, 1] < below[:, 1, 1] - 0.05)
+    assert_allclose(below[:, 1, 1], -0.05)
+    end = np.array(arrows(Scene(line()).clamp("left").pressure("right", 7.0).plot()))
+    assert_allclose(end[0, :, 1], 0, atol=1e-12)
+    assert end[0, 1, 0] < end[0, 0, 0]
+
+
+def test_follower_loads_turn_with_the_body():
+    beam = line()
+    for scene, start in ((Scene(beam).follower_force((0, -1), at=(2, 0)), (0, -1)),
+                         (Scene(beam).pressure("top", 1.0), (0, -1)),
+                         (Scene(beam).point_force((0, -1), at=(2, 0)), None)):
+        scene.clamp("left")
+        u = affine(beam, turn(0.5)).u
+        found = np.array(arrows(scene.state(u).plot(loads=True)))
+        d = (found[:, 1] - found[:, 0]).T
+        wanted = (0, -1) if start is None else turn(0.5) @ start
+        assert_allclose(d / np.hypot(*d), np.transpose([wanted] * len(found)), atol=1e-9)
+
+
+def test_loads_of_a_state_have_its_load_factor():
+    scene = Scene(line()).clamp("left").point_force((0, -8), at=(2, 0)).gravity((0, -9.81))
+    assert texts(scene.state(load=0.5).plot(loads=True, thickness=1), "force") == ["4"]
+    assert not texts(scene.state(load=0.5).plot(supports=True), "force")
+    assert texts(scene.plot(), "weight") == ["g = 9.81"]
+
+
+@pytest.mark.parametrize("hold, number", [
+    (lambda s: s.clamp("left"), 7), (lambda s: s.clamp("left", thickness="free"), 7),
+    (lambda s: s.pin("left"), 8), (lambda s: s.fix("left", "r^2"), 8),
+    (lambda s: s.fix("left", "r^1").fix("left", "r^2"), 8)])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
+def test_what_is_held_at_one_place_is_one_symbol(hold, number, element):
+    ax = hold(Scene(line(element=element))).plot()
+    assert len(marked(ax, "support")) == number  # a line and six hatches, of a pin a triangle, too
+
+
+def test_joints_springs_masses_bodies_and_obstacles_are_drawn():
+    body = RigidBody(1.0, 1.0, (2, 0), name="bob")
+    beam = line()
+    scene = Scene(beam, body).pin("left", 0).point_mass(3, at=(0.5, 0), beam=0)
+    scene.hinge((0, "right"), (body, (2, 0)))
+    scene.spring(40.0, ((0, (1, 0)), ("ground", (1, 0.5))))
+    scene.torsional_spring(6.0, "left", beam=0).foundation(9.0, beam=0)
+    scene.slider((body, (2, 0)), "ground", (0, 1))
+    scene.obstacle(Circle((0.3, 0.5), 0.2))
+    ax = scene.plot(names=True)
+    assert texts(ax, "mass") == ["m = 3"] and texts(ax, "torsional spring") == ["k = 6"]
+    assert texts(ax, "name") == ["arm", "bob"] and "k = 9" in texts(ax, "foundation")
+    spring = marked(ax, "spring")[0].get_xydata()
+    assert_allclose(spring[[0, -1]], [(1, 0), (1, 0.5)], atol=1e-12)
+    for kind in ("joint", "mass"):
+        at, = (a.get_xydata()[0] for a in marked(ax, kind) if hasattr(a, "get_xydata"))
+        assert_allclose(at, {"joint": (2, 0), "mass": (0.5, 0)}[kind], atol=1e-12)
+    assert len(marked(ax, "slider")) == 3
+    wall = np.vstack([c.get_segments() for c in ax.collections
+                      if len(c.get_paths()) > 20 and hasattr(c, "get_segments")])
+    assert_allclose(np.hypot(*(wall.reshape(-1, 2) - [0.3, 0.5]).T), 0.2)
+
+
+def test_frames_show_what_holds_and_loads_their_nodes():
+    frame = Frame.from_lines([(0, 0), (0, 3), (4, 3), (4, 0)], [(0, 1), (1, 2), (2, 3)], hinges=[2],
+                             nodes={"ground": [0, 3]}, material=STEEL, height=0.2, width=0.1)
+    frame.clamp(0).pin(3).point_force((7, 0), at=1).moment(1, 2.0).line_load((0, -1))
+    ax = frame.plot()
+    assert sorted(texts(ax)) == ["1", "2", "7"]
+    assert len(marked(ax, "support")) == 7 + 8
+    assert_allclose([a.get_xydata()[0] for a in marked(ax, "joint")], [(4, 3)] * 2)
+    assert any(np.allclose(tip, (0, 3)) for _, tip in arrows(ax))
+
+
+def test_scale_magnifies_displacements_and_says_so():
+    scene = Scene(line()).clamp("left").point_force((0, -0.02), at=(2, 0))
+    state = scene.solve_static()
+    one, ten = (drawn(state.plot("S_xx", thickness=1, scale=k)) for k in (1, 10))
+    x, many = (np.array([c._triangulation.x, c._triangulation.y]) for c in (one, ten))
+    start = drawn(scene.state().plot("S_xx", thickness=1))._triangulation
+    start = np.array([start.x, start.y])
+    assert_allclose(many - start, 10 * (x - start), atol=1e-12)
+    assert_allclose(one.get_array(), ten.get_array())  # the field is that of the state
+    assert texts(state.plot(thickness=1, scale=10)) == ["displacements 10 times as large"]
+    ax = state.plot(thickness=1, scale="auto", loads=True)
+    note = texts(ax)[-1]
+    factor = float(note.split()[1])
+    tip = state.displacement((2, 0))
+    assert 0.04 < factor * abs(tip[1]) / 2 < 0.13
+    assert_allclose(arrows(ax)[0][1], (2, 0) + factor * tip, atol=1e-12)
+    large = Scene(line()).clamp("left").point_force((0, -5), at=(2, 0)).solve_static()
+    assert not large.plot(thickness=1, scale="auto").texts
+
+
+def test_zero_is_seen_on_white():
+    image = drawn(Scene(line()).state().plot("S_xx"))
+    assert np.dot(image.to_rgba(0.0)[:3], [0.3, 0.6, 0.1]) < 0.85
+
+
+def test_what_is_wrong_with_a_plot_of_a_scene_is_said():
+    scene = Scene(line()).clamp("left")
+    with pytest.raises(InputError, match="names must be True or False"):
+        scene.plot(names="arm")
+    with pytest.raises(InputError, match=r"scene\.plot\(\)"):
+        pickle.loads(pickle.dumps(scene.state())).plot(loads=True)

@@ -85,6 +85,8 @@ class System:
         Force elements.
     symmetric : bool
         The tangent is symmetric, as all loads and force elements have a potential.
+    items : tuple or None
+        What acts, as it was given, for pictures; None of a copy in another process.
     clock : float or None
         The time at which statics takes functions of time, see :meth:`stopped_at`; None for full
         size of loads.
@@ -124,6 +126,7 @@ class System:
                              f"{domains[0]!r} do not know: give beams KelvinVoigt(time) as their "
                              "damping=, and the scene damping(modal=...) or damping(mass=...)")
         self._rest_modes = rest_modes
+        self.items: tuple[Any, ...] | None = None
         self.clock: float | None = None
         self._varying: list[Any] = []
         self.constant_force = np.zeros(self.N)

@@ -12,6 +12,7 @@ from ..actions.axial import LineLoad
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
+from ..actions.symbols import Symbol, at_node, force_symbol, symbols
 from ..beam.beam import Beam
 from ..beam.kinematics import direction
 from ..beam.layout import WhichBeam, WhichMember
@@ -66,6 +67,20 @@ class NodeMoment(EndMoment):
     def angle(self, u: Array) -> float:
         start = self.beam.q0_local[self.dofs] @ self.c @ [1.0, 1.0j]
         return float(np.angle(self.direction(u) @ [1.0, 1.0j] / start))
+
+
+@symbols.register(NodeForce)
+def _(load, layout):
+    beam = layout.beam(load.beam)
+    for node in chain_ends(beam).ravel()[load.ends].tolist():
+        yield force_symbol([at_node(layout, beam, node)], load.value)
+
+
+@symbols.register(NodeMoment)
+def _(load, layout):
+    beam = layout.beam(load.beam)
+    node = int(chain_ends(beam).ravel()[load.end])
+    yield Symbol("moment", (at_node(layout, beam, node),), value=load.M, show=True)
 
 
 class Frame(Scene):

@@ -33,6 +33,7 @@ from ..results.path import CriticalPoint, Path
 from ..results.state import State
 from ..solvers import continuation, eigen
 from ..visuals.html import scene_html
+from ..visuals.matplotlib import plot_scene
 from .adapt import solve_adaptive
 from .model import Model
 from .plan import Plan, make_plan
@@ -90,6 +91,7 @@ class Scene(Model):
         with self._lock:
             if self._system is None:
                 self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
+                self._system.items = self.items
             return self._system
 
     @property
@@ -311,6 +313,34 @@ class Scene(Model):
                                  "state: give adapt= without start=")
             warn_about(state)
             return state
+
+    def plot(self, ax: Any = None, *, nodes: bool = False, names: bool = False,
+             loads: bool = True, supports: bool = True, thickness: float | str = "auto",
+             title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
+        """Draw the scene before anything is solved: bodies, supports, joints, springs, loads.
+
+        Parameters
+        ----------
+        ax, nodes, names, loads, supports, thickness, title, filename, dpi
+            As for :func:`skfem_ancf.visuals.matplotlib.plot_scene`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1, name="arm")
+        >>> scene = Scene(beam).clamp("left").point_force((0, -2.5), at=(1, 0))
+        >>> [text.get_text() for text in scene.plot(names=True).texts]
+        ['2.5', 'arm']
+        """
+        return plot_scene(self.state(load=0.0), ax, nodes=nodes, names=names, loads=loads,
+                          supports=supports, thickness=thickness, title=title,
+                          filename=filename, dpi=dpi)
 
     def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,
               load: float = 1.0) -> State:

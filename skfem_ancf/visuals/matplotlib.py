@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.obstacles.outlines import AROUND
+from ..actions.obstacles.outlines import AROUND, around
 from ..beam.layout import WhichBeam
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text)
 from ..core.types import StrPath
-from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery
+from .scenery import BODY, GHOST, INK, MUTED, RIGID, WALL, Scenery
+from .symbols import Sketch, symbols_of
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400
@@ -28,7 +29,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
                cmap: Any = None, limits: tuple[float, float] | None = None,
                title: str | None = None, unit: str | None = None,
                subdivide: tuple[int, int] = (16, 8), filename: StrPath | None = None,
-               dpi: float = 200, recover: bool = True) -> Any:
+               dpi: float = 200, recover: bool = True, scale: float | str = 1.0,
+               loads: bool = False, supports: bool = False) -> Any:
     """Draw the deformed body of a state, coloured by a field.
 
     Parameters
@@ -67,6 +69,12 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         made.
     recover
         Recovered strain and stress where the state has them; False for those of the elements.
+    scale
+        Factor by which displacements are drawn larger than they are; the picture says so. "auto":
+        the largest is about 1/10 of the body, or as it is if that is more.
+    loads, supports
+        Draw the symbols of :func:`plot_scene`, of several states those of the last; loads with
+        their values at this load factor or time.
 
     Returns
     -------
@@ -85,15 +93,17 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     Figure, states, cmap = figure_class(), _states(state), colormap(cmap)
     colorbar, unit = require_flag("colorbar", colorbar), require_text("unit", unit)
     filename, dpi = page(ax, title, filename, dpi)
-    scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover)
+    loads, supports = require_flag("loads", loads), require_flag("supports", supports)
+    symbols = symbols_of(states[-1], loads, supports)
+    scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover, scale)
     drawn, values = scenery.field, scenery.found
     if ax is None:
         ax = Figure(figsize=_figsize(scenery.every[:, :2], colorbar),
                     layout="constrained").add_subplot()
     image, _ = paint(ax, scenery, range(len(states)), cmap)
-    ax.set_aspect("equal")
-    ax.margins(AROUND if len(scenery.walls[0]) else 0.04)
-    ax.autoscale_view()
+    if symbols:
+        sketch(ax, scenery, states[-1]).draw(symbols)
+    frame(ax, scenery, bool(symbols))
     dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note)
     if colorbar and image is not None:
         ends = bool(np.any(values < scenery.low)), bool(np.any(values > scenery.high))
@@ -102,8 +112,77 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     return ax
 
 
-def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any) -> tuple[Any, list[Any]]:
-    """Draw frames over each other; returns the coloured image, or None, and all artists."""
+def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool = True,
+               nodes: bool = False, names: bool = False, thickness: float | str = "auto",
+               title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
+    """Draw the bodies of a scene as they are at the start, and what acts on them.
+
+    Parameters
+    ----------
+    state
+        The reference configuration, a :class:`~skfem_ancf.results.State`.
+    loads
+        Draw forces as straight arrows and moments as curved ones, with their values.
+    supports
+        Draw supports, joints, springs, foundations and masses. A clamp is a line with hatching, a
+        pin a triangle, a support of one direction a triangle on a line, a hinge a circle, a weld a
+        square.
+    nodes
+        Draw the nodes of the meshes.
+    names
+        Write the names of beams, bodies and domains, or their numbers.
+    ax, thickness, title, filename, dpi
+        As for :func:`plot_state`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    Figure = figure_class()
+    loads, supports, nodes, names = (require_flag(name, value) for name, value in (
+        ("loads", loads), ("supports", supports), ("nodes", nodes), ("names", names)))
+    filename, dpi = page(ax, title, filename, dpi)
+    scenery = Scenery([state], "displacement", thickness, True, None, (8, 2), False)
+    if ax is None:
+        ax = Figure(figsize=_figsize(scenery.every[:, :2], False),
+                    layout="constrained").add_subplot()
+    paint(ax, scenery, [0], None, BODY)
+    drawn = sketch(ax, scenery, state)
+    drawn.draw(symbols_of(state, loads, supports, 1.0))
+    if nodes:
+        at = np.hstack([np.zeros((2, 0)), *(beam.mesh.p for beam in state.beams)])
+        ax.plot(*at, ".", color=INK, ms=4, zorder=3, gid="node")
+    if names:
+        drawn.names(scenery.names)
+    frame(ax, scenery, True)
+    dress(ax, title, scenery.note)
+    save(ax, filename, dpi=dpi, bbox_inches="tight")
+    return ax
+
+
+def sketch(ax: Any, scenery: Scenery, state: Any) -> Sketch:
+    """What draws symbols at a state as it is drawn, the last of a scenery."""
+    return Sketch(ax, scenery.scale * state.u, scenery.points(-1)[:, :2])
+
+
+def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
+    """Limits of a picture: wide ones have room for symbols, and show obstacles beside the body."""
+    if wide:
+        box, walls = around(scenery.every[:, :2].T), scenery.walls[-1].reshape(-1, 2)
+        near = np.all((walls.T >= box[:, :1]) & (walls.T <= box[:, 1:]), axis=0)
+        room = 0.1 * np.max(np.ptp(box, axis=1)) * np.array([[-1.0], [1.0]])
+        ax.update_datalim(np.vstack([box.mean(axis=1) + room, walls[near]]))
+    ax.set_aspect("equal")
+    ax.margins(AROUND if len(scenery.walls[0]) and not wide else 0.04)
+    ax.autoscale_view()
+
+
+def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any,
+          fill: str | None = None) -> tuple[Any, list[Any]]:
+    """Draw frames over each other; returns the coloured image, or None, and all artists.
+
+    With a colour ``fill`` the reference configuration has it and nothing is coloured by the field.
+    """
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
@@ -114,19 +193,21 @@ def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any) -> tuple[
     image, artists = None, []
     if ghosts:
         artists.append(ax.add_collection(PolyCollection(
-            ghosts, facecolor=GHOST, edgecolor=GHOST, linewidth=0.5, zorder=1), autolim=True))
+            ghosts, color=fill or GHOST, linewidth=0.5, zorder=1), autolim=True))
     if rigid:
         artists.append(ax.add_collection(PolyCollection(
             rigid, facecolor=RIGID, edgecolor=INK, linewidth=0.5, zorder=1.5), autolim=True))
-    if edges:
+    if edges and fill is None:
         points, cells = scenery.beam_points(frames), scenery.cells(frames)
         image = ax.tripcolor(
             Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])),
             np.concatenate([b.values for k in frames for b in scenery.frames[k]]),
             shading="gouraud", cmap=scenery.colours(cmap), vmin=scenery.low, vmax=scenery.high,
             zorder=2)
-        artists += [image, ax.add_collection(LineCollection(edges, colors=INK, linewidths=0.5,
-                                                            zorder=3))]
+        artists.append(image)
+    if edges:
+        artists.append(ax.add_collection(LineCollection(edges, colors=INK, linewidths=0.5,
+                                                        zorder=3)))
     if len(walls):
         artists.append(ax.add_collection(LineCollection(
             walls, colors=WALL, linewidths=1.2, zorder=2.5), autolim=False))

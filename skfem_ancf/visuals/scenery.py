@@ -18,22 +18,30 @@ from ..recovery.grids import Grid, grids, in_space
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
 
+#: ``scale="auto"`` draws the largest displacement at most this part of the body.
+VISIBLE = 0.12
+
+#: Colours of signed fields; a body without any is seen on white.
+SIGNED = "#313695", "#5a91c4", "#ecd27a", "#ee6a41", "#a50026"
+
 #: Colours of lines, of what is less important, of the reference configuration, of bodies and
 #: obstacles.
 INK, MUTED, GHOST, RIGID, WALL = "#222222", "#666666", "#d9d9d9", "#bbbbbb", "#7a5230"
+#: Of bodies in the picture of a scene.
+BODY = "#cfdbe6"
 
 
 class _Body:
     """One beam: reference and deformed place of the points and the axis, and the field."""
 
-    def __init__(self, grid, state, beam, m, field):
+    def __init__(self, grid, state, beam, m, field, scale):
         self.cells, self.height = grid.cells, beam.mesh.height
         # the axis is at eta = 1/2, which is on the grid only if it has an odd number of rows
         axis = values_on_grid(state, beam, np.array([np.linspace(0, 1, m + 1),
                                                      np.full(m + 1, 0.5)]), False)
         flat = (2, beam.mesh.nelements, m + 1)
         x, u = (y.reshape(*flat, grid.rows) for y in (grid.x, grid.u))
-        axis_x, axis_u = (y.reshape(flat) for y in (axis.x, axis.u))
+        axis_x, axis_u = (y.reshape(flat) for y in (axis.x, scale * axis.u))
         self.reference, self.deformed = (x, axis_x), (x + u, axis_x + axis_u)
         self.values = _values(field, grid)
 
@@ -110,6 +118,19 @@ def _thickness(thickness, bodies):
     return float(max(1, factor))
 
 
+def _scale(scale, found):
+    """By what displacements are drawn larger: 1, 2 or 5 times a power of ten for "auto"."""
+    if not (isinstance(scale, str) and scale == "auto"):
+        return require_positive("scale", scale)
+    size = np.max(np.ptp(np.concatenate([grid.x for grid in found], axis=1), axis=1))
+    largest = max(float(np.max(np.hypot(*grid.u))) for grid in found)
+    if not 1e-12 * size < largest < VISIBLE * size:
+        return 1.0
+    wanted = VISIBLE * size / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted * (1 + 1e-9)))
+
+
 def _limits(limits, values, field):
     require_unmasked("limits", limits)
     if limits is not None:
@@ -135,14 +156,17 @@ class Scenery:
     """
 
     def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
-                 limits: Any, subdivide: tuple[int, int], recover: bool) -> None:
+                 limits: Any, subdivide: tuple[int, int], recover: bool,
+                 scale: Any = 1.0) -> None:
         self.field: Field = find_field(field, DRAWN)
         self.undeformed = require_flag("undeformed", undeformed)
         self.frames: list[list[Any]] = []
         self.rigid: list[list[Grid]] = []
-        for state in states:
-            found = grids(state, subdivide, recover=recover)
-            self.frames.append([_Body(grid, state, beam, subdivide[0], self.field)
+        every = [grids(state, subdivide, recover=recover) for state in states]
+        self.scale = _scale(scale, [grid for found in every for grid in found])
+        for state, found in zip(states, every):
+            found = [grid._replace(u=self.scale * grid.u) for grid in found]
+            self.frames.append([_Body(grid, state, beam, subdivide[0], self.field, self.scale)
                                 for grid, beam in zip(found, state.beams)])
             others = [(grid, _coloured(grid, self.field)) for grid in found[len(state.beams):]]
             self.frames[-1] += [solid for _, solid in others if solid is not None]
@@ -151,7 +175,15 @@ class Scenery:
         self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
         self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
         self.low, self.high = _limits(limits, self.found, self.field)
-        self._states = states
+        self._states, self._grids = states, every
+
+    @property
+    def names(self) -> list[tuple[str, Array]]:
+        """Names of the members of the first frame, and a place (2,) of each, of beams on the axis.
+        """
+        return [(grid.name, np.mean(grid.x if grid.rows == 1 else grid.x.reshape(
+            2, -1, grid.rows)[:, grid.x.shape[1] // grid.rows // 4], axis=1))
+            for grid in self._grids[0]]
 
     @cached_property
     def every(self) -> Array:
@@ -211,8 +243,10 @@ class Scenery:
 
     @property
     def note(self) -> str:
-        """What the picture says of the thickness."""
-        return "" if self.factor == 1.0 else f"section drawn {self.factor:g} times as thick"
+        """What the picture says of the thickness and of displacements."""
+        said = [] if self.factor == 1.0 else [f"section drawn {self.factor:g} times as thick"]
+        return ", ".join(said + [f"displacements {self.scale:g} times as large"] * (
+            self.scale != 1.0))
 
     def unit(self, unit: str | None) -> str:
         """What the picture says of the unit, if None is given that of the field; "" for numbers."""
@@ -221,5 +255,8 @@ class Scenery:
 
     def colours(self, cmap: Any) -> Any:
         """The colour map that is given, or for None one that fits the field."""
-        return cmap or ("RdYlBu_r" if self.field.signed else "viridis")
+        from matplotlib.colors import LinearSegmentedColormap
+
+        return cmap or (LinearSegmentedColormap.from_list("signed", SIGNED)
+                        if self.field.signed else "viridis")
 

@@ -1,0 +1,383 @@
+"""What pictures show of items: arrows of loads, symbols of supports, joints and springs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import singledispatch
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..beam.beam import Beam
+from ..beam.domain import Domain
+from ..beam.kinematics import direction_weights, probe_reference
+from ..beam.layout import Layout
+from ..beam.rigid import RigidBody
+from ..core.types import Array
+from ..mesh.places import facets_of
+from .axial import FollowerForce, LineLoad
+from .eigenstrain import EigenStrain
+from .forces import Foundation, PointMass, Spring, TorsionalSpring
+from .forces.springs import end_of
+from .joints import Hinge, Weld
+from .joints.glue import Glue
+from .joints.guides import OnCircle, OnLine
+from .joints.nodes import Nodes
+from .joints.plane_section import PlaneSection
+from .joints.prescribed import PrescribedAngle, PrescribedPosition
+from .joints.settlements import HELD
+from .joints.sliders import Sleeve, Slot
+from .loads import DeadLoad, EndMoment, Load, PointForce, Pressure, Traction, Weight
+from .places import Vector, is_ground, named_place, point, section
+from .supports import Support
+
+#: Arrows of a distributed load on one chain of elements or one side, and on one beam, at most.
+ARROWS, MOST = 9, 200
+
+#: Kinds of symbols that are loads; "support", "joint", "slider", "spring", "foundation",
+#: "torsional spring" and "mass" are not.
+LOADS = "force", "moment", "weight"
+
+
+class Symbol(NamedTuple):
+    """One symbol of an item in a picture.
+
+    Attributes
+    ----------
+    kind
+        "force", "moment", "weight", "support", "joint", "slider", "spring", "torsional spring",
+        "foundation" or "mass".
+    at
+        Its places, n vectors that follow the degrees of freedom: two ends of a spring, several
+        arrows of a distributed load, one of others.
+    direction
+        At each place: of a force that of the largest size 1, of a support away from the body, of
+        a slider along its line; shape (n, 2).
+    value
+        Largest force, moment or mass, by which the direction is multiplied; 1 of others.
+    text
+        What stands before the value, or beside the symbol; of a support what is held, as "x y".
+    turn
+        Vectors with which the directions turn, n or none.
+    show
+        The value is written.
+    """
+
+    kind: str
+    at: tuple[Vector, ...]
+    direction: Any = ((0.0, 0.0),)
+    value: float = 1.0
+    text: str = ""
+    turn: tuple[Vector, ...] = ()
+    show: bool = False
+
+
+def all_symbols(items: Iterable[Any], layout: Layout, load: float = 1.0,
+                t: float | None = None) -> list[Symbol]:
+    """The symbols of items, loads times their factors.
+
+    Parameters
+    ----------
+    items, layout
+        Items as they were given, and the Layout of the scene.
+    load, t
+        The load factor, and the time of a motion or None.
+    """
+    out = []
+    for item in items:
+        for one in item.expand(layout):
+            factor = one.factor(t) * (load if one.scaled else 1.0) if isinstance(one, Load) else 1.0
+            out += [s._replace(value=s.value * factor) if s.kind in LOADS else s
+                    for s in symbols(one, layout)]
+    return out
+
+
+@singledispatch
+def symbols(item: Any, layout: Layout) -> Iterable[Symbol]:
+    """The symbols of an item, none by default; ``@symbols.register`` adds a class.
+
+    Parameters
+    ----------
+    item
+        An item with its beam by number, as ``expand`` returns it.
+    layout
+        The Layout of the scene.
+    """
+    return ()
+
+
+def force_symbol(at: Iterable[Vector], force: Any, turn: Iterable[Vector] = (),
+                 show: bool = True) -> Symbol:
+    """Arrows of forces (n, 2) at n places, with the largest as the value."""
+    force = np.reshape(force, (-1, 2))
+    size = float(np.max(np.hypot(*force.T), initial=0.0))
+    return Symbol("force", tuple(at), force / (size or 1.0), size, "", tuple(turn), show)
+
+
+def at_node(layout: Layout, beam: Beam, node: int) -> Vector:
+    """The position of the axis at a node of a beam."""
+    first = layout.offset(beam) + node * beam.nd
+    return Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1))
+
+
+def _inside(layout: Layout, beam: Any, e: int, xi: float, eta: float = 0.5) -> Vector:
+    """The position of a point of an element; of a cable of its axis."""
+    X = np.array([xi, eta if beam.has_sections else 0.5])
+    dofs, weights = probe_reference(beam, e, X)
+    start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+    return Vector(start, dofs + layout.offset(beam), weights)
+
+
+def _tangent(beam: Any, e: int, xi: float) -> Array:
+    """The unit tangent of the axis at a place of an element."""
+    tangent = beam.mesh.mapping().DF(np.array([[xi], [0.5]]), np.array([e]))[:, 0, 0, 0]
+    return np.asarray(tangent / np.hypot(*tangent))
+
+
+def _turning(layout: Layout, beam: Any, e: int, xi: float) -> Vector:
+    """The direction of the section at a place of an element."""
+    dofs, _ = probe_reference(beam, e, np.array([xi, 0.5]))
+    weights = direction_weights(beam, e, xi)
+    return Vector(beam.q0_local[dofs] @ weights, dofs + layout.offset(beam), weights)
+
+
+def _along(elements: Array, n: int) -> list[tuple[int, float]]:
+    """Elements and xi of n places along a run of elements."""
+    s = np.linspace(0, len(elements), n)
+    k = np.minimum(s.astype(int), len(elements) - 1)
+    return list(zip(np.asarray(elements)[k].tolist(), (s - k).tolist()))
+
+
+def _sides(beam: Any, boundary: Any) -> list[tuple[list[tuple[int, float]], float]]:
+    """Places along the loaded faces, with their eta, and sections, with eta = 1/2."""
+    n, ne = beam.mesh.p.shape[1], beam.mesh.nelements
+    facets = np.sort(np.asarray(facets_of(beam.mesh, boundary)))
+    out = [([(int(e[0]), xi)], 0.5) for node in facets[facets < n] for e, xi in (
+        (np.flatnonzero(beam.mesh.t[0] == node), 0.0), (np.flatnonzero(beam.mesh.t[1] == node), 1.0)
+    ) if len(e)]
+    for side in (0, 1):
+        found = facets[(facets >= n + side * ne) & (facets < n + (side + 1) * ne)] - n - side * ne
+        runs = [run for run in np.split(found, np.flatnonzero(
+            (np.diff(found) > 1) | (np.diff(beam.mesh.chains[found]) != 0)) + 1) if len(run)]
+        out += [(_along(run, _number(runs)), float(side)) for run in runs]
+    return out
+
+
+def _number(runs):
+    return int(np.clip(MOST // len(runs), 2, ARROWS))
+
+
+def _values(function, x):
+    """A constant (2,) or a function of points at points (2, n), as (n, 2)."""
+    found = function(x) if callable(function) else np.reshape(function, (2, 1))
+    return np.broadcast_to(found, x.shape).T
+
+
+# loads
+
+@symbols.register(Load)
+def _(load, layout):
+    beam = layout.beam(load.beam)  # of one's own, or a form: its forces on the nodes
+    if not isinstance(beam, Beam) or isinstance(load, EigenStrain):
+        return
+    given = load if isinstance(load, DeadLoad) else load.bind(beam)
+    force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]
+    loaded = np.flatnonzero(np.hypot(*force.T) > 1e-9 * np.abs(force).max())
+    some = loaded[np.unique(np.linspace(0, len(loaded) - 1, 2 * ARROWS).astype(int))] if len(
+        loaded) else loaded
+    if len(some):
+        yield force_symbol((at_node(layout, beam, k) for k in some), force[some], show=False)
+
+
+@symbols.register(Weight)
+def _(load, layout):
+    member = layout.beam(load.beam)
+    at = (_inside(layout, member, *_along(np.arange(member.mesh.nelements), 3)[1]) if isinstance(
+        member, Beam) else point(layout, member, None) if isinstance(member, RigidBody) else
+        Vector(np.mean(member.basis.mesh.p, axis=1)))
+    yield force_symbol([at], load.g)._replace(kind="weight", text="g = ")
+
+
+@symbols.register(PointForce)
+def _(load, layout):
+    yield force_symbol([point(layout, load.beam, load.at)], load.total)
+
+
+@symbols.register(FollowerForce)
+def _(load, layout):
+    yield force_symbol([point(layout, load.beam, load.at)], load.total,
+                       [section(layout, load.beam, load.at)[1]])
+
+
+@symbols.register(LineLoad)
+def _(load, layout):
+    beam = layout.beam(load.beam)
+    chains = np.unique(beam.mesh.chains) if load.chains is None else load.chains
+    for k, chain in enumerate(chains):
+        at = [_inside(layout, beam, *place) for place in _along(
+            np.flatnonzero(beam.mesh.chains == chain), _number(chains))]
+        yield force_symbol(at, _values(load.per_length, np.array([a.start for a in at]).T),
+                           show=k == 0)
+
+
+@symbols.register(Traction)
+def _(load, layout):
+    beam = layout.beam(load.beam)
+    for places, eta in _sides(beam, load.boundary):
+        at = [_inside(layout, beam, *place, eta) for place in places]
+        yield force_symbol(at, _values(load.t, np.array([a.start for a in at]).T))
+
+
+@symbols.register(Pressure)
+def _(load, layout):
+    beam = layout.beam(load.beam)
+    for places, eta in _sides(beam, load.boundary):
+        force = []
+        for e, xi in places:
+            tx, ty = _tangent(beam, e, xi)
+            force.append(load.p * (np.array([tx, ty]) * (1 if xi == 0 else -1) if eta == 0.5 else
+                                   np.array([ty, -tx]) * (2 * eta - 1)))
+        yield force_symbol([_inside(layout, beam, *place, eta) for place in places], force,
+                           [_turning(layout, beam, *place) for place in places])._replace(
+                               text="p = ")
+
+
+@symbols.register(EndMoment)
+def _(load, layout):
+    yield Symbol("moment", (section(layout, load.beam, load.boundary)[0],), value=load.M, show=True)
+
+
+# supports and joints
+
+def _outward(beam: Beam, node: int) -> Array:
+    """At an end of a chain along the axis, away from it; else below the axis."""
+    left, right = (bool(np.any(beam.mesh.t[k] == node)) for k in (0, 1))
+    tangent = beam.mesh.p_X[:, node]
+    return -beam.mesh.p_Y[:, node] if left and right else -tangent if left else tangent
+
+
+@symbols.register(Support)
+def _(support, layout):
+    member = layout.beam(support.beam)
+    dofs = member.dofs(support.boundary, support.names)
+    if isinstance(member, RigidBody):
+        at = None if support.boundary is member else support.boundary
+        yield _support([point(layout, member, at)], "x y angle" if len(dofs) == 4 else "x y")
+    elif isinstance(member, Domain):
+        yield _support([section(layout, member, support.boundary)[0]], "x y angle")
+    else:
+        for node in np.unique(dofs // member.nd).tolist():
+            own = dofs[dofs // member.nd == node] % member.nd
+            held = " ".join(name for name, found in (
+                ("x", 0 in own), ("y", 1 in own), ("angle", np.any(own > 1))) if found)
+            yield _support([at_node(layout, member, node)], held, _outward(member, node))
+
+
+def _support(at, held, direction=(0.0, -1.0)):
+    return Symbol("support", tuple(at), (tuple(direction),), text=held)
+
+
+@symbols.register(PlaneSection)
+@symbols.register(PrescribedAngle)
+def _(joint, layout):
+    yield _support([section(layout, joint.beam, joint.at)[0]], "angle")
+
+
+@symbols.register(PrescribedPosition)
+def _(joint, layout):
+    yield _support([point(layout, joint.beam, joint.at)], "x y")
+
+
+@symbols.register(Hinge)
+@symbols.register(Weld)
+def _(joint, layout):
+    weld = isinstance(joint, Weld)
+    at = [(section(layout, b, a)[0] if weld else point(layout, b, a))
+          for b, a in zip(joint.beams, joint.at) if not is_ground(b)]
+    if any(map(is_ground, joint.beams)):
+        yield _support(at[:1], "x y angle" if weld else "x y")
+    else:
+        yield Symbol("joint", tuple(at[:1]), text="weld" if weld else "hinge")
+
+
+@symbols.register(Glue)
+def _(joint, layout):
+    yield Symbol("joint", (section(layout, joint.domain, joint.boundary)[0],), text="weld")
+
+
+@symbols.register(OnLine)
+def _(joint, layout):
+    yield Symbol("slider", (point(layout, joint.beam, joint.at),),
+                 ((joint.normal[1], -joint.normal[0]),))
+
+
+@symbols.register(OnCircle)
+def _(joint, layout):
+    at = point(layout, joint.beam, joint.at)
+    x, y = at.start - joint.center
+    yield Symbol("slider", (at,), ((-y, x) / np.hypot(x, y),))
+
+
+@symbols.register(Sleeve)
+@symbols.register(Slot)
+def _(joint, layout):
+    at = point(layout, *named_place(layout, joint.at))
+    if isinstance(joint, Slot):
+        along = joint.direction
+    else:
+        beam = layout.beam(joint.on)
+        e, X, *_ = beam.finder.find(at.start[:, None])
+        along = _tangent(beam, int(e[0]), float(X[0, 0]))
+    yield Symbol("slider", (at,), (along,))
+
+
+@symbols.register(Nodes)
+def _(joint, layout):
+    bound, several = joint._thawed(), np.bincount(joint.nodes) > 1
+    bound.bind(layout)
+
+    def place(end: int) -> Vector:
+        return Vector(joint.net.points[:, bound.nodes[end]], bound.positions[end][:, None],
+                      np.ones(1))
+
+    for end in bound.leaders:
+        held = [name for name, one in zip(HELD, bound.held[bound.nodes[end]]) if one]
+        if held:
+            yield _support([place(end)], " ".join(held))
+    for end in np.flatnonzero(bound.hinged & several[bound.nodes]):
+        yield Symbol("joint", (place(end),), text="hinge")
+
+
+# force elements
+
+@symbols.register(Spring)
+def _(spring, layout):
+    yield Symbol("spring", tuple(end_of(layout, place) for place in spring.between),
+                 text=_stiffness(spring.k))
+
+
+@symbols.register(TorsionalSpring)
+def _(spring, layout):
+    yield Symbol("torsional spring", (section(layout, spring.beam, spring.at)[0],),
+                 text=_stiffness(spring.k))
+
+
+def _stiffness(k):
+    return f"k = {float(k):.6g}" if isinstance(k, float) else "k(s)"
+
+
+@symbols.register(PointMass)
+def _(mass, layout):
+    yield Symbol("mass", (point(layout, mass.beam, mass.at),), text="m = ", value=mass.mass,
+                 show=True)
+
+
+@symbols.register(Foundation)
+def _(foundation, layout):
+    beam = layout.beam(foundation.beam)
+    for places, eta in _sides(beam, foundation.side):
+        for k, (e, xi) in enumerate(places):
+            tx, ty = _tangent(beam, e, xi)
+            yield Symbol("foundation", (_inside(layout, beam, e, xi, eta),),
+                         (np.array([-ty, tx]) * (2 * eta - 1),),
+                         text=_stiffness(foundation.k) if k == len(places) // 2 else "")

@@ -1,0 +1,238 @@
+"""Symbols of loads, supports, joints and springs in a picture of matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ..actions.places import Vector
+from ..actions.symbols import LOADS, Symbol, all_symbols
+from ..beam.layout import Layout
+from ..core.errors import InputError
+from ..core.types import Array
+from .scenery import INK, MUTED
+
+#: Colours of loads and of what holds.
+LOAD, HOLD = "#b3261e", "#1f5f8b"
+#: Sizes of symbols relative to the picture: arrows, those of distributed loads, others.
+ARROW, SPREAD, SIZE = 0.13, 0.07, 0.03
+
+
+def symbols_of(state: Any, loads: bool, supports: bool, load: float | None = None) -> list[Symbol]:
+    """The loads, and the supports, joints, springs and masses, of the scene of a state.
+
+    ``load`` is a load factor in place of the state's.
+    """
+    if not (loads or supports):
+        return []
+    system: Any = getattr(state, "system", None)
+    if getattr(system, "items", None) is None:
+        raise InputError("this state does not know the items of its scene, as it comes from another"
+                         " process or a file: draw them by scene.plot()")
+    found = all_symbols(system.items, Layout(*system.members),
+                        state.load if load is None else load, state.t)
+    return [s for s in found if (loads if s.kind in LOADS else supports)]
+
+
+class Sketch:
+    """Draws symbols on matplotlib Axes; each artist has the kind of its symbol as its gid.
+
+    Parameters
+    ----------
+    ax
+        The Axes.
+    u
+        Displacement of the degrees of freedom as it is drawn, shape (N,).
+    points
+        Points of the bodies as they are drawn, shape (n, 2).
+    """
+
+    def __init__(self, ax: Any, u: Array, points: Array) -> None:
+        self.ax, self.u, self.points = ax, u, points
+        self.size = float(np.max(np.ptp(points, axis=0)))
+
+    def draw(self, symbols: Iterable[Symbol]) -> None:
+        """Draw symbols, what is held at one place together."""
+        one: dict[Any, Symbol] = {}
+        symbols = list(symbols)
+        for s in symbols:  # what is drawn once
+            if s.kind == "support":
+                place = tuple(np.round(s.at[0].start / self.size, 6) + 0.0)
+                before = one.get(place)
+                one[place] = s if before is None else max(before, s, key=_ends)._replace(
+                    text=f"{before.text} {s.text}")
+            elif s.kind == "weight":
+                one[tuple(s.direction[0]), s.value] = s
+        largest = max((abs(s.value) for s in symbols if s.kind == "force" and len(s.at) == 1),
+                      default=1.0) or 1.0
+        for s in [*one.values(), *(s for s in symbols if s.kind not in ("support", "weight"))]:
+            at = np.array([place(self.u) for place in s.at])
+            if s.kind in LOADS and not s.value:
+                continue
+            getattr(self, "_" + s.kind.replace(" ", "_"))(s, at, largest)
+
+    def names(self, places: Iterable[tuple[str, Array]]) -> None:
+        """Write names beside places (2,)."""
+        for name, at in places:
+            self._text(name, at, (1, -1), INK, "name", 10, style="italic")
+
+    # loads
+
+    def _force(self, s, at, largest):
+        d = np.array(s.direction)
+        for k, turn in enumerate(s.turn):
+            now, start = (x @ [1, 1j] for x in (turn(self.u), turn.start))
+            d[k] = _pair(d[k] @ [1, 1j] * now / start * abs(start / now))
+        length = np.sign(s.value) * self.size * (
+            SPREAD if len(at) > 1 else ARROW * (0.5 + 0.5 * abs(s.value) / largest))
+        tips, tails = at, at - length * d
+        out = at + length * d
+        if len(at) == 1 and self._room(out[0]) > 1.2 * self._room(tails[0]):
+            tips, tails = out, at
+        for tip, tail in zip(tips, tails):
+            if np.hypot(*(tip - tail)) > 0.005 * self.size:
+                self._arrow(tail, tip, kind=s.kind)
+        if len(at) > 1:
+            self._line(tails, s.kind, LOAD, 0.8)
+        if s.show:
+            sizes = np.hypot(*d.T)
+            k = len(at) // 2 if np.ptp(sizes) < 1e-9 else int(np.argmax(sizes))
+            free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
+            self._text(f"{s.text}{abs(s.value):.6g}", free, free - other, LOAD, s.kind)
+
+    def _weight(self, s, at, largest):
+        """One arrow to the right of the picture, for all members of one gravity."""
+        foot = np.max(self.points, axis=0) + [0.2 * self.size, 0.0]
+        tip = foot + ARROW * self.size * np.array(s.direction[0]) * np.sign(s.value)
+        self._arrow(foot, tip, kind=s.kind, color=MUTED)
+        self._text(f"{s.text}{abs(s.value):.6g}", tip, tip - foot, MUTED, s.kind)
+
+    def _moment(self, s, at, largest):
+        angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
+        arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
+        self._arrow(*arc, kind=s.kind)
+        self._beside(f"{abs(s.value):.6g}", at[0], LOAD, s.kind)
+
+    def _beside(self, text, at, color, kind):
+        """Write in that corner about a place that is farthest from the bodies."""
+        r = 1.1 * SIZE * self.size
+        away = max([(1, 1), (-1, 1), (1, -1), (-1, -1)],
+                   key=lambda d: round(self._room(at + 3 * r * np.array(d)) / r, 3))
+        self._text(text, at + r * np.array(away), away, color, kind)
+
+    def _room(self, point):
+        return float(np.min(np.hypot(*(self.points - point).T)))
+
+    # what holds
+
+    def _support(self, s, at, largest):
+        held, p, r = set(s.text.split()), at[0], SIZE * self.size
+        d = np.array(s.direction[0])
+        if not {"x", "y"} <= held or "angle" not in held:  # upright
+            d = np.array([np.sign(d[0]) or -1.0, 0.0]) if held == {"x"} else (
+                np.array([0.0, 1.0 if d[1] > 0.7 else -1.0]))
+        across = np.array([-d[1], d[0]])
+        base = p
+        if not held & {"x", "y"}:
+            return self._mark("s", p, s.kind)
+        if not {"x", "y", "angle"} <= held:
+            base = p + 1.5 * r * d
+            self._line([p, base + 0.8 * r * across, base - 0.8 * r * across, p], s.kind)
+            if not {"x", "y"} <= held:
+                base = base + 0.4 * r * d
+        self._ground(base, d, max(1.2 * r, 1.3 * self._half(p, across) * (base is p)), s.kind)
+
+    def _ground(self, foot, d, wide, kind):
+        """A line across d with hatching behind it."""
+        across, r = np.array([-d[1], d[0]]), SIZE * self.size
+        self._line([foot - wide * across, foot + wide * across], kind)
+        for k in np.linspace(-wide, 0.8 * wide, 6):
+            at = foot + k * across
+            self._line([at, at + 0.45 * r * (d - across)], kind, HOLD, 0.8)
+
+    def _half(self, p, across):
+        """Half of the height of the section that is drawn at a point."""
+        off = self.points - p
+        near = np.abs(off @ [-across[1], across[0]]) < 0.002 * self.size
+        far = np.abs(off[near] @ across)
+        return float(np.max(far[far < 0.2 * self.size], initial=0.0))
+
+    def _joint(self, s, at, largest):
+        self._mark("o" if s.text == "hinge" else "s", at[0], s.kind)
+
+    def _slider(self, s, at, largest):
+        d, r = np.array(s.direction[0]), SIZE * self.size
+        for side in (-0.6, 0.6):
+            foot = at[0] + side * r * np.array([-d[1], d[0]])
+            self._line([foot - 1.5 * r * d, foot + 1.5 * r * d], s.kind)
+        self._mark("o", at[0], s.kind)
+
+    def _spring(self, s, at, largest):
+        a, b = at
+        along, r = b - a, 0.5 * SIZE * self.size
+        length = np.hypot(*along)
+        if length > 0:
+            across = np.array([-along[1], along[0]]) / length
+            x = np.array([0, 0.2, *np.linspace(0.25, 0.75, 8), 0.8, 1])
+            y = np.array([0, 0, *np.tile([1, -1], 4), 0, 0])
+            self._line(a + np.outer(x, along) + r * np.outer(y, across), s.kind)
+            for place, end, way in zip(s.at, at, (-along, along)):
+                if not place.dofs.size:
+                    self._ground(end, way / length, 1.2 * r, s.kind)
+            if s.text:
+                self._text(s.text, 0.5 * (a + b) + r * across, across, HOLD, s.kind)
+
+    def _foundation(self, s, at, largest):
+        foot = at[0] + 2 * SIZE * self.size * np.array(s.direction[0])
+        self._spring(s._replace(at=(s.at[0], Vector(foot))), [at[0], foot], largest)
+
+    def _torsional_spring(self, s, at, largest):
+        angle = np.linspace(0, 4 * np.pi, 60)
+        spiral = SIZE * self.size * angle / angle[-1] * [np.cos(angle), np.sin(angle)]
+        self._line(at[0] + spiral.T, s.kind)
+        self._beside(s.text, at[0], HOLD, s.kind)
+
+    def _mass(self, s, at, largest):
+        self._mark("o", at[0], s.kind, INK)
+        self._beside(f"{s.text}{s.value:.6g}", at[0], INK, s.kind)
+
+    # artists
+
+    def _arrow(self, *points, kind, color=LOAD):
+        from matplotlib.patches import FancyArrowPatch
+        from matplotlib.path import Path
+
+        self.ax.add_patch(FancyArrowPatch(
+            path=Path(points), arrowstyle="-|>", mutation_scale=9, color=color, lw=1.2, zorder=5,
+            gid=kind))
+        self.ax.update_datalim(points)
+
+    def _line(self, points, kind, color=HOLD, lw=1.2):
+        self.ax.plot(*np.transpose(points), color=color, lw=lw, zorder=4, gid=kind,
+                     solid_capstyle="round")
+
+    def _mark(self, marker, at, kind, face="white"):
+        self.ax.plot(*at, marker, mfc=face, mec=HOLD, ms=6, mew=1.2, zorder=6, gid=kind)
+
+    def _text(self, text, at, away, color, kind, far=4, **options):
+        from matplotlib.patheffects import withStroke
+
+        x, y = np.array(away) / (np.hypot(*away) or 1.0)
+        width = SIZE * (0.5 + 0.4 * len(text))  # of the text, about
+        self.ax.update_datalim([at + self.size * np.array([width * x, SIZE * y])])
+        self.ax.annotate(
+            text, at, (far * x, far * y), textcoords="offset points", fontsize=8, color=color,
+            gid=kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],
+            ha="left" if x > 0.4 else "right" if x < -0.4 else "center",
+            va="bottom" if y > 0.4 else "top" if y < -0.4 else "center", **options)
+
+
+def _ends(s):
+    """Of two supports that which knows where the body is."""
+    return tuple(s.direction[0]) != (0.0, -1.0)
+
+
+def _pair(z):
+    return np.array([z.real, z.imag])
