@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from skfem import Basis, BilinearForm, ElementVector, LinearForm
@@ -15,14 +17,8 @@ from ..core.errors import (AncfError, CallbackError, InputError, MeshError, Name
                            require_finite, require_label, require_slope, shown)
 from ..core.immutable import Immutable, read_only
 from ..core.quadrature import gauss
+from ..core.types import Array
 from ..mesh.places import as_point, is_point
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
 
 #: Gauss points of the way from rest along which the residual works, and of that in a time step.
 WORK, STEP = 6, 3

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..actions.forces.turns import Turns
+from ..actions.joints.base import Joint
+from ..beam.layout import WhichBeam, WhichMember
 from ..beam.points import require_body
 from ..core.errors import InputError, require_finite, require_index, require_path, shown
+from ..core.types import Array, Place, StrPath
 from ..equations.momentum import angular_momentum, momentum
-from ..recovery.resultants import over_time
+from ..equations.system import System
+from ..recovery.resultants import Resultants, over_time
 from ..results.points import MaterialPoints
 from ..results.state import Reaction, State
-from .base import Motion
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from numpy.typing import ArrayLike
-
-    from ..actions.joints.base import Joint
-    from ..beam.layout import WhichBeam, WhichMember
-    from ..core.types import Array, Place, StrPath
-    from ..equations.system import System
-    from ..recovery.resultants import Resultants
-    from .base import Scheme
-    from .sensors import Readings
+from .base import Motion, Scheme
+from .sensors import Readings
 
 #: What is stored of a Motion.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS, Inertia
-
-if TYPE_CHECKING:
-    from ..core.types import Array
+from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from itertools import accumulate, count, pairwise
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from scipy import sparse
 
+from ..actions.forces.base import ForceElement
 from ..actions.forces.domain import DomainForce
-from ..actions.forces.system import Forces
 from ..actions.forces.kernels import add_resisting_force
+from ..actions.forces.system import Forces
+from ..actions.joints.base import Joint
 from ..actions.joints.director import UnitDirector
+from ..actions.loads import EndMoment, Load
+from ..beam.beam import Beam
+from ..beam.domain import Domain
 from ..beam.kinematics import folded
 from ..beam.points import Points
+from ..beam.rigid import RigidBody
 from ..core.errors import InputError
 from ..core.linalg import BandMatrix
+from ..core.types import Array
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
 from .backend import Backend
@@ -26,17 +34,6 @@ from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .linear_solver import LinearSolver
 from .mass_solver import MassSolver, ModalDamping
 from .scales import Scales
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from ..actions.forces.base import ForceElement
-    from ..actions.joints.base import Joint
-    from ..actions.loads import EndMoment, Load
-    from ..beam.beam import Beam
-    from ..beam.domain import Domain
-    from ..beam.rigid import RigidBody
-    from ..core.types import Array
 
 
 class System:

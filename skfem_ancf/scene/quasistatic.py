@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..actions.forces.turns import Turns
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown,
-                           require_finite, require_flag, require_integer, require_positive)
+from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, require_finite,
+                           require_flag, require_integer, require_positive)
 from ..core.progress import progress_bar
 from ..core.steps import Steps
 from ..core.switch import expecting
+from ..core.types import Array
+from ..dynamics.base import Motion, Scheme
+from ..dynamics.history import COLUMNS, History, state_of
+from ..dynamics.sensors import Recorder, Sensor
+from ..equations.system import System
 from ..results.arguments import displacement
+from ..results.state import State
 from ..solvers.newton import Steps as Rules
 from ..solvers.outcome import StaticResult, StepFailed
 from ..solvers.quasistatic import JUMPED, Instant, follow
-from ..dynamics.base import Motion, Scheme
-from ..dynamics.history import COLUMNS, History, state_of
-from ..dynamics.sensors import Recorder
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from ..core.types import Array
-    from ..equations.system import System
-    from ..results.state import State
-    from ..dynamics.sensors import Sensor
 
 logger = logging.getLogger(__name__)
 

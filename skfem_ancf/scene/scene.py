@@ -23,7 +23,6 @@ from ..dynamics.checkpoint import resume
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
-from .quasistatic import StepHistory, run
 from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import SceneMatrices, matrices_of
 from ..equations.system import System
@@ -37,6 +36,7 @@ from ..visuals.matplotlib import plot_scene
 from .adapt import solve_adaptive
 from .model import Model
 from .plan import Plan, make_plan
+from .quasistatic import StepHistory, run
 from .solve import critical_of, solve_linear, solve_static, system_of, velocity_of, warn_about
 
 if TYPE_CHECKING:
