@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
@@ -21,6 +22,7 @@ from ..core.types import Array, TimeFunction
 from ..mesh.places import as_point
 from .item import Item
 from .loads import DeadLoad, Load, number_at
+from .moving import MovingLineLoad
 
 
 class FollowerForce(Load):
@@ -114,7 +116,7 @@ class LineLoad(Load):
     ----------
     force
         Force per length, shape (2,), or a function of the points x (2, ...) of the stress-free
-        axis that returns (2, ...).
+        axis that returns (2, ...); or of x and the time.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
@@ -128,6 +130,12 @@ class LineLoad(Load):
         self.per_length = force if callable(force) else require_finite("force", force, (2,))
 
     def bind(self, beam: Beam) -> Load:
+        in_time: Any = self.per_length
+        if _takes_time(in_time):
+            def made(force: Callable[[Array], Array]) -> Load:
+                return self._with(per_length=force, amplitude=None).bind(beam)
+
+            return MovingLineLoad(beam, made, in_time, self.amplitude)
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         xi, w = gauss(beam.element.axis_degree + 5)
         X = np.array([xi, 0.5 + 0.0 * xi])
@@ -143,3 +151,15 @@ class LineLoad(Load):
         spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,
                                          values * (lengths / w)),))
         return DeadLoad(beam, vector, self.amplitude, spread)
+
+
+def _takes_time(force):
+    """True of a function that needs two arguments, x and the time."""
+    if not callable(force):
+        return False
+    try:
+        parameters = inspect.signature(force).parameters.values()
+    except (TypeError, ValueError):  # of a built-in function
+        return False
+    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+               for p in parameters) == 2

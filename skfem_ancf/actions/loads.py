@@ -17,7 +17,6 @@ from scipy import sparse
 from ..beam.beam import Beam
 from ..beam.distribution import Spread, on_facets, stations_of_vector
 from ..beam.domain import Domain
-from ..beam.kinematics import locate, probe
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction
 from ..beam.layout import Layout, WhichBeam, WhichMember
@@ -294,45 +293,6 @@ class Weight(Load):
     def bind(self, beam: Beam | RigidBody) -> Load:
         spread = Spread(gravity=self.g) if isinstance(beam, Beam) else None
         return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)._with(g=self.g)
-
-
-class PointForce(Load):
-    """A dead force on a material point.
-
-    Parameters
-    ----------
-    force
-        The force, shape (2,).
-    at
-        The point: its place (x, y) in the reference configuration, shape (2,), or "right" for the
-        axis at that end; of a rigid body also None, for its centre of mass.
-    beam
-        The beam, its name or its number, where several have the point; or a RigidBody.
-    amplitude
-        A function of time by which the force is multiplied in a motion.
-    """
-
-    for_bodies = for_domains = True
-
-    def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
-                 amplitude: TimeFunction = None) -> None:
-        at, beam = on_body(at, beam)
-        super().__init__(beam, amplitude)
-        self.total, self.at = require_finite("force", force, (2,)), at
-
-    def expand(self, layout: Layout) -> Sequence[Item]:
-        return (self._with(beam=number_at(layout, self.at, self.beam)),)
-
-    def bind(self, beam: Beam | RigidBody) -> Load:
-        vector = np.zeros(beam.N)
-        if not isinstance(beam, Beam):
-            dofs, weights = beam.probe(self.at)
-            np.add.at(vector, dofs, self.total[:, None] * weights)
-            return DeadLoad(beam, vector, self.amplitude)
-        e, X = locate(beam, self.at)
-        dofs, weights = probe(beam, self.at, (e, X))
-        vector[dofs] = self.total[:, None] * weights  # those of an element, each once
-        return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
 
 
 def number_at(layout: Layout, at: Any, beam: Any) -> int:

@@ -20,7 +20,8 @@ from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass
 from ..actions.item import Item
 from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
 from ..actions.joints.sliders import slider
-from ..actions.loads import EndMoment, Load, PointForce, Pressure, Traction, Weight
+from ..actions.loads import EndMoment, Load, Pressure, Traction, Weight
+from ..actions.point_force import PointForce
 from ..actions.obstacles import Obstacle
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support

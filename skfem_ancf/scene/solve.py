@@ -10,7 +10,8 @@ import numpy as np
 from ..actions.forces import PointMass
 from ..actions.forces.base import ForceElement
 from ..actions.joints import Joint
-from ..actions.loads import Load, PointForce, bind_load
+from ..actions.loads import Load, bind_load
+from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..beam.masses import projected

@@ -1,0 +1,198 @@
+"""Loads whose place depends on time: a force that moves along a beam, and a train of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..beam.beam import Beam
+from ..beam.distribution import Spread
+from ..beam.kinematics import locate, probe_reference
+from ..beam.layout import WhichBeam
+from ..core.errors import (InputError, ask_array, require_finite, require_finite_scalar,
+                           require_positive)
+from ..core.types import Array, TimeFunction
+from .loads import Load
+
+_NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
+
+
+class TimedLoad(Load):
+    """A force that depends on time and not on the displacement.
+
+    A subclass defines :meth:`at`. In statics, where time is the load factor, the load is that of
+    the time 1; in :meth:`skfem_ancf.Scene.run` and in motions that of the time.
+    """
+
+    constant = False
+    # of the load at a time
+    _time: float | None = None
+    _vector: Any = None
+    _spread: Any = None
+    _last: Any = None
+
+    def at(self, t: float) -> tuple[Array, Spread]:
+        """The force (N,) at a time, and how it is spread over the beam."""
+        raise NotImplementedError
+
+    @property
+    def first_order(self) -> bool:
+        return False
+
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        last, time = self._last, 1.0 if t is None else float(t)
+        if last is None or last._time != time:
+            vector, spread = self.at(time)
+            last = self._last = self._with(_time=time, _vector=vector, _spread=spread, _last=None)
+        return self.factor(t), last
+
+    def force(self, u: Array) -> Array:
+        return self.acting(None)[1].force(u) if self._vector is None else self._vector
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        return self.force(u1)
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        return _NONE
+
+    def potential(self, u: Array) -> float:
+        return -float(self.force(u) @ u)
+
+    def spread(self, u: Array) -> Spread | None:
+        return self.acting(None)[1].spread(u) if self._spread is None else self._spread
+
+    def _of_points(self, places: Sequence[tuple[Array, int, Array]]) -> tuple[Array, Spread]:
+        """The force (N,) of forces (2,) at places, each an element and a reference point."""
+        vector = np.zeros(self.beam.N)
+        for force, e, X in places:
+            dofs, weights = probe_reference(self.beam, e, X)
+            vector[dofs] += force[:, None] * weights
+        return vector, Spread(stations=tuple(e + float(X[0]) for _, e, X in places))
+
+
+class MovingForce(TimedLoad):
+    """A dead force whose point moves over the body; ``scene.point_force(F, at=function)``.
+
+    Parameters
+    ----------
+    force
+        The force, shape (2,).
+    at
+        A function of time that returns the place (x, y) in the stress-free body on which the force
+        acts, on the axis or not; NaN where it is not on the beam.
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamCable(),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(beam).pin("left").fix("right", "r^2")
+    >>> scene = scene.point_force((0, -0.1), at=lambda t: (t, 0.0))
+    >>> history = scene.run(1.0, increments=4)
+    >>> history.reactions("left").force[:, 1].round(6).tolist()
+    [0.1, 0.075, 0.05, 0.025, 0.0]
+    """
+
+    def __init__(self, force: ArrayLike, at: Callable[[float], ArrayLike], beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.total, self.where = require_finite("force", force, (2,)), at
+
+    def at(self, t: float) -> tuple[Array, Spread]:
+        place = np.asarray(self.where(t), dtype=float)
+        if np.isnan(place).any():
+            return self._of_points(())
+        place = ask_array("at(t={:g})", (2,), self.where, t)
+        return self._of_points([(self.total, *locate(self.beam, place))])
+
+
+class Train(TimedLoad):
+    """Forces at given distances that run along the axis of a beam, from its left end on.
+
+    Parameters
+    ----------
+    forces
+        The force of each axle, shape (n,), along ``direction``.
+    distances
+        How far each is behind the first, along the axis, shape (n,).
+    speed
+        Length per time, positive.
+    beam
+        The beam, its name or its number.
+    start
+        Where the first axle is at the time 0, along the axis.
+    direction
+        Of the forces, shape (2,).
+    amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+
+    Examples
+    --------
+    Two axles of a lorry, 4 m apart, on a girder of 20 m:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, Train
+    >>> girder = Beam(MeshBeam.init_line(np.linspace(0, 20, 9), height=0.6), ElementBeamCable(),
+    ...               StVenantKirchhoff(3e10, 0.2, 2500), width=0.4)
+    >>> scene = Scene(girder).pin("left").fix("right", "r^2")
+    >>> history = scene.add(Train([5e4, 8e4], [0.0, 4.0], speed=10.0)).run(2.4, increments=6)
+    >>> history.reactions("left").force[1:3, 1].round(-2).tolist()
+    [120000.0, 100000.0]
+    """
+
+    # of a bound one
+    _ends: Array
+
+    def __init__(self, forces: ArrayLike, distances: ArrayLike, speed: float,
+                 beam: WhichBeam = None, start: float = 0.0, direction: ArrayLike = (0.0, -1.0),
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.forces = require_finite("forces", np.atleast_1d(forces), (None,))
+        self.distances = require_finite("distances", np.atleast_1d(distances), (None,))
+        if len(self.forces) != len(self.distances):
+            raise InputError(f"each of the {len(self.forces)} forces has a distance from the "
+                             f"first, got {len(self.distances)} distances")
+        self.speed = require_positive("speed", speed)
+        self.start = require_finite_scalar("start", start)
+        self.direction = require_finite("direction", direction, (2,))
+
+    def bind(self, beam: Beam) -> Load:
+        return self._with(beam=beam, _ends=np.cumsum(np.append(0.0, beam.mesh.lengths)))
+
+    def at(self, t: float) -> tuple[Array, Spread]:
+        s, ends, places = self.start + self.speed * t - self.distances, self._ends, []
+        for force, x in zip(self.forces, s):
+            if 0.0 <= x <= ends[-1]:
+                e = min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
+                xi = (x - ends[e]) / (ends[e + 1] - ends[e])
+                places.append((force * self.direction, e, np.array([xi, 0.5])))
+        return self._of_points(places)
+
+
+class MovingLineLoad(TimedLoad):
+    """A force per length of the stress-free axis that depends on time.
+
+    Parameters
+    ----------
+    beam, amplitude
+        A :class:`~skfem_ancf.Beam`, and as for :class:`~skfem_ancf.actions.loads.Load`.
+    made
+        A function of a force per length, a function of x, that makes the dead load of it.
+    force
+        The function of the points x (2, ...) and the time that returns (2, ...).
+    """
+
+    def __init__(self, beam: Beam, made: Callable[..., Any], force: Callable[..., Any],
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.made, self.per_length = made, force
+
+    def at(self, t: float) -> tuple[Array, Spread]:
+        load = self.made(lambda x: self.per_length(x, t))
+        return load.vector, load.spread(load.vector)

@@ -1,0 +1,62 @@
+"""A dead force on a material point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..beam.beam import Beam
+from ..beam.distribution import Spread
+from ..beam.kinematics import locate, probe
+from ..beam.layout import Layout, WhichMember
+from ..beam.rigid import RigidBody, on_body
+from ..core.errors import require_finite
+from ..core.types import TimeFunction
+from .item import Item
+from .loads import DeadLoad, Load, number_at
+from .moving import MovingForce
+
+
+class PointForce(Load):
+    """A dead force on a material point.
+
+    Parameters
+    ----------
+    force
+        The force, shape (2,).
+    at
+        The point: its place (x, y) in the reference configuration, shape (2,), or "right" for the
+        axis at that end; of a rigid body also None, for its centre of mass. Of a force that moves
+        a function of time, see :class:`~skfem_ancf.actions.moving.MovingForce`.
+    beam
+        The beam, its name or its number, where several have the point; or a RigidBody.
+    amplitude
+        A function of time by which the force is multiplied in a motion.
+    """
+
+    for_bodies = for_domains = True
+
+    def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
+                 amplitude: TimeFunction = None) -> None:
+        at, beam = on_body(at, beam)
+        super().__init__(beam, amplitude)
+        self.total, self.at = require_finite("force", force, (2,)), at
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        if callable(self.at):
+            return MovingForce(self.total, self.at, self.beam, self.amplitude).expand(layout)
+        return (self._with(beam=number_at(layout, self.at, self.beam)),)
+
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        vector = np.zeros(beam.N)
+        if not isinstance(beam, Beam):
+            dofs, weights = beam.probe(self.at)
+            np.add.at(vector, dofs, self.total[:, None] * weights)
+            return DeadLoad(beam, vector, self.amplitude)
+        e, X = locate(beam, self.at)
+        dofs, weights = probe(beam, self.at, (e, X))
+        vector[dofs] = self.total[:, None] * weights  # those of an element, each once
+        return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
