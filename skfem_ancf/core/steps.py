@@ -96,7 +96,7 @@ class Steps(Immutable):
         Parameters
         ----------
         start
-            The value at the time 0: a number or a vector; zero by default.
+            The value at the time 0: a number or a vector, shape (k,); zero by default.
         **values
             Values at the ends of steps by their names; in a step that is not named it stays what
             it was.
