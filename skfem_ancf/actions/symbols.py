@@ -27,7 +27,8 @@ from .joints.plane_section import PlaneSection
 from .joints.prescribed import PrescribedAngle, PrescribedPosition
 from .joints.settlements import HELD
 from .joints.sliders import Sleeve, Slot
-from .loads import DeadLoad, EndMoment, Load, PointForce, Pressure, Traction, Weight
+from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
+from .point_force import PointForce
 from .places import Vector, is_ground, named_place, point, section
 from .supports import Support
 
