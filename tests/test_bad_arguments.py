@@ -425,6 +425,10 @@ call("history.save", of(history, "save"), filename="h.pvd", progress=False, subd
 call("state.plot", of(state, "plot"), "cmap=name? limits=other?", {"limits": ["[True, False]"]},
      field="S_xx", thickness=1.0, undeformed=True, colorbar=False, cmap="viridis",
      limits=(-1.0, 1.0), title="title", unit="Pa", subdivide=(2, 2), dpi=50)
+call("state.plot, magnified", of(state, "plot"), "scale=positive supports=flag loads=flag",
+     field="S_xx", scale=2.0, loads=True, supports=True, subdivide=(1, 1), dpi=50)
+call("scene.plot", of(clamped, "plot"), "nodes=flag names=flag loads=flag supports=flag",
+     nodes=True, names=True, loads=True, supports=True, thickness=1.0, title="title", dpi=50)
 call("history.animate", of(history, "animate"), "frames=count? size=other",
      {"frames": ["10**30", "10**400"]}, filename="f.gif", field="S_xx", frames=2, fps=5.0,
      recover=False, subdivide=(1, 1), size=(320, 240))

@@ -222,11 +222,14 @@ def test_loads_of_a_state_have_its_load_factor():
 @pytest.mark.parametrize("hold, number", [
     (lambda s: s.clamp("left"), 7), (lambda s: s.clamp("left", thickness="free"), 7),
     (lambda s: s.pin("left"), 8), (lambda s: s.fix("left", "r^2"), 8),
+    (lambda s: s.fix("left", "r^1").joint("plane", at="left"), 8),
     (lambda s: s.fix("left", "r^1").fix("left", "r^2"), 8)])
 @pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
 def test_what_is_held_at_one_place_is_one_symbol(hold, number, element):
-    ax = hold(Scene(line(element=element))).plot()
-    assert len(marked(ax, "support")) == number  # a line and six hatches, of a pin a triangle, too
+    scene = Scene(line(element=element))
+    hold(scene)
+    ax = scene.plot()
+    assert len(marked(ax, "support")) == number  # a line and six hatches, and one more
 
 
 def test_joints_springs_masses_bodies_and_obstacles_are_drawn():
@@ -259,8 +262,24 @@ def test_frames_show_what_holds_and_loads_their_nodes():
     ax = frame.plot()
     assert sorted(texts(ax)) == ["1", "2", "7"]
     assert len(marked(ax, "support")) == 7 + 8
-    assert_allclose([a.get_xydata()[0] for a in marked(ax, "joint")], [(4, 3)] * 2)
+    assert_allclose([a.get_xydata()[0] for a in marked(ax, "joint")], [(4, 3)])
     assert any(np.allclose(tip, (0, 3)) for _, tip in arrows(ax))
+
+
+def test_supports_of_frames_are_outside_of_them():
+    def support(points, lines):
+        frame = Frame.from_lines(points, lines, material=STEEL, height=0.2, width=0.1)
+        return np.vstack([a.get_xydata() for a in marked(frame.clamp(0).plot(), "support")])
+
+    assert support([(0, 0), (3, 0)], [(0, 1)])[:, 0].max() < 1e-9
+    assert support([(0, 0), (0, 3)], [(0, 1)])[:, 1].max() < 1e-9
+    assert support([(0, 0), (0, -3)], [(0, 1)])[:, 1].min() > -1e-9
+
+
+def test_instants_of_a_motion_show_loads_of_their_time():
+    scene = Scene(line()).clamp("left").point_force((0, -4), at=(2, 0), amplitude=lambda t: 10 * t)
+    history = scene.integrate(0.1, 0.05)
+    assert texts(history.plot(times=[0.05], loads=True, thickness=1), "force") == ["2"]
 
 
 def test_scale_magnifies_displacements_and_says_so():

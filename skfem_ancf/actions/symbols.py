@@ -103,6 +103,24 @@ def symbols(item: Any, layout: Layout) -> Iterable[Symbol]:
         An item with its beam by number, as ``expand`` returns it.
     layout
         The Layout of the scene.
+
+    Examples
+    --------
+    A custom item, in pictures a mass:
+
+    >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.actions.places import point
+    >>> from skfem_ancf.actions.symbols import Symbol, symbols
+    >>> class Magnet(Item):
+    ...     def energy(self, u, t):
+    ...         return 1e-3 * u[-4]**2
+    >>> @symbols.register(Magnet)
+    ... def draw(item, layout):
+    ...     return [Symbol("mass", (point(layout, 0, "right"),), text="magnet ", value=7.0)]
+    >>> beam = Beam(MeshBeam.init_line([0, 1, 2], height=0.1), ElementBeamCable(3),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> [text.get_text() for text in Scene(beam).clamp("left").add(Magnet()).plot().texts]
+    ['magnet 7']
     """
     return ()
 
@@ -135,43 +153,40 @@ def _tangent(beam: Any, e: int, xi: float) -> Array:
     return np.asarray(tangent / np.hypot(*tangent))
 
 
-def _turning(layout: Layout, beam: Any, e: int, xi: float) -> Vector:
-    """The direction of the section at a place of an element."""
-    dofs, _ = probe_reference(beam, e, np.array([xi, 0.5]))
-    weights = direction_weights(beam, e, xi)
-    return Vector(beam.q0_local[dofs] @ weights, dofs + layout.offset(beam), weights)
-
-
-def _along(elements: Array, n: int) -> list[tuple[int, float]]:
-    """Elements and xi of n places along a run of elements."""
-    s = np.linspace(0, len(elements), n)
+def _along(elements: Array, runs: int) -> list[tuple[int, float]]:
+    """Elements and xi of places along one of some runs of elements."""
+    s = np.linspace(0, len(elements), int(np.clip(MOST // runs, 2, ARROWS)))
     k = np.minimum(s.astype(int), len(elements) - 1)
-    return list(zip(np.asarray(elements)[k].tolist(), (s - k).tolist()))
+    return list(zip(elements[k].tolist(), (s - k).tolist()))
 
 
-def _sides(beam: Any, boundary: Any) -> list[tuple[list[tuple[int, float]], float]]:
-    """Places along the loaded faces, with their eta, and sections, with eta = 1/2."""
+def _faces(layout: Layout, beam: Any, boundary: Any) -> Iterable[tuple[Any, Any, Any]]:
+    """Of sections and runs of faces: places, outward normals (n, 2), directions of sections."""
     n, ne = beam.mesh.p.shape[1], beam.mesh.nelements
     facets = np.sort(np.asarray(facets_of(beam.mesh, boundary)))
-    out = [([(int(e[0]), xi)], 0.5) for node in facets[facets < n] for e, xi in (
-        (np.flatnonzero(beam.mesh.t[0] == node), 0.0), (np.flatnonzero(beam.mesh.t[1] == node), 1.0)
-    ) if len(e)]
+    found = [([(int(e), float(xi))], 0.5) for node in facets[facets < n] for xi in (0, 1)
+             for e in np.flatnonzero(beam.mesh.t[xi] == node)]
     for side in (0, 1):
-        found = facets[(facets >= n + side * ne) & (facets < n + (side + 1) * ne)] - n - side * ne
-        runs = [run for run in np.split(found, np.flatnonzero(
-            (np.diff(found) > 1) | (np.diff(beam.mesh.chains[found]) != 0)) + 1) if len(run)]
-        out += [(_along(run, _number(runs)), float(side)) for run in runs]
-    return out
+        on = facets[(facets >= n + side * ne) & (facets < n + (side + 1) * ne)] - n - side * ne
+        ends = np.flatnonzero((np.diff(on) > 1) | (np.diff(beam.mesh.chains[on]) != 0)) + 1
+        found += [(_along(run, len(ends) + 1), float(side)) for run in np.split(on, ends)
+                  if len(run)]
+    for places, eta in found:
+        normals, turns = [], []
+        for e, xi in places:
+            tx, ty = _tangent(beam, e, xi)
+            normals.append((2 * xi - 1) * np.array([tx, ty]) if eta == 0.5 else
+                           (2 * eta - 1) * np.array([-ty, tx]))
+            dofs, _ = probe_reference(beam, e, np.array([xi, 0.5]))
+            weights = direction_weights(beam, e, xi)
+            turns.append(Vector(beam.q0_local[dofs] @ weights, dofs + layout.offset(beam), weights))
+        yield [_inside(layout, beam, e, xi, eta) for e, xi in places], np.array(normals), turns
 
 
-def _number(runs):
-    return int(np.clip(MOST // len(runs), 2, ARROWS))
-
-
-def _values(function, x):
-    """A constant (2,) or a function of points at points (2, n), as (n, 2)."""
-    found = function(x) if callable(function) else np.reshape(function, (2, 1))
-    return np.broadcast_to(found, x.shape).T
+def _values(function, at):
+    """A constant (2,) or a function of points at places, as (n, 2)."""
+    x = np.array([place.start for place in at]).T
+    return np.broadcast_to(function(x) if callable(function) else function[:, None], x.shape).T
 
 
 # loads
@@ -179,35 +194,24 @@ def _values(function, x):
 @symbols.register(Load)
 def _(load, layout):
     beam = layout.beam(load.beam)  # of one's own, or a form: its forces on the nodes
-    if not isinstance(beam, Beam) or isinstance(load, EigenStrain):
-        return
-    given = load if isinstance(load, DeadLoad) else load.bind(beam)
-    force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]
-    loaded = np.flatnonzero(np.hypot(*force.T) > 1e-9 * np.abs(force).max())
-    some = loaded[np.unique(np.linspace(0, len(loaded) - 1, 2 * ARROWS).astype(int))] if len(
-        loaded) else loaded
-    if len(some):
+    if isinstance(beam, Beam) and not isinstance(load, EigenStrain):
+        given = load if isinstance(load, DeadLoad) else load.bind(beam)
+        force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]
+        loaded = np.flatnonzero(np.hypot(*force.T) > 1e-9 * np.abs(force).max())
+        some = loaded[::1 + len(loaded) // (2 * ARROWS)]
         yield force_symbol((at_node(layout, beam, k) for k in some), force[some], show=False)
 
 
 @symbols.register(Weight)
 def _(load, layout):
-    member = layout.beam(load.beam)
-    at = (_inside(layout, member, *_along(np.arange(member.mesh.nelements), 3)[1]) if isinstance(
-        member, Beam) else point(layout, member, None) if isinstance(member, RigidBody) else
-        Vector(np.mean(member.basis.mesh.p, axis=1)))
-    yield force_symbol([at], load.g)._replace(kind="weight", text="g = ")
+    yield force_symbol([Vector(np.zeros(2))], load.g)._replace(kind="weight", text="g = ")
 
 
 @symbols.register(PointForce)
-def _(load, layout):
-    yield force_symbol([point(layout, load.beam, load.at)], load.total)
-
-
 @symbols.register(FollowerForce)
 def _(load, layout):
-    yield force_symbol([point(layout, load.beam, load.at)], load.total,
-                       [section(layout, load.beam, load.at)[1]])
+    turn = [section(layout, load.beam, load.at)[1]] if isinstance(load, FollowerForce) else []
+    yield force_symbol([point(layout, load.beam, load.at)], load.total, turn)
 
 
 @symbols.register(LineLoad)
@@ -216,31 +220,20 @@ def _(load, layout):
     chains = np.unique(beam.mesh.chains) if load.chains is None else load.chains
     for k, chain in enumerate(chains):
         at = [_inside(layout, beam, *place) for place in _along(
-            np.flatnonzero(beam.mesh.chains == chain), _number(chains))]
-        yield force_symbol(at, _values(load.per_length, np.array([a.start for a in at]).T),
-                           show=k == 0)
+            np.flatnonzero(beam.mesh.chains == chain), len(chains))]
+        yield force_symbol(at, _values(load.per_length, at), show=k == 0)
 
 
 @symbols.register(Traction)
 def _(load, layout):
-    beam = layout.beam(load.beam)
-    for places, eta in _sides(beam, load.boundary):
-        at = [_inside(layout, beam, *place, eta) for place in places]
-        yield force_symbol(at, _values(load.t, np.array([a.start for a in at]).T))
+    for at, _, _ in _faces(layout, layout.beam(load.beam), load.boundary):
+        yield force_symbol(at, _values(load.t, at))
 
 
 @symbols.register(Pressure)
 def _(load, layout):
-    beam = layout.beam(load.beam)
-    for places, eta in _sides(beam, load.boundary):
-        force = []
-        for e, xi in places:
-            tx, ty = _tangent(beam, e, xi)
-            force.append(load.p * (np.array([tx, ty]) * (1 if xi == 0 else -1) if eta == 0.5 else
-                                   np.array([ty, -tx]) * (2 * eta - 1)))
-        yield force_symbol([_inside(layout, beam, *place, eta) for place in places], force,
-                           [_turning(layout, beam, *place) for place in places])._replace(
-                               text="p = ")
+    for at, normals, turns in _faces(layout, layout.beam(load.beam), load.boundary):
+        yield force_symbol(at, -load.p * normals, turns)._replace(text="p = ")
 
 
 @symbols.register(EndMoment)
@@ -257,15 +250,26 @@ def _outward(beam: Beam, node: int) -> Array:
     return -beam.mesh.p_Y[:, node] if left and right else -tangent if left else tangent
 
 
+def _boundary(layout: Layout, domain: Domain, boundary: Any) -> Vector:
+    """The mean of the degrees of freedom at a boundary of a domain."""
+    dofs = domain.dofs(boundary)
+    place = domain.basis.doflocs[:, np.argsort(domain.numbers(np.arange(domain.N)))[dofs]]
+    pairs = layout.offset(domain) + dofs.reshape(-1, 2).T
+    return Vector(np.nanmean(place, axis=1), pairs, np.full(len(dofs) // 2, 2 / len(dofs)))
+
+
 @symbols.register(Support)
 def _(support, layout):
     member = layout.beam(support.beam)
     dofs = member.dofs(support.boundary, support.names)
     if isinstance(member, RigidBody):
-        at = None if support.boundary is member else support.boundary
-        yield _support([point(layout, member, at)], "x y angle" if len(dofs) == 4 else "x y")
+        yield _support([point(layout, member, support.boundary)],
+                       "x y angle" if len(dofs) == 4 else "x y")
     elif isinstance(member, Domain):
-        yield _support([section(layout, member, support.boundary)[0]], "x y angle")
+        held = [name for k, name in enumerate(("x", "y")) if np.any(dofs % 2 == k)]
+        at = _boundary(layout, member, support.boundary)
+        away = at.start - np.mean(member.basis.mesh.p, axis=1)
+        yield _support([at], " ".join([*held, "angle"]), away / (np.hypot(*away) or 1.0))
     else:
         for node in np.unique(dofs // member.nd).tolist():
             own = dofs[dofs // member.nd == node] % member.nd
@@ -280,13 +284,12 @@ def _support(at, held, direction=(0.0, -1.0)):
 
 @symbols.register(PlaneSection)
 @symbols.register(PrescribedAngle)
-def _(joint, layout):
-    yield _support([section(layout, joint.beam, joint.at)[0]], "angle")
-
-
 @symbols.register(PrescribedPosition)
 def _(joint, layout):
-    yield _support([point(layout, joint.beam, joint.at)], "x y")
+    if isinstance(joint, PrescribedPosition):
+        yield _support([point(layout, joint.beam, joint.at)], "x y")
+    else:
+        yield _support([section(layout, joint.beam, joint.at)[0]], "angle")
 
 
 @symbols.register(Hinge)
@@ -303,20 +306,16 @@ def _(joint, layout):
 
 @symbols.register(Glue)
 def _(joint, layout):
-    yield Symbol("joint", (section(layout, joint.domain, joint.boundary)[0],), text="weld")
+    yield Symbol("joint", (_boundary(layout, layout.beam(joint.domain), joint.boundary),),
+                 text="weld")
 
 
 @symbols.register(OnLine)
-def _(joint, layout):
-    yield Symbol("slider", (point(layout, joint.beam, joint.at),),
-                 ((joint.normal[1], -joint.normal[0]),))
-
-
 @symbols.register(OnCircle)
 def _(joint, layout):
     at = point(layout, joint.beam, joint.at)
-    x, y = at.start - joint.center
-    yield Symbol("slider", (at,), ((-y, x) / np.hypot(x, y),))
+    x, y = joint.normal if isinstance(joint, OnLine) else at.start - joint.center
+    yield Symbol("slider", (at,), (np.array([-y, x]) / np.hypot(x, y),))
 
 
 @symbols.register(Sleeve)
@@ -341,10 +340,15 @@ def _(joint, layout):
         return Vector(joint.net.points[:, bound.nodes[end]], bound.positions[end][:, None],
                       np.ones(1))
 
+    points = joint.net.points[:, joint.nodes]
     for end in bound.leaders:
         held = [name for name, one in zip(HELD, bound.held[bound.nodes[end]]) if one]
-        if held:
-            yield _support([place(end)], " ".join(held))
+        if held:  # away from the lines that meet
+            meet = np.flatnonzero(bound.nodes == bound.nodes[end])
+            away = np.sum(points[:, meet] - points[:, meet ^ 1], axis=1)
+            size = np.hypot(*away)
+            yield _support([place(end)], " ".join(held),
+                           away / size if size > 1e-9 * joint.net.size else (0.0, -1.0))
     for end in np.flatnonzero(bound.hinged & several[bound.nodes]):
         yield Symbol("joint", (place(end),), text="hinge")
 
@@ -375,10 +379,7 @@ def _(mass, layout):
 
 @symbols.register(Foundation)
 def _(foundation, layout):
-    beam = layout.beam(foundation.beam)
-    for places, eta in _sides(beam, foundation.side):
-        for k, (e, xi) in enumerate(places):
-            tx, ty = _tangent(beam, e, xi)
-            yield Symbol("foundation", (_inside(layout, beam, e, xi, eta),),
-                         (np.array([-ty, tx]) * (2 * eta - 1),),
-                         text=_stiffness(foundation.k) if k == len(places) // 2 else "")
+    for at, normals, _ in _faces(layout, layout.beam(foundation.beam), foundation.side):
+        for k, (place, normal) in enumerate(zip(at, normals)):
+            yield Symbol("foundation", (place,), (normal,),
+                         text=_stiffness(foundation.k) if k == len(at) // 2 else "")

@@ -125,8 +125,8 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
         Draw forces as straight arrows and moments as curved ones, with their values.
     supports
         Draw supports, joints, springs, foundations and masses. A clamp is a line with hatching, a
-        pin a triangle, a support of one direction a triangle on a line, a hinge a circle, a weld a
-        square.
+        pin a triangle, a support of one direction a triangle on a line, or two lines if the section
+        cannot turn, a hinge a circle, a weld a square.
     nodes
         Draw the nodes of the meshes.
     names

@@ -54,24 +54,24 @@ class Sketch:
         self.size = float(np.max(np.ptp(points, axis=0)))
 
     def draw(self, symbols: Iterable[Symbol]) -> None:
-        """Draw symbols, what is held at one place together."""
+        """Draw symbols: one for all that holds a place, and for all weights of one gravity."""
         one: dict[Any, Symbol] = {}
-        symbols = list(symbols)
-        for s in symbols:  # what is drawn once
-            if s.kind == "support":
-                place = tuple(np.round(s.at[0].start / self.size, 6) + 0.0)
-                before = one.get(place)
-                one[place] = s if before is None else max(before, s, key=_ends)._replace(
-                    text=f"{before.text} {s.text}")
-            elif s.kind == "weight":
-                one[tuple(s.direction[0]), s.value] = s
-        largest = max((abs(s.value) for s in symbols if s.kind == "force" and len(s.at) == 1),
-                      default=1.0) or 1.0
-        for s in [*one.values(), *(s for s in symbols if s.kind not in ("support", "weight"))]:
-            at = np.array([place(self.u) for place in s.at])
-            if s.kind in LOADS and not s.value:
-                continue
-            getattr(self, "_" + s.kind.replace(" ", "_"))(s, at, largest)
+        for number, s in enumerate(symbols):
+            key: Any = number
+            if s.kind == "weight":
+                key = s.kind, *s.direction[0], s.value
+            elif s.kind in ("support", "joint"):
+                key = s.kind, *(np.round(s.at[0].start / self.size, 6) + 0.0)
+            before = one.get(key)
+            if s.kind == "support" and before is not None:
+                s = max(before, s, key=_ends)._replace(text=f"{before.text} {s.text}")
+            one[key] = s
+        largest = max((abs(s.value) for s in one.values() if s.kind == "force" and len(s.at) == 1),
+                      default=0.0) or 1.0
+        for s in one.values():
+            if s.value or s.kind not in LOADS:
+                getattr(self, "_" + s.kind.replace(" ", "_"))(
+                    s, np.array([place(self.u) for place in s.at]), largest)
 
     def names(self, places: Iterable[tuple[str, Array]]) -> None:
         """Write names beside places (2,)."""
@@ -128,21 +128,20 @@ class Sketch:
     # what holds
 
     def _support(self, s, at, largest):
-        held, p, r = set(s.text.split()), at[0], SIZE * self.size
-        d = np.array(s.direction[0])
-        if not {"x", "y"} <= held or "angle" not in held:  # upright
-            d = np.array([np.sign(d[0]) or -1.0, 0.0]) if held == {"x"} else (
-                np.array([0.0, 1.0 if d[1] > 0.7 else -1.0]))
-        across = np.array([-d[1], d[0]])
-        base = p
-        if not held & {"x", "y"}:
-            return self._mark("s", p, s.kind)
-        if not {"x", "y", "angle"} <= held:
-            base = p + 1.5 * r * d
-            self._line([p, base + 0.8 * r * across, base - 0.8 * r * across, p], s.kind)
-            if not {"x", "y"} <= held:
-                base = base + 0.4 * r * d
-        self._ground(base, d, max(1.2 * r, 1.3 * self._half(p, across) * (base is p)), s.kind)
+        held, base, r = set(s.text.split()), at[0], SIZE * self.size
+        single, (x, y) = {"x", "y"} - held, s.direction[0]
+        if len(single) == 2:
+            return self._mark("s", base, s.kind)
+        if single or "angle" not in held:  # upright, or sideways where only x is held
+            x, y = (0.0, 1.0 if y > 0.7 else -1.0) if "y" in held else (1.0 if x > 0.7 else -1.0, 0)
+        d, across = np.array([x, y]), np.array([-y, x])
+        wide = max(1.2 * r, 1.3 * self._half(base, across) * ("angle" in held))
+        if "angle" not in held:
+            base = base + 1.5 * r * d
+            self._line([at[0], base + 0.8 * r * across, base - 0.8 * r * across, at[0]], s.kind)
+        elif single:
+            self._line([base - wide * across, base + wide * across], s.kind)
+        self._ground(base + 0.4 * r * d * len(single), d, wide, s.kind)
 
     def _ground(self, foot, d, wide, kind):
         """A line across d with hatching behind it."""
