@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from test_io import affine, bent, turn
 
 from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, Frame, InputError,
-                        MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene, StVenantKirchhoff)
+                        MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
+                        Train)
 from skfem_ancf.recovery.fields import DRAWN, FIELDS
 from skfem_ancf.visuals.matplotlib import plot_state
 
@@ -280,6 +281,23 @@ def test_instants_of_a_motion_show_loads_of_their_time():
     scene = Scene(line()).clamp("left").point_force((0, -4), at=(2, 0), amplitude=lambda t: 10 * t)
     history = scene.integrate(0.1, 0.05)
     assert texts(history.plot(times=[0.05], loads=True, thickness=1), "force") == ["2"]
+
+
+def test_loads_that_move_are_drawn_where_they_are():
+    def tips(ax):
+        return sorted(float(tip[0]) for _, tip in arrows(ax))
+
+    scene = Scene(line()).clamp("left").point_force((0, -4), at=lambda t: (4 * t, 0))
+    assert_allclose(tips(scene.plot()), [0], atol=1e-12)  # at the start; at the time 1 it is away
+    history = scene.integrate(0.5, 0.25)
+    assert_allclose(tips(history.plot(times=[0.25], loads=True, scale=1e-9)), [1], atol=1e-9)
+    lorry = Scene(line()).clamp("left").add(Train([1, 2], [0, 0.5], speed=1.0, start=1.5))
+    assert_allclose(tips(lorry.plot()), [1, 1.5], atol=1e-12)
+    assert texts(lorry.plot()) == ["1", "2"]
+    rising = Scene(line()).clamp("left").line_load(lambda x, t: np.array([0 * x[0], -t + 0 * x[0]]))
+    assert texts(rising.plot()) == ["1"]  # nothing at the start
+    history = rising.integrate(0.5, 0.25)
+    assert texts(history.plot(times=[0.5], loads=True, thickness=1), "force") == ["0.5"]
 
 
 def test_scale_magnifies_displacements_and_says_so():

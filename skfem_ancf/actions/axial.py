@@ -131,7 +131,7 @@ class LineLoad(Load):
 
     def bind(self, beam: Beam) -> Load:
         in_time: Any = self.per_length
-        if _takes_time(in_time):
+        if of_place_and_time(in_time):
             def made(force: Callable[[Array], Array]) -> Load:
                 return self._with(per_length=force, amplitude=None).bind(beam)
 
@@ -153,7 +153,7 @@ class LineLoad(Load):
         return DeadLoad(beam, vector, self.amplitude, spread)
 
 
-def _takes_time(force):
+def of_place_and_time(force: Any) -> bool:
     """True of a function that needs two arguments, x and the time."""
     if not callable(force):
         return False

@@ -23,8 +23,8 @@ _NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 class TimedLoad(Load):
     """A force that depends on time and not on the displacement.
 
-    A subclass defines :meth:`at`. In statics, where time is the load factor, the load is that of
-    the time 1; in :meth:`skfem_ancf.Scene.run` and in motions that of the time.
+    A subclass defines :meth:`places` or :meth:`at`. In statics, where time is the load factor, the
+    load is that of the time 1; in :meth:`skfem_ancf.Scene.run` and in motions that of the time.
     """
 
     constant = False
@@ -34,9 +34,17 @@ class TimedLoad(Load):
     _spread: Any = None
     _last: Any = None
 
-    def at(self, t: float) -> tuple[Array, Spread]:
-        """The force (N,) at a time, and how it is spread over the beam."""
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
+        """The forces (2,) at a time, each with its element and its reference point (2,)."""
         raise NotImplementedError
+
+    def at(self, t: float) -> tuple[Array, Spread]:
+        """The force (N,) at a time, and how it is spread over the beam; that of :meth:`places`."""
+        vector, places = np.zeros(self.beam.N), self.places(t)
+        for force, e, X in places:
+            dofs, weights = probe_reference(self.beam, e, X)
+            vector[dofs] += force[:, None] * weights
+        return vector, Spread(stations=tuple(e + float(X[0]) for _, e, X in places))
 
     @property
     def first_order(self) -> bool:
@@ -63,14 +71,6 @@ class TimedLoad(Load):
 
     def spread(self, u: Array) -> Spread | None:
         return self.acting(None)[1].spread(u) if self._spread is None else self._spread
-
-    def _of_points(self, places: Sequence[tuple[Array, int, Array]]) -> tuple[Array, Spread]:
-        """The force (N,) of forces (2,) at places, each an element and a reference point."""
-        vector = np.zeros(self.beam.N)
-        for force, e, X in places:
-            dofs, weights = probe_reference(self.beam, e, X)
-            vector[dofs] += force[:, None] * weights
-        return vector, Spread(stations=tuple(e + float(X[0]) for _, e, X in places))
 
 
 class MovingForce(TimedLoad):
@@ -104,12 +104,12 @@ class MovingForce(TimedLoad):
         super().__init__(beam, amplitude)
         self.total, self.where = require_finite("force", force, (2,)), at
 
-    def at(self, t: float) -> tuple[Array, Spread]:
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
         place = np.asarray(self.where(t), dtype=float)
         if np.isnan(place).any():
-            return self._of_points(())
+            return []
         place = ask_array("at(t={:g})", (2,), self.where, t)
-        return self._of_points([(self.total, *locate(self.beam, place))])
+        return [(self.total, *locate(self.beam, place))]
 
 
 class Train(TimedLoad):
@@ -165,14 +165,14 @@ class Train(TimedLoad):
     def bind(self, beam: Beam) -> Load:
         return self._with(beam=beam, _ends=np.cumsum(np.append(0.0, beam.mesh.lengths)))
 
-    def at(self, t: float) -> tuple[Array, Spread]:
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
         s, ends, places = self.start + self.speed * t - self.distances, self._ends, []
         for force, x in zip(self.forces, s):
             if 0.0 <= x <= ends[-1]:
                 e = min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
                 xi = (x - ends[e]) / (ends[e + 1] - ends[e])
                 places.append((force * self.direction, e, np.array([xi, 0.5])))
-        return self._of_points(places)
+        return places
 
 
 class MovingLineLoad(TimedLoad):

@@ -13,9 +13,10 @@ from ..beam.domain import Domain
 from ..beam.kinematics import direction_weights, probe_reference
 from ..beam.layout import Layout
 from ..beam.rigid import RigidBody
+from ..core.errors import AncfError
 from ..core.types import Array
 from ..mesh.places import facets_of
-from .axial import FollowerForce, LineLoad
+from .axial import FollowerForce, LineLoad, of_place_and_time
 from .eigenstrain import EigenStrain
 from .forces import Foundation, PointMass, Spring, TorsionalSpring
 from .forces.springs import end_of
@@ -28,6 +29,7 @@ from .joints.prescribed import PrescribedAngle, PrescribedPosition
 from .joints.settlements import HELD
 from .joints.sliders import Sleeve, Slot
 from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
+from .moving import TimedLoad
 from .point_force import PointForce
 from .places import Vector, is_ground, named_place, point, section
 from .supports import Support
@@ -74,7 +76,7 @@ class Symbol(NamedTuple):
 
 
 def all_symbols(items: Iterable[Any], layout: Layout, load: float = 1.0,
-                t: float | None = None) -> list[Symbol]:
+                t: float | None = None, start: bool = False) -> list[Symbol]:
     """The symbols of items, loads times their factors.
 
     Parameters
@@ -83,10 +85,14 @@ def all_symbols(items: Iterable[Any], layout: Layout, load: float = 1.0,
         Items as they were given, and the Layout of the scene.
     load, t
         The load factor, and the time of a motion or None.
+    start
+        Loads that move or depend on time are those of the time 0, or if they are zero of 1.
     """
     out = []
     for item in items:
         for one in item.expand(layout):
+            if isinstance(one, (TimedLoad, LineLoad)) and not start:
+                one = one._with(_time=1.0 if t is None else t)
             factor = one.factor(t) * (load if one.scaled else 1.0) if isinstance(one, Load) else 1.0
             out += [s._replace(value=s.value * factor) if s.kind in LOADS else s
                     for s in symbols(one, layout)]
@@ -218,10 +224,32 @@ def _(load, layout):
 def _(load, layout):
     beam = layout.beam(load.beam)
     chains = np.unique(beam.mesh.chains) if load.chains is None else load.chains
+    given = load.per_length
+    functions = ([lambda x, t=t: given(x, t) for t in _times(load)] if of_place_and_time(given)
+                 else [given])
     for k, chain in enumerate(chains):
         at = [_inside(layout, beam, *place) for place in _along(
             np.flatnonzero(beam.mesh.chains == chain), len(chains))]
-        yield force_symbol(at, _values(load.per_length, at), show=k == 0)
+        found = [_values(function, at) for function in functions]
+        yield force_symbol(at, next(filter(np.any, found), found[0]), show=k == 0)
+
+
+@symbols.register(TimedLoad)
+def _(load, layout):
+    beam = layout.beam(load.beam)
+    for t in _times(load):
+        try:
+            places = load.bind(beam).places(t)
+        except AncfError:  # it has left the beam
+            continue
+        yield from (force_symbol([_inside(layout, beam, e, *X)], force) for force, e, X in places)
+        if places:
+            return
+
+
+def _times(load):
+    time = getattr(load, "_time", None)
+    return (0.0, 1.0) if time is None else (time,)
 
 
 @symbols.register(Traction)

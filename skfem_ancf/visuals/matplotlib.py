@@ -148,7 +148,7 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
                     layout="constrained").add_subplot()
     paint(ax, scenery, [0], None, BODY)
     drawn = sketch(ax, scenery, state)
-    drawn.draw(symbols_of(state, loads, supports, 1.0))
+    drawn.draw(symbols_of(state, loads, supports, True))
     if nodes:
         at = np.hstack([np.zeros((2, 0)), *(beam.mesh.p for beam in state.beams)])
         ax.plot(*at, ".", color=INK, ms=4, zorder=3, gid="node")

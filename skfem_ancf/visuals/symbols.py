@@ -20,10 +20,10 @@ LOAD, HOLD = "#b3261e", "#1f5f8b"
 ARROW, SPREAD, SIZE = 0.13, 0.07, 0.03
 
 
-def symbols_of(state: Any, loads: bool, supports: bool, load: float | None = None) -> list[Symbol]:
+def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> list[Symbol]:
     """The loads, and the supports, joints, springs and masses, of the scene of a state.
 
-    ``load`` is a load factor in place of the state's.
+    With ``start`` the loads are the whole ones, before anything is solved.
     """
     if not (loads or supports):
         return []
@@ -32,7 +32,7 @@ def symbols_of(state: Any, loads: bool, supports: bool, load: float | None = Non
         raise InputError("this state does not know the items of its scene, as it comes from another"
                          " process or a file: draw them by scene.plot()")
     found = all_symbols(system.items, Layout(*system.members),
-                        state.load if load is None else load, state.t)
+                        1.0 if start else state.load, state.t, start)
     return [s for s in found if (loads if s.kind in LOADS else supports)]
 
 
