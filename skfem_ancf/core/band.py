@@ -381,12 +381,6 @@ def largest(x):
 
 
 @primitive("skfem_ancf.core.loops")
-def differs(a, b):
-    """True if two vectors of one size are not the same."""
-    return bool(np.any(a != b))
-
-
-@primitive("skfem_ancf.core.loops")
 def weighted(a, b, w):
     """The sum of a b w."""
     return np.dot(a * b, w)

@@ -341,13 +341,6 @@ def largest(x):
     return found
 
 
-def differs(a, b):
-    for i in range(a.size):
-        if a[i] != b[i]:
-            return True
-    return False
-
-
 def add_each(out, at, x):
     for k in range(at.size):
         out[at[k]] += x[k]
