@@ -297,7 +297,9 @@ for _name, _valid in {
         "traction": dict(boundary="top", t=(0.0, -1.0)), "pressure": dict(boundary="top", p=1.0),
         "moment": dict(boundary="right", M=0.1)}.items():
     _kinds = "at=vector" if "at" in _valid else ""
-    call(f"scene.{_name}", moving(clamped, _name), _kinds, **_valid, beam=0, amplitude=amplitude)
+    _takes = {"at": ["returns None"]} if _name == "point_force" else None  # off the beam
+    call(f"scene.{_name}", moving(clamped, _name), _kinds, _takes, **_valid, beam=0,
+         amplitude=amplitude)
 for _name in (clamped, with_body):
     call(f"scene.point_mass, {_name.__name__}", moving(_name, "point_mass"), "at=vector", mass=1.0,
          at=(1.0, 0.0), inertia=0.1, beam=0)

@@ -507,7 +507,7 @@ def test_tangent_of_a_moment_that_varies():
 
 def test_slope_of_a_joint_that_does_not_say_it():
     class Plain(PrescribedAngle):
-        slope = Joint.slope
+        slope_entries = Joint.slope_entries
 
     found = []
     for kind in (PrescribedAngle, Plain):

@@ -129,12 +129,16 @@ def test_a_line_load_may_depend_on_time():
 def test_what_is_off_the_beam_is_said_or_left_out():
     beam = girder(np.linspace(0, 10, 5))
     scene = Scene(beam).pin("left").fix("right", "r^2")
-    off = scene.point_force((0, -1.0), at=lambda t: (5.0, np.nan if t < 0.5 else 0.0))
+    off = scene.point_force((0, -1.0), at=lambda t: None if t < 0.5 else (5.0, 0.0))
     force = off.run(1.0, increments=4).reactions("left").force[:, 1]
     assert np.allclose(force, [0, 0, 0.5, 0.5, 0.5], atol=1e-9)
     with pytest.raises((MeshError, CallbackError), match="outside"):
         Scene(beam).pin("left").fix("right", "r^2").point_force(
             (0, -1.0), at=lambda t: (20.0, 0.0)).solve_static()
+    for wrong in (lambda t: np.nan, lambda t: "there", lambda t: 1 / 0, lambda: (1.0, 0.0)):
+        with pytest.raises((InputError, CallbackError), match="at"):
+            Scene(beam).pin("left").fix("right", "r^2").point_force(
+                (0, -1.0), at=wrong).solve_static()
     with pytest.raises(InputError, match="distance"):
         Train([1.0, 2.0], [0.0], speed=1.0)
     with pytest.raises(InputError, match="speed"):

@@ -12,7 +12,7 @@ from ..beam.beam import Beam
 from ..beam.distribution import Spread
 from ..beam.kinematics import locate, probe_reference
 from ..beam.layout import WhichBeam
-from ..core.errors import (InputError, ask_array, require_finite, require_finite_scalar,
+from ..core.errors import (InputError, ask, require_finite, require_finite_scalar,
                            require_positive)
 from ..core.types import Array, TimeFunction
 from .loads import Load
@@ -82,7 +82,7 @@ class MovingForce(TimedLoad):
         The force, shape (2,).
     at
         A function of time that returns the place (x, y) in the stress-free body on which the force
-        acts, on the axis or not; NaN where it is not on the beam.
+        acts, shape (2,), on the axis or not; None while it is not on the beam.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
 
@@ -105,10 +105,10 @@ class MovingForce(TimedLoad):
         self.total, self.where = require_finite("force", force, (2,)), at
 
     def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
-        place = np.asarray(self.where(t), dtype=float)
-        if np.isnan(place).any():
+        place = ask("at(t={:g})", self.where, t)
+        if place is None:
             return []
-        place = ask_array("at(t={:g})", (2,), self.where, t)
+        place = require_finite(f"what at(t={t:g}) returns", place, (2,))
         return [(self.total, *locate(self.beam, place))]
 
 
