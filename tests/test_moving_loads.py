@@ -118,6 +118,15 @@ def test_a_force_on_a_face_stands_where_it_is_told():
     assert np.allclose(moving.solve_static().u, still.solve_static().u, atol=1e-9)
 
 
+def test_an_axle_at_the_very_end_of_a_beam_is_on_it():
+    scene = Scene(girder(np.linspace(0, 20, 9))).pin("left").fix("right", "r^2")
+    history = scene.add(Train([5e4, 8e4], [0.0, 4.0], speed=10.0)).run(2.4, increments=6)
+    assert np.allclose(history.t[[1, 5]], (0.4, 2.0))  # 0.4 * 10 - 4 is round-off, and 2 * 10 is 20
+    left, right = (history.reactions(end).force[:, 1] for end in ("left", "right"))
+    assert np.allclose(left[[1, 5]], (12e4, 1.6e4), rtol=1e-3)
+    assert np.allclose((left + right)[[1, 5, 6]], (13e4, 13e4, 8e4), rtol=1e-3)
+
+
 def test_a_line_load_may_depend_on_time():
     beam = girder(np.linspace(0, 10, 5))
     scene = Scene(beam).pin("left").fix("right", "r^2")
