@@ -1,7 +1,6 @@
 """Material points, one and many: found, remembered, refused, and what they give."""
 
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -213,24 +212,3 @@ def require_short_road(state, x, recover):
     assert len(roads[0]) <= 5, list(roads[0])
     for module, entered in roads[0].items():
         assert len(entered) == 1 or module == "core/errors.py", (module, entered)
-
-
-def test_time_of_the_strain_at_points():
-    """Relative to that of 800 square roots of 1000 numbers, about 1 ms."""
-    state = loaded(Beam(MeshBeam.init_line(np.linspace(0, 1, 17), 0.1), ElementBeamANCF(2), STEEL,
-                        0.1))
-    x = np.random.default_rng(0).random((2, 10_000)) * [[1.0], [0.1]] - [[0.0], [0.05]]
-    numbers = np.linspace(1.0, 2.0, 1000)
-
-    def least(call, times=20):
-        out = []
-        for _ in range(times):
-            start = time.perf_counter()
-            call()
-            out.append(time.perf_counter() - start)
-        return min(out)
-
-    state.strain(x)
-    unit = least(lambda: [np.sqrt(numbers) for _ in range(800)])
-    assert least(lambda: state.strain(x)) < 20.0 * unit
-    assert least(lambda: state.strain((0.3, 0.02))) < unit
