@@ -1,5 +1,7 @@
 """Loads whose place depends on time: against series, Euler-Bernoulli, and standing ones."""
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -133,6 +135,23 @@ def test_a_line_load_may_depend_on_time():
     scene.line_load(lambda x, t: np.array([0 * x[0], -100.0 * (1 + 0 * x[1]) * t]))
     history = scene.run(2.0, increments=2)
     assert np.allclose(history.reactions("left").force[:, 1], [0.0, 500.0, 1000.0], atol=1e-6)
+
+
+def _swell(x, t):
+    return np.array([0 * x[0], -100.0 * (1 + 0 * x[1]) * t])
+
+
+def _walk(t):
+    return 10.0 * t, 0.0
+
+
+def test_loads_that_move_go_to_other_processes():
+    scene = Scene(girder(np.linspace(0, 10, 5))).pin("left").fix("right", "r^2")
+    scene.line_load(_swell).point_force((0, -5.0), at=_walk).add(Train([3.0], [0.0], speed=10.0))
+    history = scene.run(1.0, increments=2)
+    again, state = (pickle.loads(pickle.dumps(x)) for x in (scene, history.state(1)))
+    assert np.array_equal(again.run(1.0, increments=2).u, history.u)
+    assert np.array_equal(state.reactions("left").force, history.reactions("left").force[1])
 
 
 def test_what_is_off_the_beam_is_said_or_left_out():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ from ..core.types import Array, TimeFunction
 from ..mesh.places import as_point
 from .item import Item
 from .loads import DeadLoad, Load, number_at
-from .moving import MovingLineLoad
+from .moving import TimedLoad
 
 
 class FollowerForce(Load):
@@ -130,27 +130,66 @@ class LineLoad(Load):
         self.per_length = force if callable(force) else require_finite("force", force, (2,))
 
     def bind(self, beam: Beam) -> Load:
-        in_time: Any = self.per_length
-        if of_place_and_time(in_time):
-            def made(force: Callable[[Array], Array]) -> Load:
-                return self._with(per_length=force, amplitude=None).bind(beam)
-
-            return MovingLineLoad(beam, made, in_time, self.amplitude)
-        mesh, mapping = beam.mesh, beam.mesh.mapping()
-        xi, w = gauss(beam.element.axis_degree + 5)
-        X = np.array([xi, 0.5 + 0.0 * xi])
-        lengths = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0)) * w
-        x = np.asarray(mapping.F(X))
-        given = self.per_length
-        values = (ask_field("force(x)", given, x) if callable(given) else
-                  np.broadcast_to(given[:, None, None], x.shape))
-        if self.chains is not None:
-            values = values * np.isin(mesh.chains, self.chains)[:, None]
-        functions = beam.element.of_mesh(mapping, X)[0]
-        vector = beam.kernel.scatter(np.einsum("kep,iep->eki", functions, lengths * values))
-        spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,
-                                         values * (lengths / w)),))
+        points, given = _axis_points(beam, self.chains), self.per_length
+        if of_place_and_time(given):
+            return LineLoadInTime(beam, points, given, self.amplitude)
+        values = (ask_field("force(x)", given, points.x) if callable(given) else
+                  np.broadcast_to(given[:, None, None], points.x.shape))
+        vector, spread = points.load(beam, values)
         return DeadLoad(beam, vector, self.amplitude, spread)
+
+
+class _AxisPoints(NamedTuple):
+    """Points of the axis: xi (np,), places (2, ne, np), lengths per xi and those that points stand
+    for, 0 where nothing acts, (ne, np), and the local functions there, (nb, ne, np).
+    """
+
+    xi: Array
+    x: Array
+    speed: Array
+    lengths: Array
+    functions: Array
+
+    def load(self, beam: Beam, values: Array) -> tuple[Array, Spread]:
+        """The force (N,) of forces per length at the points, (2, ne, np), and their Spread."""
+        vector = beam.kernel.scatter(
+            np.einsum("kep,iep->eki", self.functions, self.lengths * values))
+        return vector, Spread(sampled=(Sampled(AXIS, np.arange(len(self.lengths)), self.xi,
+                                               values * self.speed),))
+
+
+def _axis_points(beam, chains):
+    """The points of a rule along the axis, of some chains of elements or of all."""
+    mapping, (xi, w) = beam.mesh.mapping(), gauss(beam.element.axis_degree + 5)
+    X = np.array([xi, 0.5 + 0.0 * xi])
+    speed = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))
+    if chains is not None:
+        speed = speed * np.isin(beam.mesh.chains, chains)[:, None]
+    return _AxisPoints(xi, np.asarray(mapping.F(X)), speed, speed * w,
+                       beam.element.of_mesh(mapping, X)[0])
+
+
+class LineLoadInTime(TimedLoad):
+    """A force per length of the stress-free axis that depends on time, bound.
+
+    Parameters
+    ----------
+    beam, amplitude
+        A :class:`~skfem_ancf.Beam`, and as for :class:`~skfem_ancf.actions.loads.Load`.
+    points
+        Where the force is asked.
+    force
+        The function of the points x (2, ...) and the time that returns (2, ...).
+    """
+
+    def __init__(self, beam: Beam, points: Any, force: Any,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.points, self.per_length = points, force
+
+    def at(self, t: float) -> tuple[Array, Spread]:
+        values = ask_field("force(x, t)", lambda x: self.per_length(x, t), self.points.x)
+        return self.points.load(self.beam, values)
 
 
 def of_place_and_time(force: Any) -> bool:

@@ -175,26 +175,3 @@ class Train(TimedLoad):
                 xi = (x - ends[e]) / (ends[e + 1] - ends[e])
                 places.append((force * self.direction, e, np.array([xi, 0.5])))
         return places
-
-
-class MovingLineLoad(TimedLoad):
-    """A force per length of the stress-free axis that depends on time.
-
-    Parameters
-    ----------
-    beam, amplitude
-        A :class:`~skfem_ancf.Beam`, and as for :class:`~skfem_ancf.actions.loads.Load`.
-    made
-        A function of a force per length, a function of x, that makes the dead load of it.
-    force
-        The function of the points x (2, ...) and the time that returns (2, ...).
-    """
-
-    def __init__(self, beam: Beam, made: Callable[..., Any], force: Callable[..., Any],
-                 amplitude: TimeFunction = None) -> None:
-        super().__init__(beam, amplitude)
-        self.made, self.per_length = made, force
-
-    def at(self, t: float) -> tuple[Array, Spread]:
-        load = self.made(lambda x: self.per_length(x, t))
-        return load.vector, load.spread(load.vector)
