@@ -36,6 +36,8 @@ def test_ramps_take_numbers_vectors_and_many_times():
     (lambda: Steps(press=1.0).ramp(press=np.nan), InputError, "press"),
     (lambda: Ramp([0, 0], [1, 2]), InputError, "ascend"),
     (lambda: Ramp([0, 1], [1, 2, 3]), InputError, "as many"),
+    (lambda: Ramp([0, 1], ["a", "b"]), InputError, "values"),
+    (lambda: Ramp([0], 1.0), InputError, "as many"),
 ])
 def test_wrong_steps_are_explained(wrong, error, says):
     with pytest.raises(error, match=says):
@@ -210,6 +212,8 @@ def test_curves_of_sensors_are_drawn():
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("tip 1", "force")
     with pytest.raises(InputError, match="a pair of its name and a component"):
         history.plot_curve("t", "tip")
+    with pytest.raises(InputError, match="component"):
+        history.plot_curve("t", ("tip", 5))
     with pytest.raises(NameUnknown, match="force"):
         history.plot_curve("t", "forse")
     with pytest.raises(InputError, match="same instants"):

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .errors import InputError, NameUnknown, require_finite, require_positive
 from .immutable import Immutable
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from .types import Array
+from .types import Array
 
 
 class Ramp(Immutable):
@@ -33,11 +30,10 @@ class Ramp(Immutable):
 
     def __init__(self, times: ArrayLike, values: ArrayLike) -> None:
         self.times = require_finite("times", times, (None,))
-        self.values = np.asarray(values, dtype=float)
-        require_finite("values", self.values, self.values.shape)
+        self.values = require_finite("values", values)
         if not len(self.times) or np.any(np.diff(self.times) <= 0.0):
             raise InputError(f"the times of a Ramp must ascend, got {self.times.tolist()}")
-        if len(self.values) != len(self.times) or self.values.ndim > 2:
+        if self.values.ndim not in (1, 2) or len(self.values) != len(self.times):
             raise InputError(f"a Ramp with {len(self.times)} times has as many numbers or vectors, "
                              f"got values of shape {self.values.shape}")
 

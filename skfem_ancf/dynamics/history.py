@@ -369,7 +369,8 @@ class History(MaterialPoints):
         sensor, *parts = (of,) if isinstance(of, str) else of
         values = self.sensors[sensor]
         for part in parts:
-            values = values.reshape(len(values), -1)[:, part]
+            values = values.reshape(len(values), -1)
+            values = values[:, require_index("component", part, values.shape[1])]
         if values.ndim != 1:
             raise InputError(f"the sensor {sensor!r} reads numbers of shape {values.shape[1:]}: "
                              f"give a pair of its name and a component, as ({sensor!r}, 1)")

@@ -164,13 +164,12 @@ class _Record:
         if not self._motions:
             columns |= dict.fromkeys(("u", "v", "acceleration"), empty)
         results = [instant.result for instant in self._instants]
-        history = StepHistory(
+        return StepHistory(
             self.system, self.scheme, columns, (None, None), self._recorder.readings(),
-            event=None, steps=len(results) - 1, substeps=0, rejected=0,
+            event=None, steps=max(0, len(results) - 1), substeps=0, rejected=0,
             iterations=sum(x.iterations for x in results), factorizations=0, plan=self.plan,
             found_by=[x.way for x in self._instants],
             iterations_at=np.array([x.iterations for x in results], dtype=int))
-        return history
 
 
 def _stored(value):
