@@ -214,21 +214,13 @@ def test_derivatives_given_and_found_agree():
 
 def test_psi_compiled_by_numba():
     njit = pytest.importorskip("numba").njit
+    gradient = njit(soft_gradient)
 
     @njit
     def psi(r, F, X, t):
         J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
         return (50.0 * ((r[0] - X[0])**2 + (r[1] - X[1])**2 + J**2 * r[1]) + 10.0 * F[0, 1]**2
                 + 1e-9 * t)
-
-    @njit
-    def gradient(r, F, X, t):
-        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
-        d = 100.0 * (r - X)
-        d[1] += 50.0 * J**2
-        P = 100.0 * J * r[1] * np.array([[F[1, 1], -F[1, 0]], [-F[0, 1], F[0, 0]]])
-        P[0, 1] += 20.0 * F[0, 1]
-        return d, P
 
     def solved(*functions):
         return cantilever(4, 0.1, 0.1, ElementBeamANCF(2)).gravity((0.0, -9.81)).energy(

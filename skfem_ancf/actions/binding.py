@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from ..beam.layout import Layout
-from ..core.errors import AncfError, InputError, require_finite, shown
+from ..core.errors import InputError, explained, require_finite, shown
 from ..core.types import Array
 from .forces.base import ForceElement, Part, bind_force, derivative, try_force
 from .forces.unscaled import Unscaled
@@ -36,7 +36,9 @@ def bind_item(item: Item, layout: Layout) -> list[Any]:
 
 def _bind_custom(item, layout):
     """The parts of a user-defined item."""
-    try:
+    hint = ("its energy(u, t), force(u, v, t) and constraint(u, t) take displacements and "
+            f"velocities of all degrees of freedom, shape ({layout.N},)")
+    with explained("{!r} fails in the reference configuration", hint, InputError, item):
         bound = item.bind(layout)
         if not isinstance(bound, Item):
             raise InputError(f"bind(layout) of {item!r} must return an Item, got {shown(bound)}")
@@ -45,13 +47,6 @@ def _bind_custom(item, layout):
             out.append(_Force(bound, layout))
         if hasattr(bound, "constraint"):
             out.append(_Constraint(bound, layout))
-    except AncfError:
-        raise
-    except Exception as error:  # it is the user's: it may raise anything
-        raise InputError(
-            f"{item!r} fails in the reference configuration: {type(error).__name__}: {error}; its "
-            "energy(u, t), force(u, v, t) and constraint(u, t) take displacements and velocities "
-            f"of all degrees of freedom, shape ({layout.N},)") from error
     if not out:
         raise InputError(f"{item!r} does nothing: an item defines energy(u, t), force(u, v, t), "
                          "constraint(u, t) or mass()")

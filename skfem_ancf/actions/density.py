@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..beam.kinematics import entries_of
 from ..core.types import Array
 from .loads import Load
 
@@ -105,8 +106,8 @@ class Density(Load):
             AT = A.reshape(n, points, 12, 3) @ T.transpose(0, 2, 3, 1)  # (n, np, (i, k, j), nb)
             AT = AT.reshape(n, points, 2, 3, 2, nb).transpose(0, 1, 3, 2, 5, 4)
             K = T.reshape(n, nb, -1) @ AT.reshape(n, 3 * points, -1)  # (n, nb, (i, b, j))
-            i, j = np.broadcast_arrays(part.dofs[:, :, None], part.dofs[:, None])
-            rows.append(i.ravel())
-            columns.append(j.ravel())
+            i, j = entries_of(part.dofs)
+            rows.append(i)
+            columns.append(j)
             values.append(-K.ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)

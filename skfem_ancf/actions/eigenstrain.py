@@ -17,6 +17,7 @@ import numpy as np
 from ..beam.beam import Beam
 from ..beam.distribution import Spread
 from ..beam.kernels.kernel import stresses_of
+from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.strains import on_grid, strain_at, stretched
 from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
@@ -155,9 +156,7 @@ class EigenStrain(Load):
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         beam = self.beam
         K = beam.kernel.pushed_tangents(self._pushed(self._size), u)
-        dofs = beam.mesh.t[0][:, None] * beam.nd + np.arange(2 * beam.nd)
-        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
-        return rows.ravel(), columns.ravel(), -K.ravel()
+        return *entries_of(element_dofs(beam)), -K.ravel()
 
     def potential(self, u: Array) -> float:
         if self._strains is not None:

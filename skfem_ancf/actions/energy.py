@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, Sampled, Spread
+from ..beam.kinematics import element_dofs
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
 from ..beam.surfaces import LEFT, RIGHT, TOP, groups_of, surfaces_of
@@ -357,9 +358,3 @@ def _points(beam, elements, X, weights, of):
     mapping = beam.mesh.mapping()
     return points_of(element_dofs(beam, elements), np.asarray(mapping.F(X, elements)), weights,
                      *beam.element.functions(mapping, X, elements), of)
-
-
-def element_dofs(beam: Beam, elements: Array) -> Array:
-    """Degrees of freedom (n, 2 nb) of elements (n,)."""
-    return (beam.nd * beam.mesh.t[:, elements].T[:, :, None] + np.arange(beam.nd)).reshape(
-        len(elements), -1)

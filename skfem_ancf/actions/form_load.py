@@ -18,7 +18,7 @@ from skfem.element import DiscreteField
 from ..beam.distribution import BODY, Sampled, Spread, facets_along
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember
-from ..core.errors import (AncfError, CallbackError, InputError, require_flag, require_slope, shown,
+from ..core.errors import (CallbackError, InputError, explained, require_flag, require_slope, shown,
                            warnings_as_errors)
 from ..core.types import Array, Place, TimeFunction
 from .density import Density, points_of
@@ -156,22 +156,19 @@ class FormLoad(Density):
     def _values(self, form, *args):
         """What a form of the caller's returns at the points."""
         what = f"the form of a load, form({'u, ' * (len(args) == 3)}v, w),"
-        try:
-            with warnings_as_errors(_COMPLEX):
-                found = np.empty(self._basis.dx.shape)
+        hint = "it must return a real number at each point, as v[1]"
+        with explained("{} fails", hint, CallbackError, what), warnings_as_errors(_COMPLEX):
+            found = np.empty(self._basis.dx.shape)
+            try:
                 found[:] = form(*args)
-                return found
-        except (KeyError, AttributeError) as error:
-            name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))
-            if name is None:
-                raise CallbackError(f"{what} raised {type(error).__name__}: {error}") from error
-            raise CallbackError(f"{what} uses w.{name[1] or name[2]}, which there is not: it knows "
-                                "w.x, w.h, on a boundary w.n, and w.r, w.F and w.t") from error
-        except AncfError:
-            raise
-        except Exception as error:  # it is the user's: it may raise anything
-            raise CallbackError(f"{what} fails: {type(error).__name__}: {error}; it must return a "
-                                "real number at each point, as v[1]") from error
+            except (KeyError, AttributeError) as error:
+                name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))
+                if name is None:
+                    raise CallbackError(f"{what} raised {type(error).__name__}: {error}") from error
+                raise CallbackError(
+                    f"{what} uses w.{name[1] or name[2]}, which there is not: it knows w.x, w.h, "
+                    "on a boundary w.n, and w.r, w.F and w.t") from error
+            return found
 
     def _slope(self, y, part):
         return -self._asked(y)[0]

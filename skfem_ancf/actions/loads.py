@@ -18,7 +18,7 @@ from ..beam.beam import Beam
 from ..beam.distribution import Spread, on_facets, stations_of_vector
 from ..beam.domain import Domain
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
-from ..beam.kinematics import direction
+from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
 from ..beam.surfaces import add_nodal, surfaces_of
@@ -456,14 +456,12 @@ class Pressure(Load):
 
 def _follower(beam, facets, p):
     """The force of a pressure over the position, ``-n da`` being its derivative, turned; sparse."""
-    mesh, nd, row, column, value = beam.mesh, beam.nd, [], [], []
+    mesh, row, column, value = beam.mesh, [], [], []
     for one in surfaces_of(beam, facets, beam.element.facet_points):
         functions, grad = beam.element.functions(mesh.mapping(), one.X, one.elements)
         slopes = grad[:, 0] * one.along[0] + grad[:, 1] * one.along[1]
         both = p * np.einsum("iep,jep,ep->eij", functions, slopes, one.weights)
-        dofs = (mesh.t[:, one.elements].T[:, :, None] * nd + np.arange(0, nd, 2)).reshape(
-            len(one.elements), -1)
-        i, j = (x.ravel() for x in np.broadcast_arrays(dofs[:, :, None], dofs[:, None]))
+        i, j = entries_of(element_dofs(beam, one.elements)[:, ::2])
         row += [i, i + 1]
         column += [j + 1, j]
         value += [-both.ravel(), both.ravel()]

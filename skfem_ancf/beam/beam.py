@@ -379,9 +379,8 @@ class Beam(Immutable):
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""
-        dofs = self.basis.element_dofs.T
-        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
-        M = sparse.coo_matrix((self.mass_elements().ravel(), (rows.ravel(), columns.ravel())),
+        entries = kinematics.entries_of(self.basis.element_dofs.T)
+        M = sparse.coo_matrix((self.mass_elements().ravel(), entries),
                               shape=(self.N, self.N)).tocsr()
         M.eliminate_zeros()
         return M

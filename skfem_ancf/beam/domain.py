@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from skfem import Basis, BilinearForm, ElementVector, LinearForm
 from skfem.assembly.dofs import DofsView
 
-from ..core.errors import (AncfError, CallbackError, InputError, MeshError, NameUnknown,
+from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, explained,
                            require_finite, require_label, require_slope, shown)
 from ..core.immutable import Immutable, read_only
 from ..core.quadrature import gauss
@@ -149,16 +149,11 @@ class Domain(Immutable):
         return {"u": self.basis.interpolate(np.asarray(u)[self._rank])}
 
     def _ask(self, name, function, *args, **options):
-        try:
-            with np.errstate(all="ignore"):  # an iterate may be turned inside out
-                return function(*args, **options)
-        except AncfError:
-            raise
-        except Exception as error:  # it is the user's: it may raise anything
-            raise CallbackError(
-                f"the {name} of {self!r} fails: {type(error).__name__}: {error}; residual and "
-                "tangent know w['u'], the displacement, w['u'].grad, w.x and w.h; mass and loads "
-                "w.x, w.h and, on a boundary, w.n") from error
+        hint = ("residual and tangent know w['u'], the displacement, w['u'].grad, w.x and w.h; "
+                "mass and loads w.x, w.h and, on a boundary, w.n")
+        with explained("the {} of {!r} fails", hint, CallbackError, name, self), np.errstate(
+                all="ignore"):  # an iterate may be turned inside out
+            return function(*args, **options)
 
     def force(self, u: Array) -> Array:
         """The internal force at a displacement of the scene's DOFs, (N,) both."""

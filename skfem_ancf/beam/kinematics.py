@@ -71,6 +71,18 @@ def probe_reference(beam: Any, e: int, X: Array) -> tuple[Array, Array]:
     return dofs, beam.element.of_mesh(beam.mesh.mapping(), X, np.array([e]))[0].ravel()
 
 
+def element_dofs(beam: Any, elements: Array | None = None) -> Array:
+    """Degrees of freedom (n, 2 nd) of elements (n,), by default of all."""
+    first = beam.nd * (beam.mesh.t[0] if elements is None else beam.mesh.t[0, elements])
+    return np.asarray(first[:, None] + np.arange(2 * beam.nd))
+
+
+def entries_of(dofs: Array) -> tuple[Array, Array]:
+    """Rows and columns of the entries of square matrices with these DOFs (n, k), (n k k,) both."""
+    rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+    return rows.ravel(), columns.ravel()
+
+
 def direction(beam: Any, node: int) -> tuple[Array, Array]:
     """Degrees of freedom (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section.
 

@@ -434,6 +434,29 @@ def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator[None]:
+    """What a user's code raises in the block, whatever it is, as an error with a hint.
+
+    ``what`` is formatted with ``of`` if it is needed. Errors of the package pass.
+
+    Examples
+    --------
+    >>> from skfem_ancf.core.errors import InputError, explained
+    >>> with explained("{} fails", "give a number", InputError, "f(x)"):  # doctest: +ELLIPSIS
+    ...     1 / 0
+    Traceback (most recent call last):
+    ...
+    skfem_ancf.core.errors.InputError: f(x) fails: ZeroDivisionError: ...; give a number
+    """
+    try:
+        yield
+    except AncfError:
+        raise
+    except Exception as error:
+        raise kind(f"{what.format(*of)}: {type(error).__name__}: {error}; {hint}") from error
+
+
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
     """What a function of the caller's returns; if it raises, a :class:`CallbackError` says of what.
 

@@ -14,7 +14,7 @@ from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted,
 from ..core.progress import progress_bar
 from ..core.switch import expecting
 from ..core.types import Array, StrPath
-from ..equations.stability import position_weights
+from ..equations.stability import largest_displacement
 from ..equations.system import System
 from ..results.state import State
 from .base import Scheme, in_steps, same_scheme
@@ -158,9 +158,7 @@ def _difference(history, begun, task, progress):
         return np.nan
     except Interrupted as stopped:
         raise Interrupted(str(stopped), history) from None
-    places = np.nonzero(position_weights(system))[0]
-    off = (other.u - history.u)[:, places].reshape(-1, 2)
-    return float(np.hypot(*off.T).max(initial=0.0)) / system.size
+    return largest_displacement(system, other.u - history.u) / system.size
 
 
 def _samples(system, t_start, t_end):

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from ..beam.kinematics import element_dofs, entries_of
 from ..beam.strain_energy import body_tangent
 from ..core.errors import InputError
 from ..core.linalg import BandMatrix
@@ -52,8 +53,7 @@ def matrices_of(system: Any, state: Any) -> SceneMatrices:
         u, time, state.multipliers)
     D = sparse.csr_array((system.N, system.N))
     for beam, s in zip(system.beams, system.slices):
-        dofs = s.start + beam.nd * beam.mesh.t[0][:, None] + np.arange(2 * beam.nd)
-        i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+        i, j = entries_of(s.start + element_dofs(beam))
         K = K + _square(system, i, j, beam.kernel.tangents(u[s]))
     if system.viscous:
         band, none = BandMatrix(system.N, system.bandwidth), tables.stresses
@@ -75,9 +75,8 @@ def matrices_of(system: Any, state: Any) -> SceneMatrices:
     if system.damped:
         force = force - system.damping_force(u, v, t)
     return SceneMatrices(M, sparse.csr_array(D), sparse.csr_array(K), force,
-                    system.constraints.sparse_jacobian(u, time))
+                         system.constraints.sparse_jacobian(u, time))
 
 
 def _square(system, i, j, values):
-    return sparse.csr_array((np.ravel(values), (np.ravel(i), np.ravel(j))),
-                            shape=(system.N, system.N))
+    return sparse.csr_array((np.ravel(values), (i, j)), shape=(system.N, system.N))

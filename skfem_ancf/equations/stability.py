@@ -214,6 +214,12 @@ def potential(system: Any, u: Array, load: float, turned: Array | None = None) -
     return system.strain_energy(u, load) + load * system.load_potential(u, turned=turned)
 
 
+def largest_displacement(system: Any, du: Array) -> float:
+    """The largest displacement of a node, of changes of the DOFs (..., N)."""
+    places = np.nonzero(position_weights(system))[0]
+    return float(np.hypot(*du[..., places].reshape(-1, 2).T).max(initial=0.0))
+
+
 def position_weights(system: Any) -> Array:
     """One at the positions of the nodes, zero at other coordinates, shape (N,)."""
     weights = np.zeros(system.N)

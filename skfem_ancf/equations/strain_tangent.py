@@ -19,6 +19,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
 from ..actions.forces.kernels import add_elastic_force
+from ..beam.kinematics import element_dofs, entries_of
 from ..core.errors import ConvergenceError, SupportError
 from ..core.types import Array
 from .condensation import Condensed
@@ -187,8 +188,8 @@ def _beam_rows(beam, u):
     """B and C B of one beam as sparse matrices, and its weighted stresses."""
     B, CB, stress = beam.kernel.gradients(u)
     n, stress = B.shape[2], stress.ravel()
-    dofs = beam.nd * beam.mesh.t[0][:, None, None] + np.arange(n)
-    j, first = np.broadcast_to(dofs, B.shape).ravel(), n * np.arange(len(stress) + 1)
+    j = np.broadcast_to(element_dofs(beam)[:, None], B.shape).ravel()
+    first = n * np.arange(len(stress) + 1)
     return (*(sparse.csr_matrix((x.ravel(), j, first), shape=(len(stress), beam.N))
               for x in (B, CB)), stress)
 
@@ -198,9 +199,7 @@ def _beam_geometric(beam, u, stress):
     if not np.any(stress):
         return sparse.csr_matrix((beam.N, beam.N))
     S = beam.kernel.geometric(u, stress.reshape(beam.mesh.nelements, -1))
-    dofs = beam.nd * beam.mesh.t[0][:, None] + np.arange(S.shape[1])
-    i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
-    return sparse.csr_matrix((S.ravel(), (i.ravel(), j.ravel())), shape=(beam.N, beam.N))
+    return sparse.csr_matrix((S.ravel(), entries_of(element_dofs(beam))), shape=(beam.N, beam.N))
 
 
 def is_symmetric(S: csr_matrix, sizes: Array) -> bool:

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..actions.density import points_of
-from ..actions.energy import Energy, element_dofs
+from ..actions.energy import Energy
+from ..beam.kinematics import element_dofs
 from ..core.errors import require_like
 from ..formulations import get_formulation
 from .weak import green_lagrange, moduli_of, piola

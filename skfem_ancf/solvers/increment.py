@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,6 +95,13 @@ class Increment:
                 and not descent.heads_on(system, start, found.u, self.level)):
             raise Unstable("the equilibrium found lies on the other side", found)
         return found
+
+    def reached(self, found: Equilibrium) -> StaticResult:
+        """The result after the increment, with what it leaves behind at obstacles."""
+        contacts, start = self.system.forces.contacts, self.start
+        contacts.settle(found.u, self.time)
+        return replace(start, steps=[*start.steps, self.record], load=self.level,
+                       memory=contacts.remember(), **found._asdict())
 
     def _augmented(self):
         """Again until obstacles that ask for it are entered no deeper than that."""
@@ -193,10 +201,8 @@ class Increment:
     def _target(self, tables, u):
         """The :class:`~skfem_ancf.solvers.iteration.Target` of the level."""
         constraints, route = self.system.constraints, self.options.route
-        gap, clock = route.gap, self.system.clock
-        values, fixed = constraints.values(self.time), constraints.fixed
-        if clock is not None:
-            values = constraints.values(self.load, self.time)
+        gap, clock, fixed = route.gap, self.system.clock, constraints.fixed
+        values = constraints.values(self.time if clock is None else self.load, self.time)
         if gap is None:
             gap = np.zeros(self.system.N)
         else:

@@ -265,14 +265,14 @@ class Search:
             with np.errstate(all="ignore"):  # what overflows is seen in the residual
                 found = step.solve(self._wanted(route))
             if self._elsewhere(route, found):
-                self.other = self.other or self._followed(result, step, found)
+                self.other = self.other or step.reached(found)
                 raise Unstable("the equilibrium found lies on the other side", found)
         except Soft:
             self.soft = True
             raise
         finally:
             self._spent += step.record.iterations
-        return self._followed(result, step, found)
+        return step.reached(found)
 
     def descent(self, method: str, eased: bool = False,
                 route: Route | None = None) -> StaticResult:
@@ -305,7 +305,7 @@ class Search:
             raise StepFailed("a tangent has no factors") from error
         finally:
             self._spent += step.record.iterations
-        return self._followed(result, step, found)
+        return step.reached(found)
 
     # how
 
@@ -355,13 +355,6 @@ class Search:
                             np.zeros(system.N), [], False, "no load step has converged",
                             memory=self._memory)
 
-    def _followed(self, result, step, found):
-        """The result after a load step."""
-        contacts = self.system.forces.contacts
-        contacts.settle(found.u, step.time)
-        return replace(result, steps=[*result.steps, step.record], load=step.level,
-                       memory=contacts.remember(), **found._asdict())
-
     def _load_steps(self, route, result, rules):
         stable = self._wanted(route)
         result = result or self._beginning(route)
@@ -399,7 +392,7 @@ class Search:
                 size = load - result.load
                 bar.update(size)
                 # one assignment: who interrupts finds the old result or the new one
-                result = self._followed(result, step, found)
+                result = step.reached(found)
                 if route is self.route and (self.furthest is None
                                             or result.load > self.furthest.load):
                     self.furthest = result  # what an error has

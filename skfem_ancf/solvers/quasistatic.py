@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.types import Array
-from ..equations import stability
+from ..equations.stability import largest_displacement
 from ..equations.system import System
 from .increment import Increment, Options, Route
 from .newton import Search
@@ -125,24 +125,14 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             except StepFailed as failure:
                 failed = failure
                 continue
-            moved = _largest(system, found.u - last.result.u)
+            moved = largest_displacement(system, found.u - last.result.u)
             if moved > far and not smallest:
                 failed = StepFailed(f"a node moves by {moved:.3g}")
                 break
-            contacts = system.forces.contacts
-            contacts.settle(found.u, t)
-            result = replace(start, steps=[step.record], load=1.0, converged=True,
-                             memory=contacts.remember(), **found._asdict())
-            return Instant(t, result, FOLLOWED if moved <= far else f"{JUMPED} by {method}",
-                           moved / (t - last.t))
+            way = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
+            return Instant(t, step.reached(found), way, moved / (t - last.t))
         if not smallest:
             raise failed
         logger.info("t = %.6g: %s, going on to another equilibrium", t, failed)
         result = Search(system, last.result.u, last.result.memory, rules, stable, False).find()
     return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")
-
-
-def _largest(system: System, du: Array) -> float:
-    """The largest displacement of a node."""
-    places = np.nonzero(stability.position_weights(system))[0]
-    return float(np.hypot(*du[places].reshape(-1, 2).T).max(initial=0.0))

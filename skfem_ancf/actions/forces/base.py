@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 from ...beam.beam import Beam
 from ...beam.distribution import Facets
 from ...beam.layout import Layout
-from ...core.errors import (AncfError, InputError, require_finite, require_slope, shown,
+from ...core.errors import (InputError, explained, require_finite, require_slope, shown,
                             warnings_as_errors)
 from ...core.origin import ours
 from ...core.types import Array
@@ -205,19 +206,13 @@ def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
     """
     bound = element._thawed()
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
-    try:
+    hint = ("a force element defines bind(scene), which returns a list of points, and force(x, v, "
+            "t) of shape (points, 2)")
+    with explained("{!r} fails in the stress-free state", hint, InputError,
+                   element) if own else nullcontext():
         bound.links = _links(element, bound.bind(layout))
         if bound.parts() is None:
             try_force(bound)
-    except AncfError:
-        raise
-    except Exception as error:
-        if not own:
-            raise
-        raise InputError(  # it is the user's: it may raise anything
-            f"{element!r} fails in the stress-free state: {type(error).__name__}: {error}; a force "
-            "element defines bind(scene), which returns a list of points, and force(x, v, t) of "
-            "shape (points, 2)") from error
     bound._freeze()
     return bound
 

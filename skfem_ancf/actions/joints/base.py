@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout
-from ...core.errors import AncfError, InputError, require_finite, require_slope, shown
+from ...core.errors import InputError, explained, require_finite, require_slope, shown
 from ...core.origin import ours
 from ...core.types import Array
 from ...mesh.places import is_point
@@ -219,21 +220,15 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
         As it was given, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     """
     bound = joint._thawed()
-    try:
+    hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
+            "multipliers) unless that is constant")
+    with nullcontext() if ours(joint) else explained(
+            "{!r} fails in the stress-free state", hint, InputError, joint):
         bound.bind(layout)
         bound._freeze()
         if not ours(joint):
             _try(bound, layout.N)
             beside(partial(require_derivatives, bound, layout.sizes), layout.sizes)
-    except AncfError:
-        raise
-    except Exception as error:
-        if ours(joint):
-            raise
-        raise InputError(  # it is the user's: it may raise anything
-            f"{joint!r} fails in the stress-free state: {type(error).__name__}: {error}; a joint "
-            "defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, multipliers) "
-            "unless that is constant") from error
     return bound
 
 
