@@ -6,7 +6,7 @@
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
 # make margins  the tests, with how far their comparisons are from round-off, out/margins.txt
 # make coverage  the tests, with the lines and branches that they run
-# make lint    ruff and mypy, of the versions that pyproject.toml names
+# make lint    ruff, mypy and codespell, of the versions that pyproject.toml names
 # make docs    the pages of docs/, the gallery and the reference, out/docs/index.html
 # make pictures  the pictures of docs/ that README.md and the pages show, anew
 # make dist    sdist and wheel, in out/dist
@@ -74,6 +74,7 @@ LINT := $(VENV)/lint
 lint: $(LINT)/stamp
 	$(LINT)/bin/ruff check
 	$(LINT)/bin/mypy
+	$(LINT)/bin/codespell README.md CONTRIBUTING.md CHANGELOG.md docs skfem_ancf tests demos benchmarks validation
 
 $(LINT)/stamp: pyproject.toml | $(PY)
 	$(PY) -m venv $(LINT)

@@ -255,7 +255,7 @@ def test_open_joint_at_the_start():
     a, b = soft(), soft(mesh=MeshBeam.init_line([1.1, 2.0], 0.5))
     scene = Scene(a, b)
     scene.joint("hinge", beams=(a, b), at=((1, 0), (1.1, 0)))
-    with pytest.raises(SupportError, match=r"open by 0\.1 "):
+    with pytest.raises(SupportError, match=r"largest gap is 0\.1\. "):
         scene.integrate(0.1, 0.01)
 
 

@@ -33,7 +33,7 @@ class FollowerForce(Load):
     Parameters
     ----------
     force
-        The force in the stress-free state, shape (2,).
+        The force in the reference configuration, shape (2,).
     at
         The point: its place (x, y) in the reference configuration, shape (2,).
     beam

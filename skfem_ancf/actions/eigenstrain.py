@@ -207,9 +207,9 @@ class Temperature(EigenStrain):
     Parameters
     ----------
     change
-        In degrees from the stress-free state: a number, or a function of material coordinates x,
-        the parameter of the axis, and y, the distance from it, arrays of one shape; or of
-        (x, y, t), which statics take at t = 1.
+        In degrees from the reference configuration: a number, or a function of material coordinates
+        x, the parameter of the axis, and y, the distance from it, arrays of one shape; or of (x, y,
+        t), which statics take at t = 1.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """

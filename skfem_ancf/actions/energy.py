@@ -1,4 +1,4 @@
-"""An energy density of one's own, of position, deformation gradient, material point and time."""
+"""A user-defined energy density of position, deformation gradient, material point and time."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class _Where(NamedTuple):
 class Energy(Density):
     """An energy whose density is a function of yours, with derivatives that may be found.
 
-    ``psi(r, F, X, t)`` is the energy per volume of the stress-free body, per area of a side or an
-    end, or per length of the axis. It is asked at many points at once:
+    ``psi(r, F, X, t)`` is the energy per volume of the reference configuration, per area of a side
+    or an end, or per length of the axis. It is asked at many points at once:
 
     * ``r``: the position, shape (2, nelements, npoints),
     * ``F``: the deformation gradient, ``F[i, j] = d r_i / d X_j``, (2, 2, nelements, npoints),
-    * ``X``: the material point, (2, nelements, npoints), its place in the stress-free body,
+    * ``X``: the material point, (2, nelements, npoints), its place in the reference configuration,
     * ``t``: the time of a motion; 0 in statics.
 
     It is scaled with the loads, as gravity is: ``scene.buckling()`` finds the factor on it; with

@@ -177,7 +177,7 @@ class Load(Item):
         raise NotImplementedError
 
     def potential(self, u: Array) -> float | None:
-        """The potential, minus the work done from the stress-free state; None if there is none."""
+        """Minus the work done from the reference configuration; None if there is no potential."""
         return None
 
     def spread(self, u: Array) -> Spread | None:
@@ -222,7 +222,7 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
                          "and by refinement: what has the size of one is made in bind(beam) or "
                          "force(u), of places along self.beam") from None
     except Exception as error:  # it is the user's: it may raise anything
-        raise InputError(f"{load!r} fails in the stress-free state: {type(error).__name__}: "
+        raise InputError(f"{load!r} fails in the reference configuration: {type(error).__name__}: "
                          f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
                          "unless it is constant") from error
     require_entries(f"the stiffness of {load!r}", i, j, v, beam.N)
@@ -251,7 +251,7 @@ def _require_derivatives(load, u, d):
         force, *forces = (load.force(u + s * d) for s in (0.0, -1.0, 1.0))
         potentials = [load.potential(u + s * d) for s in (0.0, -1.0, 1.0)]
         i, j, v = load.stiffness(u)
-    except Exception:  # it may be one of the stress-free state alone
+    except Exception:  # it may be one of the reference configuration alone
         return
     K, noise = sparse.coo_array((v, (i, j)), shape=(len(u), len(u))), 1e-13 * np.abs(force).max()
     require_slope(f"stiffness(u) of {load!r}", "force(u)", forces[1] - forces[0], 2.0 * (K @ d),

@@ -81,8 +81,8 @@ class MovingForce(TimedLoad):
     force
         The force, shape (2,).
     at
-        A function of time that returns the place (x, y) in the stress-free body on which the force
-        acts, shape (2,), on the axis or not; None while it is not on the beam.
+        A function of time that returns the place (x, y) in the reference configuration on which the
+        force acts, shape (2,), on the axis or not; None while it is not on the beam.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
 

@@ -69,8 +69,9 @@ def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     beam
         The beam, rigid body or domain, its name or its number; "ground" for a point of the ground.
     at
-        The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
-        mass of a rigid body; a place of a beam that is one section, as "left", for its axis there.
+        The point: its place (x, y) in the reference configuration, shape (2,); None for the centre
+        of mass of a rigid body; a place of a beam that is one section, as "left", for its axis
+        there.
     """
     if is_ground(beam):
         return Vector(np.array(as_point(at)))

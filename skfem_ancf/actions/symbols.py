@@ -199,7 +199,7 @@ def _values(function, at):
 
 @symbols.register(Load)
 def _(load, layout):
-    beam = layout.beam(load.beam)  # of one's own, or a form: its forces on the nodes
+    beam = layout.beam(load.beam)  # user-defined, or a form: its forces on the nodes
     if isinstance(beam, Beam) and not isinstance(load, EigenStrain):
         given = load if isinstance(load, DeadLoad) else load.bind(beam)
         force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]

@@ -19,7 +19,7 @@ class JointTables(NamedTuple):
     """The joints of a scene.
 
     ``hk, hi, hj, hv`` are H by equation, row, column and value, both halves; ``gk, gi`` equation
-    and column of each entry of g; ``sizes`` what each equation is open by in a displacement of the
+    and column of each entry of g; ``sizes`` the residual of each equation in a displacement of the
     scene's size; ``own`` the handle of what has joints that are not quadratic, 0 for none.
     """
 

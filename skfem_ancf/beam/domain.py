@@ -311,8 +311,8 @@ class Domain(Immutable):
             raise NameUnknown("boundary", boundary, list(mesh.boundaries or {}))
         if is_point(boundary):
             raise InputError(f"this is asked of a boundary of {self!r}, got the point "
-                             f"{shown(boundary)}; a point is held by scene.pin, and joined to "
-                             "another one by scene.hinge")
+                             f"{shown(boundary)}; scene.pin supports a point, and "
+                             "scene.hinge joins it to another one")
         found = mesh.normalize_facets(boundary)
         if not len(found):
             raise MeshError(f"no facet of the boundary of {self!r} is at {shown(boundary)}")

@@ -149,7 +149,7 @@ def solve_dependent(S, b):
     """Solve in place of b, a vector, equations of which some may repeat others.
 
     S, shape (m, m), is scaled to a unit diagonal and eliminated with complete pivots up to those
-    that are round-off: what is left is held by the other equations, up to what b does not say. Of
+    that are round-off: the other equations determine what is left, up to what b does not say. Of
     all solutions b becomes the smallest in that scale. False if S is not finite or zero.
     """
     m, size = b.size, np.abs(np.diagonal(S)).copy()

@@ -1,4 +1,4 @@
-"""What kernels ask of Python objects: loads, joints and laws of one's own, joints, descents.
+"""What kernels ask of Python objects: loads, joints and user-defined laws, joints, descents.
 
 An object is known by a handle, a positive number: compiled code can hold one, and calls back.
 """
@@ -27,7 +27,7 @@ def owner(handle: int) -> Any:
 
 @primitive("skfem_ancf.core.loops")
 def own_force(handle, t, scale, u, out):
-    """Add the loads of one's own at a time, which is not a number in statics."""
+    """Add the user-defined loads at a time, which is not a number in statics."""
     owner(handle).add_own_force(t, scale, u, out)
 
 
@@ -51,7 +51,7 @@ def own_joints(handle, what, t, u, v, out):
 
 @primitive("skfem_ancf.core.loops")
 def own_elements(handle, what, t, factor, a, b, out):
-    """Force elements of one's own, see :meth:`skfem_ancf.actions.forces.system.Forces.add_own`."""
+    """User-defined force elements, see :meth:`skfem_ancf.actions.forces.system.Forces.add_own`."""
     owner(handle).forces.add_own(what, t, factor, a, b, out)
 
 
@@ -64,7 +64,7 @@ def own_poses(handle, t, span, poses):
 
 @primitive("skfem_ancf.core.loops")
 def own_distance(handle, obstacle, t, x, out):
-    """Distance, gradient and second derivatives of a shape of one's own."""
+    """Distance, gradient and second derivatives of a user-defined shape."""
     owner(handle).ask(obstacle, t, x, out)
 
 

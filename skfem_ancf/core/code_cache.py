@@ -64,7 +64,7 @@ def can_keep() -> bool:
 
 @cache
 def _warn_of(path):
-    warn(f"compiled code is not kept in {str(path)!r}: each process compiles anew. Make "
+    warn(f"compiled code is not kept in {str(path)!r}: each process compiles again. Make "
          "the folder writable, or set the environment variable NUMBA_CACHE_DIR to another one",
          CompilationWarning)
 
@@ -85,7 +85,7 @@ def cannot_keep(reason: object) -> None:
 def key() -> str:
     """What compiled code depends on, in 16 letters: names by which it is kept end with them.
 
-    Numba's own index of what it keeps is that of one version, which another writes anew.
+    Numba's own index of what it keeps is that of one version, which another writes again.
     """
     try:
         numba = version("numba")

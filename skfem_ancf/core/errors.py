@@ -173,7 +173,7 @@ class CheckpointWarning(UserWarning):
 
 
 class CompilationWarning(UserWarning):
-    """Compiled code cannot be kept on disk: each process compiles anew."""
+    """Compiled code cannot be kept on disk: each process compiles again."""
 
 
 class SweepWarning(UserWarning):

@@ -90,7 +90,7 @@ class Immutable(metaclass=_Freezing):
 
 
 def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
-    """``thing`` made anew with some arguments changed; the others are its attributes of that name.
+    """A copy of ``thing`` with some arguments changed; the others are its attributes of that name.
 
     A constructor that passes ``**kwargs`` on takes the names ``more`` by them.
     """

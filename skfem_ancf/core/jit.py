@@ -2,7 +2,7 @@
 
 Marked functions are registered by ``numba.extending``, so that compiled code finds them by what
 Python calls. What is called from Python, or by its address, is kept on disk. Numba compiles what a
-function calls anew with each that calls it: behind an address large parts are compiled once.
+function calls again with each that calls it: behind an address large parts are compiled once.
 """
 
 from __future__ import annotations

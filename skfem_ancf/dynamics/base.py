@@ -85,7 +85,7 @@ def stored(arrays: dict[str, Any], name: str, like: Any) -> Any:
 class Scheme:
     """A time integrator: a member of the family of :mod:`skfem_ancf.dynamics.steps`, by numbers.
 
-    A scheme of your own is a subclass with other numbers, or one that overrides :meth:`step`.
+    A custom scheme is a subclass with other numbers, or one that overrides :meth:`step`.
 
     Attributes
     ----------

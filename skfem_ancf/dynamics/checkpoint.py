@@ -138,7 +138,7 @@ def _scheme_of(text, given):
                                   f"{scheme!r}")
         return scheme
     if name not in SCHEMES:
-        raise CheckpointError(f"the run was made by a scheme of your own, {name!r}: give it, "
+        raise CheckpointError(f"the run was made by a custom scheme, {name!r}: give it, "
                               "resume(path, scheme=...)")
     scheme = SCHEMES[name].__new__(SCHEMES[name])
     for attribute, value in values.items():

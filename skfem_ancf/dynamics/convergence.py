@@ -1,4 +1,4 @@
-"""When the iteration of a step ends, keeps its factors, begins anew or fails."""
+"""When the iteration of a step ends, keeps its factors, begins again or fails."""
 
 from typing import NamedTuple, get_type_hints
 

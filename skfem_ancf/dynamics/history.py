@@ -249,7 +249,7 @@ class History(MaterialPoints):
 
     @cached_property
     def potential_energy(self) -> Array:
-        """Potential of the loads, zero in the stress-free state, shape (nt,).
+        """Potential of the loads, zero in the reference configuration, shape (nt,).
 
         That of moments counts whole turns, which are followed from step to step.
         """

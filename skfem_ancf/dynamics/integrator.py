@@ -166,8 +166,9 @@ class Integrator:
             joined = Joined(s, joints, y.u, (t, dt, ahead, self.limit))
             gap = np.abs(joined.gap())
             if np.any(gap > 1e-8 * s.backend.tables.plain.joints.sizes):
-                raise SupportError(f"the joints are open by {gap.max():.3g} at the start: begin "
-                                   "with beams that fit, or from a static solution (start=)")
+                raise SupportError(f"the joints do not fit at the start: the largest gap is "
+                                   f"{gap.max():.3g}. Begin with beams that fit, or from a static "
+                                   "solution (start=)")
         solve = s.mass_solver(y.u, t, None if joined is None else joined.J)
         jump = y.v - v  # of fixed degrees of freedom: their impulses move the free ones
         if joined is not None or jump.any():

@@ -73,7 +73,7 @@ def acceleration_of_joints(joints, motion, t, dt, u, v, out):
 
 @source
 def _add_differences(joints, t, dt, u, v, first, second, along, out):
-    """Of joints of one's own: out += first Phi' + second Phi'' + along (J v)', with factors."""
+    """Of user-defined joints: out += first Phi' + second Phi'' + along (J v)', with factors."""
     values = np.empty(out.size)
     for part in range(PARTS + 1):
         time = t - part * dt / PARTS

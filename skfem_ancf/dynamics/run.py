@@ -58,7 +58,7 @@ class Task:
     t_eval
         Times to store, shape (n,), or None for all steps.
     breakpoints
-        Times inside of the motion at which a step ends and the next starts afresh.
+        Times inside of the motion at which a step ends and the next starts again.
     """
 
     t_start: float

@@ -44,7 +44,7 @@ class ElementBeamANCFHermite(ElementBeamANCF):
         super().__init__(order, points)
 
     def raised(self) -> ElementBeamANCFHermite | None:
-        # the subclass of degree 3 is of this family; one's own is another element
+        # the subclass of degree 3 is of this family; a user's is another element
         if not ours(self) or self.axis_degree == DEGREES[-1]:
             return None
         return ElementBeamANCFHermite(self.order, self.axis_degree + 2, self._points)

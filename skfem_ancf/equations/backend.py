@@ -78,10 +78,10 @@ class Backend:
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif system.forces.contacts.own:
-            self._plain = "a distance of your own: SignedDistance"
+            self._plain = "a user-defined distance: SignedDistance"
         elif any(pack.law.kind == OWN
                  for pack in self.tables.plain.body.packs):
-            self._plain = ("a law of your own in Python, where a "
+            self._plain = ("a user-defined law in Python, where a "
                            "skfem_ancf.materials.PointwiseMaterial is compiled")
 
     @property

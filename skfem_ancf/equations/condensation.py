@@ -2,7 +2,7 @@
 
 An end has the unknowns of its node, x, y and the rotation of the section, and unknowns of its own:
 the stretch of the section's direction, and what an element has besides. In the frame of its
-direction the first three are those of the node, up to what the equations of the node are open by.
+direction the first three are those of the node, up to the residual of the node's equations.
 So no multiplier is unknown: they are the forces left at the ends.
 
 Statics, modes and motions use the same factors. In a motion kernels ask for them by a handle, see
@@ -262,7 +262,8 @@ class Condensed:
 class CondensedMass:
     """Solves with the mass matrix of a frame and the joints as they are at a displacement.
 
-    The factors are those of an earlier displacement, refined, and made anew where that takes long.
+    The factors are those of an earlier displacement, refined, and computed again where that takes
+    long.
 
     Parameters
     ----------
@@ -290,7 +291,7 @@ class CondensedMass:
         self._condensed.factorize(self.at, 0.0 * self._condensed.at[1])
 
     def forget(self, factors: bool = True) -> None:
-        """Begin anew: what is solved next does not depend on what was solved before.
+        """Begin again: what is solved next does not depend on what was solved before.
 
         Parameters
         ----------

@@ -52,8 +52,8 @@ class Constraints:
     joints
         Joints, already bound.
     stiffness
-        A function that returns that of force elements in the stress-free state, sparse, (N, N);
-        None where there are none.
+        A function that returns that of force elements in the reference configuration, sparse, (N,
+        N); None where there are none.
 
     Other Parameters
     ----------------
@@ -216,7 +216,7 @@ class Constraints:
         return out
 
     def equation_sizes(self, rows: Array, columns: Array, values: Array) -> Array:
-        """What equations are open by where one of their coordinates changes by its size.
+        """The residual of equations where one of their coordinates changes by its size.
 
         Returns
         -------
@@ -321,7 +321,7 @@ class Constraints:
 
     @cached_property
     def slopes(self) -> tuple[Array, ...]:
-        """Rows, columns and values of :meth:`full_jacobian` in the stress-free state at the time 0.
+        """Rows, columns, values of :meth:`full_jacobian` in the reference configuration at time 0.
 
         As :meth:`~skfem_ancf.actions.joints.Joint.slope_entries` of the joints has them.
         """

@@ -1,4 +1,4 @@
-"""The matrices of a scene in a state, sparse, for solvers of one's own."""
+"""The matrices of a scene in a state, sparse, for custom solvers."""
 
 from __future__ import annotations
 

@@ -40,12 +40,12 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
     free
         Truth values of the coordinates that supports leave free, shape (N,).
     phi
-        Returns what each equation is open by, shape (m,).
+        Returns the residual of each equation, shape (m,).
 
     Returns
     -------
     tuple or None
-        The number of the equation, and what it is open by where those before it are met.
+        The number of the equation, and its residual where those before it are met.
     """
     size = np.sqrt((J * J).sum(axis=1))
     first = None

@@ -82,7 +82,7 @@ class Tables:
     plain : Equations
         What the functions of :mod:`skfem_ancf.core.source` take.
     motion_varies, turns : bool
-        A joint moves with time; its derivative in the stress-free state does.
+        A joint moves with time; its derivative in the reference configuration does.
     """
 
     def __init__(self, system: Any) -> None:

@@ -77,8 +77,8 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
         return _solve_for_strain(scene, tol, max_elements, **options)
     rounds = _Rounds(scene, tol, max_degree)
     while True:
-        # each mesh from the stress-free state: what a coarse mesh does not see as strain a finer
-        # one does, which makes its solution a poor start
+        # each mesh from the reference configuration: what a coarse mesh does not see as strain a
+        # finer one does, which makes its solution a poor start
         coarse, state = rounds.scene, rounds.state or solve_static(
             rounds.scene.system, None, **options)
         fine = rounds.finer()

@@ -324,9 +324,9 @@ class Frame(Scene):
         place
             Nodes, see :meth:`nodes`.
         x, y, angle
-            By how much, from where the nodes are in the stress-free state, the rotation in radians,
-            counterclockwise: a number, which grows with the load of a static solution; or a
-            function of time, in statics of the load factor, for motions as well.
+            By how much, from where the nodes are in the reference configuration, the rotation in
+            radians, counterclockwise: a number, which grows with the load of a static solution; or
+            a function of time, in statics of the load factor, for motions as well.
 
         Examples
         --------

@@ -217,7 +217,7 @@ class Model:
     # joints
 
     def joint(self, joint: str | Joint, **options: Any) -> Joint:
-        """Add a joint, held by Lagrange multipliers.
+        """Add a joint, enforced by Lagrange multipliers.
 
         In statics the time of a motion is the load factor. A joint that only fixes degrees of
         freedom is eliminated like a support.
@@ -289,7 +289,8 @@ class Model:
         name
             What messages call the joint.
         apart
-            Allow that the points are apart in the stress-free state: the weld draws them together.
+            Allow that the points are apart in the reference configuration: the weld draws them
+            together.
         """
         return self.joint(Weld(*joined(self.layout, places), name, apart))
 

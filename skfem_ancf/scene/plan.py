@@ -104,7 +104,7 @@ def _forces(s, dynamic, linear):
     lossy = sum(time > 0.0 for time in s.retardation)
     kinds = [text for text, there in (
         (f"{lossy} beam(s) resist the rate of their strain", lossy),
-        ("dashpots, drag or force elements of your own", s.forces.resists),
+        ("dashpots, drag or user-defined force elements", s.forces.resists),
         ("a part of the mass", s.damping.mass),
         (f"{len(s.damping.modal)} modes", len(s.damping.modal))) if there]
     yield _item("damping", kinds and dynamic, ", ".join(kinds),
@@ -113,7 +113,7 @@ def _forces(s, dynamic, linear):
     known = sum(ours(getattr(element, "item", element)) for element in forces.own)
     yield _item("force elements", forces.elements, (
         f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
-        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} of your own, "
+        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} user-defined, "
         f"{known} by functions asked in Python, {len(forces.masses)} in the mass"
         + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
         + (", some couple points far apart" if forces.far else "")), "no springs, no masses")

@@ -253,7 +253,7 @@ class Scene(Model):
         the undeformed body; the strain energy is ``u . K u / 2``. Loads keep the direction that
         they have without displacement. ``state.stability`` is None, see :meth:`buckling`;
         ``state.checks`` says how far the body turns, which is to be small; ``state.base`` is the
-        stress-free state.
+        reference configuration.
 
         Raises
         ------
@@ -273,7 +273,7 @@ class Scene(Model):
         ----------
         start
             A State to start from, of this scene or of one whose beams have equal meshes and
-            elements; the stress-free state by default. :meth:`state` makes one of DOFs.
+            elements; the reference configuration by default. :meth:`state` makes one of DOFs.
         adapt
             Tolerance of the error: raise the degree of elements that have one where the solution is
             smooth (up to ``max_degree=``), else refine the meshes. The state's ``error_estimate``
@@ -309,8 +309,8 @@ class Scene(Model):
             elif start is None:
                 state = solve_adaptive(self, adapt, **options)
             else:
-                raise InputError("an adaptive solution begins each mesh from its stress-free "
-                                 "state: give adapt= without start=")
+                raise InputError("an adaptive solution begins each mesh from its reference "
+                                 "configuration: give adapt= without start=")
             warn_about(state)
             return state
 
@@ -351,8 +351,8 @@ class Scene(Model):
         Parameters
         ----------
         u
-            Displacement of the DOFs from the stress-free state, beam after beam, shape (N,); zero
-            by default.
+            Displacement of the DOFs from the reference configuration, beam after beam, shape (N,);
+            zero by default.
         multipliers
             Of the joints, shape (m,); zero by default.
         load
@@ -431,7 +431,7 @@ class Scene(Model):
         ----------
         v
             The velocity of all points, shape (2,), or a function of the points x, shape (2, ...),
-            of the stress-free body that returns velocities (2, ...); or velocities of the
+            of the reference configuration that returns velocities (2, ...); or velocities of the
             coordinates, shape (beam.N,). Of a rigid body the function is asked at its centre of
             mass and beside it.
         beam
@@ -446,7 +446,7 @@ class Scene(Model):
     def integrate(self, t_end: float, dt: float | str,
                   scheme: str | Scheme | type[Scheme] = "energy-momentum",
                   start: State | None = None, **options: Any) -> History:
-        """The motion from the stress-free state, or from a given one.
+        """The motion from the reference configuration, or from a given one.
 
         Parameters
         ----------
@@ -458,7 +458,7 @@ class Scene(Model):
             A scheme, a name from :data:`skfem_ancf.dynamics.SCHEMES`, or "auto": by joints,
             damping, stiffness, contact and ``rtol``, as :meth:`plan` says.
         start
-            A State to start from, or None for the stress-free state. An instant of a motion
+            A State to start from, or None for the reference configuration. An instant of a motion
             (``history.state(k)``) goes on with its velocity, from its time; every other State
             starts with the scene's :meth:`initial_velocity`.
         **options
@@ -673,7 +673,7 @@ class Scene(Model):
             return eigen.modes(self.system, configuration(self.system, state), k)
 
     def buckling(self, k: int = 1) -> Buckling:
-        """The k lowest load factors at which the stress-free state buckles, and their shapes.
+        """The k lowest load factors at which the structure buckles, and their shapes.
 
         Raises
         ------

@@ -31,7 +31,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                  tol: float = 1e-8, max_iterations: int = 15, locate: float | None = 1e-8,
                  branch: Critical | None = None, side: int = 1,
                  progress: bool | None = None) -> tuple[list[Point], list[Critical]]:
-    """Follow the equilibrium path from the stress-free state or from a bifurcation point.
+    """Follow the equilibrium path from the reference configuration or from a bifurcation point.
 
     Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
     displacement over the size of the scene, with the load factor as an unknown. Where loads move no

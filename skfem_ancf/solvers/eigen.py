@@ -85,7 +85,7 @@ def _warn_of_turning(state, values, rigid):
         warn(f"the state turns by {speed:.3g} rad/s, and modes know its stiffness alone: "
                       "centrifugal and Coriolis forces are missing, which change the square of a "
                       "frequency by about the square of that; take the state at rest in a frame "
-                      "that turns, with a load of your own (docs/modes.md, What turns)",
+                      "that turns, with a user-defined load (docs/modes.md, What turns)",
                       ModelWarning)
 
 
@@ -307,9 +307,10 @@ def _require_unstressed(system, zero):
     held = abs(system.stiffness_at_rest())
     if push > UNSTRESSED * (held.max() if held.nnz else 0.0) * system.size:
         raise InputError(
-            "springs push before there is any load: buckling() knows the stress-free state and "
-            "scales all that stresses it. state.stability of scene.solve_static(stable=False), and "
-            "scene.modes(k, state), tell under which loads the tightened scene holds")
+            "springs push before there is any load: buckling() starts from the reference "
+            "configuration and scales all that stresses it. state.stability of "
+            "scene.solve_static(stable=False), and scene.modes(k, state), tell under "
+            "which loads the tightened scene holds")
 
 
 def _require_same_springs(system, u):

@@ -24,7 +24,7 @@ SMALLEST = 1e-14
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
 #: Corrections at least, where the residual at the start is not round-off.
 LEAST = 2
-#: What joints may be open by, over the sizes of their equations.
+#: The largest residual of joints, over the sizes of their equations.
 CLOSED = 1e-12
 #: Work of the third correction, as a root over that of all forces, of an iteration that diverges.
 DIVERGING = 0.9

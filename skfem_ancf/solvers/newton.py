@@ -68,8 +68,8 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     system
         A :class:`~skfem_ancf.equations.system.System`.
     u
-        Displacement to start from, shape (N,); the stress-free state by default. Load steps lead
-        from it to the equilibrium under the full load, whatever holds it in its place.
+        Displacement to start from, shape (N,); the reference configuration by default. Load steps
+        lead from it to the equilibrium under the full load, whatever holds it in its place.
     method
         "auto": the strategies in order. "mixed": the geometric part of the tangent uses an
         independent stress, which follows its linearisation. "newton": it uses the stress of the

@@ -56,7 +56,7 @@ def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
 
 @contextmanager
 def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
-    """For the time of it flagged points of groups are held by obstacles, without friction."""
+    """While it is open, flagged points of groups stay on obstacles, without friction."""
     memory = contacts.tables.memory
     before = memory.copy()
     try:

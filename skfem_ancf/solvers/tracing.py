@@ -70,12 +70,12 @@ class Tracer:
         return np.sqrt(v @ (self.weights * v))
 
     def stress_free(self) -> Point:
-        """The stress-free state as a point."""
+        """The reference configuration as a point."""
         zero = np.zeros(self.system.N)
         return Point(zero, np.zeros(self.system.constraints.m), 0.0, zero, 0.0, 0.0, 0)
 
     def begin(self, point: Point) -> Point:
-        """Find the tangent at the stress-free state, and what the load counts in the arc length.
+        """Find the tangent at the reference configuration, and the load's weight in the arc length.
 
         Heat between walls moves no node: there the arc length has the load in it, times the strain
         that its forces could cause.

@@ -101,7 +101,7 @@ def processors() -> int:
 
 def in_processes(task: Task, members: list[dict[str, Any]], places: Iterable[int], workers: int
                  ) -> Results:
-    """As :func:`here`, in processes of this computer, started anew ("spawn")."""
+    """As :func:`here`, in processes of this computer, started again ("spawn")."""
     for what, function in (("build", task.build), ("measure", task.measure)):
         _require_sendable(what, function)
     with _Pool(workers) as pool:

@@ -40,8 +40,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         of them, drawn over each other with one range of colours.
     field
         A name of :data:`skfem_ancf.recovery.fields.FIELDS` with one component, as "S_xx",
-        "von_mises" or "eps_1"; "displacement" for its magnitude; or a function or Field of your
-        own, see :mod:`skfem_ancf.recovery.fields`.
+        "von_mises" or "eps_1"; "displacement" for its magnitude; or your function or
+        Field, see :mod:`skfem_ancf.recovery.fields`.
     ax
         matplotlib Axes to draw in; a new figure by default, which needs no display.
     thickness

@@ -44,7 +44,7 @@ def of_contacts(tables, asked, u, v, out):
 
 @primitive("skfem_ancf.equations.loops")
 def run_contacts(tables, asked, u, v, out):
-    """As :func:`of_contacts`; compiled once, and not anew in each function that calls it."""
+    """As :func:`of_contacts`; compiled once, and not again in each function that calls it."""
     of_contacts(tables, asked, u, v, out)
 
 

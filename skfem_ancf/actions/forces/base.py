@@ -21,7 +21,7 @@ from ..places import Vector
 
 #: Relative step of differences, where a force takes no complex numbers.
 STEP = 1e-6
-#: Where a user-defined element is tried besides the stress-free state: off by so much.
+#: Where a user-defined element is tried besides the reference configuration: off by so much.
 ASIDE = 0.01
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
@@ -208,7 +208,7 @@ def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
     hint = ("a force element defines bind(scene), which returns a list of points, and force(x, v, "
             "t) of shape (points, 2)")
-    with explained("{!r} fails in the stress-free state", hint, InputError,
+    with explained("{!r} fails in the reference configuration", hint, InputError,
                    element) if own else nullcontext():
         bound.links = _links(element, bound.bind(layout))
         if bound.parts() is None:
@@ -235,7 +235,7 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     for name in ("stiffness", "resistance"):
         require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
                        (n, 2, n, 2))
-    # where nothing is zero by chance, as it may be in the stress-free state
+    # where nothing is zero by chance, as it may be in the reference configuration
     sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
     y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
     K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))

@@ -43,7 +43,8 @@ class MeasuredSection(NamedTuple):
     Attributes
     ----------
     angle, rate
-        From the stress-free state, in radians and in (-pi, pi], counterclockwise; and its rate.
+        From the reference configuration, in radians and in (-pi, pi], counterclockwise; and its
+        rate.
     """
 
     angle: float

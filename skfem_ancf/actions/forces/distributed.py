@@ -21,7 +21,7 @@ from .kernels import DRAG, FOUNDATION
 
 
 class Foundation(ForceElement):
-    """Winkler's foundation: springs along the normal of a side, as it was in the stress-free state.
+    """Winkler's foundation: springs along the normal of a side in the reference configuration.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ class ForceTables(NamedTuple):
 
 @source
 def vectors_of(tables, u, factor, out):
-    """factor times the vectors in the stress-free state, and what u adds to them."""
+    """factor times the vectors in the reference configuration, and what u adds to them."""
     for k in indices(out.size):
         out[k] = factor * tables.start[k]
     add_products(out, tables.at, tables.weight, u, tables.of)
@@ -109,7 +109,7 @@ ELASTIC, RESISTING, DERIVATIVES = range(3)
 
 @primitive("skfem_ancf.equations.loops")
 def run_kinds(tables, what, y, w, factor, out):
-    """As :func:`of_kinds`; compiled once, and not anew in each kernel that calls it."""
+    """As :func:`of_kinds`; compiled once, and not again in each kernel that calls it."""
     of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)
 
 

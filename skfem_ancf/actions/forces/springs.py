@@ -44,7 +44,7 @@ class Spring(ForceElement):
     damping
         Force per velocity, zero or positive; or a function of the rate that returns the force.
     length
-        Length without force; that of the stress-free state by default.
+        Length without force; that of the reference configuration by default.
     """
 
     def __init__(self, k: Any, between: Any, damping: Any = 0.0,
@@ -116,8 +116,8 @@ class Spring(ForceElement):
 class TorsionalSpring(ForceElement):
     """A moment against the angle by which a section turns, with a dashpot.
 
-    The moment is ``k (phi - angle) + damping dphi / dt``, phi the angle from the stress-free state,
-    to the ground or to another section, taken in (-pi, pi] about ``angle``; or
+    The moment is ``k (phi - angle) + damping dphi / dt``, phi the angle from the reference
+    configuration, to the ground or to another section, taken in (-pi, pi] about ``angle``; or
     ``k(phi - angle) + damping(dphi / dt)`` where these are functions.
 
     Parameters

@@ -28,7 +28,7 @@ class Turns:
             first[:, None, None] + [[2], [3]], np.ones((len(first), 1)), directions)]
 
     def angles(self, u: Array) -> Array:
-        """The angles from the stress-free state at displacements (n, N), in (-pi, pi]: (n, k)."""
+        """Angles from the reference configuration at displacements (n, N), in (-pi, pi]: (n, k)."""
         found = [np.zeros((len(u), 0))]
         for dofs, c, start in self._groups:
             d = start + np.einsum("nkim,km->nki", u[:, dofs], c)

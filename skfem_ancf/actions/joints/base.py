@@ -162,7 +162,7 @@ class Joint(Item):
 
     @property
     def turning(self) -> bool:
-        """True if the derivative of Phi in the stress-free state depends on time."""
+        """True if the derivative of Phi in the reference configuration depends on time."""
         return self.moving and not self.constant
 
     def moved(self, times: Array, N: int) -> Array:
@@ -223,7 +223,7 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
     hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
             "multipliers) unless that is constant")
     with nullcontext() if ours(joint) else explained(
-            "{!r} fails in the stress-free state", hint, InputError, joint):
+            "{!r} fails in the reference configuration", hint, InputError, joint):
         bound.bind(layout)
         bound._freeze()
         if not ours(joint):

@@ -22,8 +22,8 @@ class Hinge(Joint):
     beams
         Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
     at
-        The point, its place (x, y) in the stress-free bodies; or one point for each beam, if they
-        are apart. None is the centre of mass of a rigid body.
+        The point, its place (x, y) in the reference configuration; or one point for each beam, if
+        they are apart. None is the centre of mass of a rigid body.
     """
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:

@@ -26,9 +26,9 @@ class Nodes(Joint):
     The ends are those of all chains of all beams: first the start and the end of the first chain of
     the first beam. At each node the first rigid end, or else the first, leads the others: the
     equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the direction g of a section,
-    seen from that of the stress-free state, as in :class:`~skfem_ancf.actions.joints.Weld`; then
-    those of what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader. Unknowns of
-    the nodes take the place of the multipliers where the linear systems are solved, see
+    seen from that of the reference configuration, as in :class:`~skfem_ancf.actions.joints.Weld`;
+    then those of what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader.
+    Unknowns of the nodes take the place of the multipliers where the linear systems are solved, see
     :mod:`skfem_ancf.equations.condensation`.
 
     Parameters
@@ -111,11 +111,11 @@ class Nodes(Joint):
             [d, np.repeat(d[..., :1], n - d.shape[2], axis=2)], axis=2) for d in directions], 1)
         self.weights = np.concatenate([np.pad(c, ((0, 0), (0, n - c.shape[1]))) for c in weights])
         self.positions, self.start = np.concatenate(positions), np.concatenate(start)
-        #: what takes directions to the frame of the stress-free state, as complex numbers
+        #: what takes directions to the frame of the reference configuration, as complex numbers
         self.frame = 1.0 / self.start
 
     def turns(self, u: Array) -> Array:
-        """The direction of each end's section, seen from that of the stress-free state."""
+        """The direction of each end's section, seen from that of the reference configuration."""
         d = u[self.directions]
         return 1.0 + self.frame * np.sum(self.weights * (d[0] + 1j * d[1]), axis=1)
 

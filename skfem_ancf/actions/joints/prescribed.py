@@ -66,7 +66,8 @@ class PrescribedAngle(Joint):
         The section, as "left" or "right" or a point through which it goes; a RigidBody. Not asked
         for where ``beam`` is a RigidBody.
     angle
-        The angle in radians as a function of time, from the stress-free state, counterclockwise.
+        The angle in radians as a function of time, from the reference configuration,
+        counterclockwise.
     beam
         The beam, by Beam, name or number; None where there is only one. Or a RigidBody.
     """
@@ -127,7 +128,8 @@ class PrescribedTurn(Joint):
         Each (beam, place) with a Beam, a RigidBody, a name or a number, and a place as for
         :class:`PrescribedAngle`. What turns, and from what its angle is measured.
     angle
-        The angle in radians as a function of time, from the stress-free state, counterclockwise.
+        The angle in radians as a function of time, from the reference configuration,
+        counterclockwise.
     """
 
     equations = ("moment",)

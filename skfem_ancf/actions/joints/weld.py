@@ -1,4 +1,4 @@
-"""Sections of two beams or more are welded at the angles they have in the stress-free state."""
+"""Sections of two beams or more are welded at the angles of the reference configuration."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ class Weld(Joint):
         The section of each beam, as ``("right", "left")``, or a material point (x, y), inside of an
         element too; or one place for all, as the point ``(1, 0)`` that they share.
     apart
-        Allow that the points are apart in the stress-free state: the weld draws them together.
+        Allow that the points are apart in the reference configuration: the weld draws them
+        together.
     """
 
     constant = False

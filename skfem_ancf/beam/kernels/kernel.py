@@ -144,7 +144,8 @@ class ElementKernel:
     def small_forces(self, u: Array) -> Array:
         """Forces of the elements of a small displacement: linear in it.
 
-        Of a :func:`~skfem_ancf.core.linear.step` from the stress-free state they are one, too.
+        Of a :func:`~skfem_ancf.core.linear.step` from the reference configuration they are one,
+        too.
         """
         z = self._checked(u if np.iscomplexobj(u) else step(0.0, u))
         out = 1j * self._forces(map(linearised, self.tables), FORCE, z).imag  # without round-off

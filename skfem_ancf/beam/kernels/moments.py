@@ -18,7 +18,7 @@ class MomentPack(NamedTuple):
         Coordinates (moments, 2, k) and weights (moments, k): a section's direction is ``start +
         c u[dofs]``. What is left over has no weight.
     start
-        Directions in the stress-free state, (moments, 2).
+        Directions in the reference configuration, (moments, 2).
     M
         Sizes, counterclockwise.
     opposite

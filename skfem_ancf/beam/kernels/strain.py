@@ -172,7 +172,7 @@ def put_gradients(t, u, B, HB):
 
 @primitive("skfem_ancf.equations.loops")
 def run(t, what, u, v, f, given, out, flat, ld):
-    """As :func:`evaluate`; compiled once, and not anew in each function that calls it."""
+    """As :func:`evaluate`; compiled once, and not again in each function that calls it."""
     evaluate(t, what, u, v, f, given, out, flat, ld)
 
 
