@@ -108,6 +108,19 @@ def test_section_forces_are_those_of_a_force_that_stands():
     assert np.allclose(M, expected, atol=0.02 * expected.max())
 
 
+def test_the_moment_under_a_train_on_few_elements():
+    """Forces inside of elements, two of them in one: exact on any mesh, by the lever of a beam."""
+    span, forces, gap = 20.0, np.array([500.0, 800.0]), 1.5
+    scene = Scene(girder(np.linspace(0, span, 4))).pin("left").fix("right", "r^2")
+    history = scene.add(Train(forces, [0.0, gap], speed=span, start=gap)).run(0.9, increments=7)
+    for state in history:
+        axles = gap + span * state.t - np.array([0.0, gap])
+        M = [np.sum(forces * np.where(x < axles, x * (span - axles), axles * (span - x))) / span
+             for x in axles]
+        found = state.resultants(np.array([axles, 0 * axles])).M
+        assert np.allclose(found, M, atol=1e-4 * span * forces.sum())
+
+
 def test_a_force_on_a_face_stands_where_it_is_told():
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.05), ElementBeamANCF(2),
                 StVenantKirchhoff(2e8, 0.3, 7800), width=0.05)

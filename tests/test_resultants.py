@@ -99,6 +99,27 @@ def test_beam_on_two_supports(at):
     assert right.x == pytest.approx([at + 0.001, 0.0]) and load == pytest.approx(at, abs=1e-4)
 
 
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_two_forces_on_few_elements(element, n):
+    """M under forces inside of elements, beside supports, of a follower, above the axis."""
+    places, x = (0.15, 0.3), np.array([0.05, 0.15, 0.2, 0.3, 0.6, 0.95])
+    scene = Scene(line(n, h=0.02, E=2e11, element=element)).pin("left").fix("right", "r^2")
+    scene = scene.point_force((0, -1.0), at=(places[0], 0))
+    state = scene.follower_force((0, -1.0), at=(places[1], 0)).solve_static()
+    M = sum(np.minimum((1 - a) * x, a * (1 - x)) for a in places)
+    r = state.resultants(np.array([x, 0 * x]))
+    assert state.recovered == {0: ""}
+    assert_allclose(r.M, M, rtol=1e-5)
+    assert_allclose(r.curvature * 2e11 * 0.02**4 / 12, M, rtol=1e-4)
+    top = state.strain(np.array([x, 0 * x + 0.01]))[0]
+    assert_allclose(top, -0.01 * M / (2e11 * 0.02**4 / 12), rtol=1e-3)
+    if element.order:
+        state = scene.point_force((4.0, 0.0), at=(0.5, 0.01)).solve_linear()
+        before, after = state.resultants(np.array([[0.5 - 1e-6, 0.5 + 1e-6], [0, 0]])).M
+        assert after - before == pytest.approx(0.04, rel=1e-3)
+
+
 def test_frame_with_a_hinge():
     """A Gerber beam: no moment in the hinge, shear by statics."""
     steel = StVenantKirchhoff(1e9, 0.3)

@@ -47,8 +47,8 @@ class FollowerForce(Load):
     constant = False
     symmetric = False
     for_bodies = True
-    # of a bound one: the point, coordinates and weights of its place and of the tangent
-    _stations: tuple[float, ...]
+    # of a bound one: element and xi, coordinates and weights of its place and of the tangent
+    _place: tuple[int, float] | None
     _dofs: Any
     _weights: Any
     _along: Any
@@ -69,14 +69,14 @@ class FollowerForce(Load):
         bound = cast("FollowerForce", super().bind(cast("Beam", beam)))
         if isinstance(beam, RigidBody):
             bound._dofs, weights = beam.probe(self.at)
-            bound._stations, bound._start = (), beam.q0[2:]
+            bound._place, bound._start = None, beam.q0[2:]
             bound._along, bound._slopes = beam.direction()
         else:
             found = Points([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
                                                          self.line, ask=True).parts[0]
             e, X = int(found.e[0]), found.X[:, 0]
             bound._dofs, weights = probe(beam, self.at, (e, X))
-            bound._stations, bound._along = (e + float(X[0]),), bound._dofs
+            bound._place, bound._along = (e, float(X[0])), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
                                            np.array([e]))
             bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
@@ -90,10 +90,13 @@ class FollowerForce(Load):
     def _tangent(self, u):
         return self._start + u[self._along] @ self._slopes
 
-    def force(self, u: Array) -> Array:
+    def _force(self, u):
         d = self._tangent(u)
+        return (self._turn @ d / np.hypot(*d))[:, None] * self._weights
+
+    def force(self, u: Array) -> Array:
         out = np.zeros(self.beam.N)
-        np.add.at(out, self._dofs, (self._turn @ d / np.hypot(*d))[:, None] * self._weights)
+        np.add.at(out, self._dofs, self._force(u))
         return out
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
@@ -106,7 +109,10 @@ class FollowerForce(Load):
         return rows.ravel(), columns.ravel(), values.ravel()
 
     def spread(self, u: Array) -> Spread:
-        return Spread(stations=self._stations)
+        if self._place is None:
+            return Spread()
+        e, xi = self._place
+        return Spread(stations=(e + xi,), points=((e, xi, self._force(u).T),))
 
 
 class LineLoad(Load):

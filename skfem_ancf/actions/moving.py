@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import Spread
-from ..beam.kinematics import locate, probe_reference
+from ..beam.distribution import Spread, on_points
+from ..beam.kinematics import locate
 from ..beam.layout import WhichBeam
 from ..core.errors import (InputError, ask, require_finite, require_finite_scalar,
                            require_positive)
@@ -40,11 +40,7 @@ class TimedLoad(Load):
 
     def at(self, t: float) -> tuple[Array, Spread]:
         """The force (N,) at a time, and how it is spread over the beam; that of :meth:`places`."""
-        vector, places = np.zeros(self.beam.N), self.places(t)
-        for force, e, X in places:
-            dofs, weights = probe_reference(self.beam, e, X)
-            vector[dofs] += force[:, None] * weights
-        return vector, Spread(stations=tuple(e + float(X[0]) for _, e, X in places))
+        return on_points(self.beam, self.places(t))
 
     @property
     def first_order(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import Spread
+from ..beam.distribution import on_points
 from ..beam.kinematics import locate, probe
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody, on_body
@@ -51,12 +51,12 @@ class PointForce(Load):
         return (self._with(beam=number_at(layout, self.at, self.beam)),)
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        vector = np.zeros(beam.N)
         if not isinstance(beam, Beam):
+            vector = np.zeros(beam.N)
             dofs, weights = beam.probe(self.at)
             np.add.at(vector, dofs, self.total[:, None] * weights)
             return DeadLoad(beam, vector, self.amplitude)
         e, X = locate(beam, self.at)
-        dofs, weights = probe(beam, self.at, (e, X))
-        vector[dofs] = self.total[:, None] * weights  # those of an element, each once
-        return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
+        probe(beam, self.at, (e, X))  # not off the axis of a cable
+        vector, spread = on_points(beam, [(self.total, e, X)])
+        return DeadLoad(beam, vector, self.amplitude, spread)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from ..elements.base import ElementBeam
 from ..mesh.mesh_beam import MeshBeam
 from ..sections.jumps import jumps
 from .beam import Beam
+from .kinematics import probe_reference
 
 #: Places nearer than this part of an element to a node are at the node.
 SNAP = 1e-5
@@ -115,6 +116,9 @@ class Spread:
         per deformed area, normal to them; or None.
     stations, sampled
         Where it acts on a section or a point: element + xi; densities that are known at points.
+    points
+        Those of the stations at which its force is known: element, xi, and the force on the degrees
+        of freedom of the element, (nb, 2).
     eigen
         A stress-free strain in place of a force, or None.
     """
@@ -126,7 +130,18 @@ class Spread:
     pressure: float | None = None
     stations: tuple[float, ...] = ()
     sampled: tuple[Sampled, ...] = ()
+    points: tuple[tuple[int, float, Array], ...] = ()
     eigen: Any = None
+
+
+def on_points(beam: Beam, places: Sequence[tuple[Array, int, Array]]) -> tuple[Array, Spread]:
+    """The force (N,) of forces (2,), each with its element and reference point, and its Spread."""
+    vector, points = np.zeros(beam.N), []
+    for force, e, X in places:
+        dofs, weights = probe_reference(beam, e, X)
+        vector[dofs] += force[:, None] * weights
+        points.append((e, float(X[0]), np.outer(weights, force)))
+    return vector, Spread(stations=tuple(e + xi for e, xi, _ in points), points=tuple(points))
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:

@@ -159,11 +159,7 @@ def _result(R, M, angle, stretch, shear, curvature):
 
 def _recovered(recovery, e, xi, after):
     segment = recovery.segment_of(e, xi, after)
-    side = np.full(len(e), 0.5)
-    for cut in recovery.forces.cuts[recovery.forces.cuts % 1.0 != 0]:
-        k = np.searchsorted(recovery.forces.cuts, cut)
-        side[e == int(cut)] = np.where(segment[e == int(cut)] >= k, 1.0, 0.0)
-    R, M = recovery.forces.at(e, xi, side)
+    R, M = recovery.forces.at(e, xi, recovery.forces.cuts[segment])
     out = np.empty((4, len(e)), R.dtype)
     s = recovery.arc.at(e, xi)
     for k in np.unique(segment):

@@ -139,6 +139,9 @@ class SectionForces:
         self.sides = [side for side in (0, 1) if any(np.any(f.faces[side]) for _, f in self._faces)
                       or any(s.where == side for s in self._sampled)]
         self.eigen = [(factor, load.eigen) for factor, load in loads if load.eigen is not None]
+        self._points = [(e, float(station), factor * f)
+                        for factor, load in loads for e, xi, f in load.points
+                        if (station := _snapped(e + xi)) % 1.0]
         self._balance(u)
         self._cut(loads, stations)
         self._check()
@@ -198,6 +201,8 @@ class SectionForces:
         self._r, self._force, self._moment = (
             x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
         load = sum(at.spread(f * np.tile(w, ne)[:, None]) for at, f in parts)
+        for e, _, f in self._points:
+            load[e] = load[e] + f
         internal = (beam.kernel.small_forces if self.small else beam.kernel.forces)(u)
         if self.viscous is not None:
             internal = internal + self.viscous
@@ -229,11 +234,16 @@ class SectionForces:
         R = -left[:, 0].T
         return R, cross(q[:, 0].T - r, R) - _moments(q, left)
 
-    def at(self, e: Array, xi: Array, side: Any) -> tuple[Array, Array]:
+    def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
         """Force (2, n) and moment (n,) about the axis: of the right part of the beam on the left.
 
-        The equilibrium is followed from the end ``side`` of the element; 0.5 is the mean of both.
+        ``begin`` is the cut at which the segment of each section begins, (n,). The equilibrium is
+        followed from both ends of the element, and the mean taken; where a force inside of it is
+        not known, from the end on this side of it.
         """
+        side = np.full(len(e), 0.5)
+        for cut in self._unknown:
+            side[e == int(cut)] = np.where(begin[e == int(cut)] >= cut, 1.0, 0.0)
         x, w = gauss(ALONG)
         inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
         till = xi[:, None] * np.einsum("q,nqk->nk", w, inner)  # the integral from 0 to xi
@@ -248,6 +258,13 @@ class SectionForces:
                  - np.sum(weights * turning, axis=-1))
             out.append((R - np.sum(weights * f, axis=-1), M))
         (R0, M0), (R1, M1) = out
+        for k, station, f in self._points:
+            on = e == k
+            passed, F, q = 1.0 * (begin[on] >= station), f[0] + f[len(f) // 2], self.q[k]
+            M = np.sum(cross(q.T, f.T)) - cross(r[:, on], F)
+            for R, turn, part in ((R0, M0, passed), (R1, M1, passed - 1.0)):
+                R[:, on] -= part * F[:, None]
+                turn[on] -= part * M
         return R0 + side * (R1 - R0), M0 + side * (M1 - M0)
 
     # where they jump
@@ -271,7 +288,11 @@ class SectionForces:
         for _, eigen in self.eigen:
             stations += list(jumps(eigen.strain_at, ne, np.linspace(0.0, 1.0, 5)))
         self.cuts = np.unique(_snapped(stations))
-        inside = self._acted[self._acted % 1.0 != 0].astype(int)
+        known = np.array([station for _, station, _ in self._points])
+        #: Stations inside of elements at which the force is not known.
+        self._unknown = np.unique(self._acted[(self._acted % 1.0 != 0)
+                                              & ~np.isin(self._acted, known)])
+        inside = self._unknown.astype(int)
         for e in inside:
             self._pass_on(e, inside)
 
@@ -279,7 +300,7 @@ class SectionForces:
         """The section forces at the ends of an element with a point load, from its neighbours."""
         t = self.beam.mesh.t
         for end, other in ((0, e - 1), (1, e + 1)):
-            if e + end in self._acted or other in inside:
+            if e + end in self._acted or other in inside or np.sum(inside == e) > 1:
                 raise NotRecovered("a load or joint at a point inside of an element acts next to "
                                    "another one, or to a support: put a node at the point")
             near = 0 <= other < t.shape[1] and t[end, e] == t[1 - end, other]

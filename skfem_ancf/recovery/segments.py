@@ -60,30 +60,27 @@ class Segment:
         self.beam, self.height = recovery.beam, recovery.beam.mesh.height
         #: Sections of cables keep their height where the axis is stretched.
         self.rigid = not self.beam.has_sections
-        xi, side = self._sections(start, end)
+        xi = self._sections(start, end)
         self._geometry(self.e, xi)
-        self.R, self.M = self.forces.at(self.e, xi, side)
+        self.R, self.M = self.forces.at(self.e, xi, np.full(len(xi), start))
         if self.forces.viscous is not None:
             self.Rv, self.Mv = self._viscous_forces()
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
         self._solve()
 
     def _sections(self, start, end):
-        """Places of the sections in their elements, and the side that their force is taken from."""
+        """Places of the sections in their elements."""
         e = np.arange(int(np.floor(start)), int(np.ceil(end)))
         a, b = np.maximum(start - e, 0.0), np.minimum(end - e, 1.0)
         far = b - a > CLOSE
         if np.any(far):  # derivatives by sections that are near each other are round-off
             e, a, b = e[far], a[far], b[far]
-        if np.any((a > 0) & (b < 1)):
-            raise NotRecovered("two point loads act inside of one element: put a node at them")
-        side = np.where(a > 0, 1.0, np.where(b < 1, 0.0, 0.5))
         if not np.any(far):  # the field on whole elements, under the section force of this part
             a, b = 0.0 * a, 0.0 * b + 1.0
         whole = (a == 0) & (b == 1)
         self.elements = e[whole] if np.any(whole) else e
-        self.e, side = (np.append(np.repeat(x, 2), x[-1]) for x in (e, side))
-        return np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1]), side
+        self.e = np.append(np.repeat(e, 2), e[-1])
+        return np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
 
     def _geometry(self, e, xi):
         """Where the points are, what the section is made of there, and the loads."""
