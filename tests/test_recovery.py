@@ -83,7 +83,7 @@ def test_goals_away_from_the_weld(name, element):
     assert np.any(errors(name, state, recover=False) > GOALS[name])
 
 
-#: Rows of docs/formulations.md: raw and recovered, of the thick cantilever and that of the paper.
+#: Rows of docs/verification.md: raw and recovered, of the thick cantilever and that of the paper.
 TABLE = {
     "assumed": ((4.8, 1.4, 11, 5.2, 1.4), (0.2, 0.4, 0.6, 0.2, 0.1),
                 (23, 84, 649, 23, 25), (1.1, 1.1, 2.1, 1.1, 0.1)),
@@ -99,7 +99,7 @@ TABLE = {
 @pytest.mark.parametrize("formulation", TABLE)
 def test_the_table_of_formulations(formulation):
     """It is what is computed, and what the page shows."""
-    page = (Path(__file__).parents[1] / "docs" / "formulations.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[1] / "docs" / "verification.md").read_text(encoding="utf-8")
     cases = [(name, recover) for name in ("thick", "gravity") for recover in (False, True)]
     for (name, recover), row in zip(cases, TABLE[formulation]):
         state = CANTILEVERS[name](ElementBeamANCF(3), formulation=formulation)
@@ -234,7 +234,7 @@ def test_adaptive_strain():
 @pytest.mark.parametrize("name, order, size, n, bound", [
     ("gravity", 4, None, 16, 5), ("thick", 6, 0.5 / 16, 8, 5)])
 def test_mesh_for_the_boundary_layer_of_a_weld(name, order, size, n, bound):
-    """What docs/fields.md advises for 5 % of eps_yy; without it there are 34 and 49 %."""
+    """What docs/supports.md advises for 5 % of eps_yy; without it there are 34 and 49 %."""
     element = ElementBeamANCFCubic(order)
     coarse = CANTILEVERS[name](element, n=n)
     assert errors(name, coarse, "weld")[1] > 30
