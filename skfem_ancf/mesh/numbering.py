@@ -14,6 +14,7 @@ from skfem.mesh import Mesh2D
 
 from ..core.errors import MeshError, require_option, shown
 from ..core.immutable import Immutable, read_only
+from ..core.near_misses import NearMisses
 from ..core.types import Array
 from .places import satisfying
 
@@ -30,7 +31,7 @@ def default_tags(p: Array, t: Array) -> dict[str, Array]:
             "top": facets[n + ne:]}
 
 
-class NumberedMesh(Immutable, Mesh2D):
+class NumberedMesh(Immutable, NearMisses, Mesh2D):
     """What scikit-fem asks of the numbers of facets and elements, for meshes of beams.
 
     Facets are the sections of the nodes, then the bottoms and the tops of the elements.

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from ..core.errors import require_finite_scalar, require_index
+from ..core.near_misses import NearMisses
 from ..equations.linearised import linear_external_force, linear_force
 from .state import State
 
@@ -18,7 +19,7 @@ SLOW = 1e-6
 
 
 @dataclass(repr=False)
-class Modes:
+class Modes(NearMisses):
     """Natural frequencies and shapes, the lowest first.
 
     A motion ``shape * exp(i omega t)`` has ``omega^2`` as its eigenvalue. Where all loads have a
@@ -124,7 +125,7 @@ class Modes:
 
 
 @dataclass(repr=False)
-class Buckling:
+class Buckling(NearMisses):
     """Load factors at which the reference configuration loses stability, the lowest first.
 
     Attributes

@@ -7,11 +7,12 @@ from typing import Any
 from ..beam.layout import WhichMember, select_member
 from ..beam.points import require_body
 from ..core.linear import first_order
+from ..core.near_misses import NearMisses
 from ..core.types import Array
 from ..equations.system import System
 
 
-class MaterialPoints:
+class MaterialPoints(NearMisses):
     """What a solution knows of material points by its degrees of freedom alone.
 
     Arrays of a motion and of a path have the instants, or the points of the path, as their first

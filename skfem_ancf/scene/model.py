@@ -30,6 +30,7 @@ from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
 from ..core.errors import InputError, shown
+from ..core.near_misses import NearMisses
 from ..core.types import TimeFunction
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh
@@ -63,7 +64,7 @@ class Entry(NamedTuple):
     bound: tuple[Any, ...]
 
 
-class Model:
+class Model(NearMisses):
     """Beams, rigid bodies, and what acts on them: the description of a :class:`Scene`."""
 
     def __init__(self, *beams: Any) -> None:

@@ -1,0 +1,75 @@
+"""Attributes that there are not, by names of other packages: the error says what is meant."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from skfem_ancf import Beam, ElementBeamCable, Frame, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.core.near_misses import NearMisses
+
+STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
+
+
+@pytest.fixture(scope="module")
+def things():
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.05), ElementBeamCable(3), STEEL, 0.05)
+    scene = Scene(beam).clamp("left").gravity((0, -9.81))
+    frame = Frame.from_lines([(0, 0), (0, 1)], [(0, 1)], height=0.1, width=0.1, material=STEEL)
+    return {"Scene": scene, "State": scene.solve_static(), "MeshBeam": beam.mesh, "Frame": frame,
+            "History": scene.integrate(0.002, 0.001), "Modes": scene.modes(1),
+            "Path": scene.continuation(steps=1)}
+
+
+@pytest.mark.parametrize("kind, names, right", [
+    ("Scene", "solve run_static solve_statc", "solve_static"),
+    ("Scene", "add_force force point_forces", "point_force"),
+    ("Scene", "fixed support", "clamp"),
+    ("Scene", "support", "clamp or pin or fix"),
+    ("Scene", "load_case", "replace(loads=...)"),
+    ("Scene", "eigenvalues eigenfrequencies", "modes"),
+    ("Scene", "buckle", "buckling"),
+    ("Scene", "simulate transient", "integrate"),
+    ("Scene", "plot_deformed", "solve_static().plot"),
+    ("Scene", "displacement", "solve_static().displacement"),
+    ("Frame", "solve", "solve_static"),
+    ("Frame", "node", "nodes"),
+    ("State", "deflection displacements", "displacement"),
+    ("State", "bending_moment", "resultants"),
+    ("History", "time", "t"),
+    ("History", "movie", "animate"),
+    ("Path", "load_factors", "load"),
+    ("Modes", "omega", "frequencies"),
+    ("MeshBeam", "refine", "refined"),
+    ("MeshBeam", "nodes", "p"),
+])
+def test_near_misses_name_what_is_meant(things, kind, names, right):
+    for name in names.split():
+        with pytest.raises(AttributeError) as error:
+            getattr(things[kind], name)
+        assert str(error.value).startswith(
+            f"{kind} has no attribute '{name}'; did you mean {right}")
+
+
+def test_what_is_like_nothing_is_just_said(things):
+    with pytest.raises(AttributeError, match="^State has no attribute 'zzzz'$"):
+        things["State"].zzzz
+    assert getattr(things["Scene"], "solve", None) is None
+
+
+@pytest.mark.parametrize("kind", ["Scene", "Frame", "State", "MeshBeam"])
+def test_copies_and_pickles(things, kind):
+    one = things[kind]
+    for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        assert type(other) is type(one)
+
+
+def test_a_property_that_fails_says_so_itself():
+    class Thing(NearMisses):
+        @property
+        def broken(self):
+            return np.nothing
+
+    with pytest.raises(AttributeError, match="numpy"):
+        Thing().broken
