@@ -85,7 +85,7 @@ def _warn_of_turning(state, values, rigid):
         warn(f"the state turns by {speed:.3g} rad/s, and modes know its stiffness alone: "
                       "centrifugal and Coriolis forces are missing, which change the square of a "
                       "frequency by about the square of that; take the state at rest in a frame "
-                      "that turns, with a user-defined load (docs/modes.md, What turns)",
+                      "that turns, with the centrifugal force (docs/modes.md, Rotating beams)",
                       ModelWarning)
 
 
