@@ -38,10 +38,10 @@ LONGEST, MEAN = 40, 20
 #: Pages that are still to be rewritten.
 EXCEPTIONS = {
     "benchmarks.md", "bodies.md", "choose.md", "domains.md", "elements.md", "fields.md",
-    "formulations.md", "frames.md", "howto.md", "index.md", "joints.md", "loads.md", "modes.md",
-    "motion.md", "obstacles.md", "own.md", "paper.md", "paraview.md", "README.md", "scikit-fem.md",
-    "sections.md", "solving.md", "speed.md", "stability.md", "supports.md", "testing.md",
-    "theory.md", "trust.md", "tutorial.md"}
+    "formulations.md", "frames.md", "howto.md", "index.md", "joints.md", "loads.md",
+    "obstacles.md", "own.md", "paper.md", "paraview.md", "README.md", "scikit-fem.md",
+    "sections.md", "solving.md", "stability.md", "supports.md", "testing.md",
+    "theory.md", "tutorial.md"}
 
 
 def prose(text):
