@@ -54,7 +54,8 @@ class Load(Item):
     A custom load, for :meth:`skfem_ancf.Scene.add`, is a subclass. It defines
 
     * :meth:`force`, and :meth:`stiffness` and ``constant = False`` if that depends on
-    displacements, * :meth:`potential`, or ``symmetric = False`` if its stiffness is not symmetric,
+      displacements,
+    * :meth:`potential`, or ``symmetric = False`` if its stiffness is not symmetric,
     * :meth:`bind`, if it computes something of the beam, as it needs to act on another mesh.
 
     Parameters
