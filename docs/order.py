@@ -9,7 +9,8 @@ ORDER = [
     "bimetal", "snap_fit", "soft_finger", "frame",
     "cylinder", "pipe_laying", "capstan", "ring",
     "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",
-    "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "tuning_fork", "damping",
+    "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "bridge_train",
+    "tuning_fork", "damping",
     "own_law", "own_element", "fit_modulus", "uncertainty",
 ]
 
