@@ -273,6 +273,17 @@ def test_a_frame_swings_in_its_first_mode(monkeypatch):
     assert np.ptp(history.total_energy) < 1e-9 * history.total_energy[0]
 
 
+def test_a_frame_at_rest_under_its_weight_stays_there(monkeypatch):
+    """All forces cancel, so that accelerations are round-off: no reason to give up."""
+    monkeypatch.setattr(mass_solver, "MANY", 0)
+    x = np.linspace(0.0, 60.0, 11)
+    cable, k = np.column_stack([x, 24.0 * (x / 60.0 - 0.5)**2]), np.arange(10)
+    frame = Frame.from_lines(cable, np.column_stack([k, k + 1]), material=STEEL, height=0.05,
+                             width=0.05).pin([0, 10]).gravity((0, -9.81))
+    history = frame.integrate(0.2, 0.05, start=frame.solve_static())
+    assert np.ptp(history.displacement((30.0, 0.0)), axis=0).max() < 1e-9
+
+
 def test_a_motion_by_elimination_goes_on_from_its_checkpoint(monkeypatch, tmp_path):
     whole = swinging(True, monkeypatch, "energy-momentum", n=12, checkpoint=tmp_path / "a.npz",
                      every=5)

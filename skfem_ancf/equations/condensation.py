@@ -37,6 +37,8 @@ CHUNK = 1024
 KEPT, NEW = (0.05, 1e-12), (0.5, 1e-6)
 #: Length of a refinement at most, and its accuracy.
 REFINEMENTS, EXACT = 50, 1e-14
+#: What is left of the equations, over their right side, where nothing can be refined.
+ROUND_OFF = 1e-12
 #: Corrections where more iterations follow.
 ROUGHLY = 2
 
@@ -356,7 +358,9 @@ class CondensedMass:
             if left <= EXACT * size or not step < np.inf:
                 return x, l
             if step > contraction * before:
-                return (x, l) if step <= rough * size else None
+                # at rest the forces cancel, and x is their round-off
+                done = np.linalg.norm(missing[0]) <= ROUND_OFF * np.linalg.norm(b)
+                return (x, l) if step <= rough * size or done else None
             before = step
         return (x, l) if most < REFINEMENTS else None
 
