@@ -605,7 +605,6 @@ def test_the_nearest_name_is_suggested():
                          (lambda: free().fix("left", "r_Y0^3"), r"r_Y0\^2"),
                          (lambda: clamped().integrate(1.0, 0.1, scheme="newmrk"), "newmark"),
                          (lambda: state().plot("eps_xz"), "eps_x[xy]"),
-                         (lambda: loaded().solve_static(toll=1e-3), "tol"),
                          (lambda: beam().replace(formulation="assumd"), "assumed"),
                          (lambda: free().joint("hing"), "hinge"),
                          (lambda: loaded().plan("statics"), "static"),

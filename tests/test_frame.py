@@ -479,7 +479,7 @@ def test_a_frame_of_meshio(tmp_path):
     (*PORTAL, {"sections": {"column": {}}, "groups": {"columns": [0]}}, NameUnknown, "columns"),
     (*PORTAL, {"hinges": [(0, 3)]}, InputError, "line 0 does not end at node 3"),
     (*PORTAL, {"elements": 0}, InputError, "elements must be an integer from 1"),
-    (*PORTAL, {"height": None}, InputError, "height must be a number"),
+    (*PORTAL, {"height": None}, InputError, "need a height"),
     (*PORTAL, {"curves": {0: lambda s: np.array([s, s])}}, MeshError, "curve of line 0 runs from"),
     ("text", PORTAL[1], {}, InputError, "points must be an array"),
     (np.zeros((2, 4)), PORTAL[1], {}, InputError, "transpose"),

@@ -43,50 +43,14 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     system, scheme
         A :class:`~skfem_ancf.equations.system.System` and a
         :class:`~skfem_ancf.dynamics.Scheme`.
-    t_end
-        Time at the end.
-    dt
-        Step size, or "auto": chosen by an estimate of the error of each step, see ``rtol``.
-        Functions of time are sampled ahead at 4097 times, so that no step passes over an event
-        that lasts longer than from one of these to the next; name shorter ones by
-        ``breakpoints``.
     u, v
         Displacement and velocity at the start, shape (N,); zero by default.
-    t_start
-        Time at the start; by default that of ``start``, or 0.
-    t_eval
-        Times to store, shape (n,); every step by default. An instant within a step is the end of
-        a shorter step from the same start: the steps of the motion do not depend on ``t_eval``,
-        and what the scheme conserves is conserved at these instants too.
-    tol
-        Tolerance of the iteration in a step; the scheme's own by default.
-    rtol
-        Tolerance of the automatic step size: what a step adds to the error of the displacement of
-        a point is at most about ``rtol`` times the size of the scene, in proportion to the size of
-        the step. The error of the motion is more where small errors grow: ``check`` measures it.
-    progress
-        Show a progress bar: True, False, or None for "if it takes long".
     start
-        A State to start from, in place of ``u``; if it is an instant of a motion, in place of
-        ``v`` too. An instant of a motion of the same scene by the same scheme goes on exactly: the
-        last one of a History to round-off, another one to the tolerance of the iteration.
-    breakpoints
-        Times, shape (n,), at which loads or motions jump or have a kink: a step ends
-        there, with the values before, and the next one starts from the values after.
-    checkpoint
-        A file to write now and then, ``.npz`` or ``.h5``, from which
-        :meth:`~skfem_ancf.Scene.resume` goes on.
-    every
-        Steps between two checkpoints; by default a minute, and so that writing takes less than a
-        twentieth of the time.
-    until
-        A function of the State at an instant that returns a number: the motion ends where it
-        changes its sign, at an instant within a step; ``history.event`` is its time. It is asked
-        after each step: two changes within one are not seen. Not with ``checkpoint``.
-    check
-        Integrate once more in steps half as long, with ``dt="auto"`` about half as long:
-        ``history.error`` is the largest difference at the stored instants. That takes three times
-        as long in all. Not with ``checkpoint``.
+        In place of ``u``; an instant of a motion in place of ``v`` too. One of the same scene by
+        the same scheme goes on exactly: the last one of a History to round-off, another one to the
+        tolerance of the iteration.
+    t_end, dt, t_start, t_eval, tol, rtol, progress, breakpoints, checkpoint, every, until, check
+        As for :meth:`skfem_ancf.Scene.integrate`, ``t_eval`` and ``breakpoints`` of shape (n,).
     sensors
         Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`: those of the scene.
 

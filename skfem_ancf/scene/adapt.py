@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..core.quadrature import gauss
 from ..core.types import Array
 from ..elements.base import DEGREES
 from ..results.state import State
+from ..solvers.outcome import StaticResult
 from .solve import solve_static
 
 logger = logging.getLogger(__name__)
@@ -29,8 +31,8 @@ SMOOTH = 10.0
 #: What the error is measured in.
 GOALS = ("displacement", "strain")
 
-#: Largest number of elements that may be allowed.
-MAX_ELEMENTS = 10**7
+#: Number of elements up to which meshes are refined, by default and at most.
+MOST_ELEMENTS, MAX_ELEMENTS = 20000, 10**7
 
 
 @dataclass(frozen=True)
@@ -48,8 +50,8 @@ class Refinement:
     error: float
 
 
-def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str = "displacement",
-                   max_degree: int = DEGREES[-1], **options: Any) -> State:
+def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_degree: int,
+                   find: Callable[..., StaticResult]) -> State:
     """Solve with higher degrees or on finer meshes until the estimated error is small enough.
 
     With the goal "displacement" each round solves twice. Beams of an element that has a higher
@@ -74,15 +76,15 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str 
     max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
     max_degree = require_integer("max_degree", max_degree, 1, DEGREES[-1])
     if require_option("goal", goal, GOALS) == "strain":
-        return _solve_for_strain(scene, tol, max_elements, **options)
+        return _solve_for_strain(scene, tol, max_elements, find)
     rounds = _Rounds(scene, tol, max_degree)
     while True:
         # each mesh from the reference configuration: what a coarse mesh does not see as strain a
         # finer one does, which makes its solution a poor start
         coarse, state = rounds.scene, rounds.state or solve_static(
-            rounds.scene.system, None, **options)
+            rounds.scene.system, None, None, find)
         fine = rounds.finer()
-        better = solve_static(fine.system, None, **options)
+        better = solve_static(fine.system, None, None, find)
         estimate, errors = _compare(coarse, state, fine, better)
         better = better.replace(error_estimate=estimate, scene=fine,
                                 refinements=rounds.done(errors, fine))
@@ -176,10 +178,10 @@ def _too_few(n, estimate, tol, state):
         "is not reached: raise max_elements or use an element of higher order", state)
 
 
-def _solve_for_strain(scene, tol, max_elements, **options):
+def _solve_for_strain(scene, tol, max_elements, find):
     before = 0, np.inf
     while True:
-        state = solve_static(scene.system, None, **options)
+        state = solve_static(scene.system, None, None, find)
         parts = [strain_error(state, b) for b in scene.beams]
         errors, sizes = (np.concatenate(x) for x in zip(*parts))
         size = sizes.sum()

@@ -21,16 +21,22 @@ from ..core.errors import (InputError, require_finite, require_finite_scalar, re
                            require_integer, require_names, require_option, require_options,
                            require_positive, require_unmasked, shown)
 from ..core.types import Array, TimeFunction
-from ..elements import ElementBeamCable
+from ..elements import ElementBeam, ElementBeamCable
+from ..formulations import Formulation
+from ..materials import Material
+from ..materials.damping import KelvinVoigt
 from ..mesh.frame_files import graph_from_meshio
 from ..mesh.frame_graph import FrameGraph, mapping_of
 from ..mesh.places import as_point
 from ..results.arguments import displacement
 from ..results.state import State
+from ..sections import Section
 from .scene import Scene
 
 #: What is given for all lines, or for those of a group.
 BEAM = "height", "material", "width", "section", "element", "formulation", "damping", "compiled"
+#: The element of lines that are given none.
+CABLE = ElementBeamCable(5)
 #: Elements of a line, at most.
 MOST = 2**16
 #: Name of the beam of lines that are in no group.
@@ -137,7 +143,12 @@ class Frame(Scene):
                    nodes: Mapping[str, Any] | None = None, hinges: Any = (),
                    curves: Mapping[int, Callable[[Array], Any]] | None = None, elements: Any = 1,
                    sections: Mapping[str, Mapping[str, Any]] | None = None,
-                   tol: float | None = None, **beam: Any) -> Frame:
+                   tol: float | None = None, *, height: Any = None,
+                   material: Material | None = None,
+                   width: float | Callable[..., ArrayLike] | None = None,
+                   section: Section | None = None, element: ElementBeam = CABLE,
+                   formulation: str | Formulation | type[Formulation] = "assumed",
+                   damping: KelvinVoigt | None = None, compiled: bool = True) -> Frame:
         """A frame of lines between points.
 
         Parameters
@@ -161,21 +172,22 @@ class Frame(Scene):
         elements
             How many elements a line is divided into, or for each line, shape (m,).
         sections
-            Arguments of ``beam`` by group, where they differ: ``{"columns": {"height": 0.3}}``.
+            Of these arguments, from ``height`` on, those of a group where they differ:
+            ``{"columns": {"height": 0.3}}``.
         tol
             Points not farther apart than this are one node, at the place of the first of them, and
             a line between two of them is left out; numbers of points and lines stay. By default
             1e-5 of the size of the frame, or 1e-3 of its longest line if that is less, and a
             ModelWarning names such points. It also names points that are nearly as close, and stay
             apart. With 0 all points are nodes of their own.
-        **beam
-            ``height``, and the arguments of :class:`~skfem_ancf.Beam`: ``material`` and ``width``
-            or ``section``, and where they differ from these ``element`` (``ElementBeamCable(5)``),
-            ``formulation``, ``damping``. The height is a number, or of tapered lines a function of
-            s (n,), which runs from 0 to 1 along each line from its first point to its second, that
-            returns heights (n,), with kinks at nodes of the elements; or a list with one of these
-            for each line, in ``sections`` for each line of the group. Functions of material
-            coordinates (x, y), as of a width or a modulus, take this s for x.
+        height
+            Of the section: a number, or of tapered lines a function of s (n,), which runs from 0 to
+            1 along each line from its first point to its second, that returns heights (n,), with
+            kinks at nodes of the elements; or a list with one of these for each line, in
+            ``sections`` for each line of the group.
+        material, width, section, element, formulation, damping, compiled
+            As for :class:`~skfem_ancf.Beam`; the element is ``ElementBeamCable(5)`` by default.
+            Functions of material coordinates (x, y), as of a width or a modulus, take s for x.
 
         Examples
         --------
@@ -193,15 +205,20 @@ class Frame(Scene):
         >>> round(float(hall.rotations(state)[1]), 5)
         -0.00188
         """
-        require_options("Frame.from_lines", beam, ("points", "lines", "groups", "nodes", "hinges",
-                                                   "curves", "elements", "sections", "tol", *BEAM))
         graph = FrameGraph(points, lines, groups, nodes, curves, tol)
+        beam = dict(height=height, material=material, width=width, section=section, element=element,
+                    formulation=formulation, damping=damping, compiled=compiled)
         return cls._made(graph, hinges, elements, sections, beam)
 
     @classmethod
     def from_meshio(cls, mesh: Any, hinges: Any = (), elements: Any = 1,
                     sections: Mapping[str, Mapping[str, Any]] | None = None, groups: Any = None,
-                    tol: float | None = None, **beam: Any) -> Frame:
+                    tol: float | None = None, *, height: Any = None,
+                    material: Material | None = None,
+                    width: float | Callable[..., ArrayLike] | None = None,
+                    section: Section | None = None, element: ElementBeam = CABLE,
+                    formulation: str | Formulation | type[Formulation] = "assumed",
+                    damping: KelvinVoigt | None = None, compiled: bool = True) -> Frame:
         """A frame of the line cells of a mesh: of Gmsh's ``.msh``, ``.vtu``, and others.
 
         Parameters
@@ -211,7 +228,9 @@ class Frame(Scene):
             which are curved, is a line. Cell sets and physical groups are names: those of vertices,
             and point sets, of nodes, those of lines of their ends, and in :meth:`line_load` of the
             lines. Other kinds of cells are refused.
-        hinges, elements, sections, tol, **beam
+        hinges, elements, sections, tol
+            As for :meth:`from_lines`.
+        height, material, width, section, element, formulation, damping, compiled
             As for :meth:`from_lines`.
         groups
             Names of the sets of lines that are beams, no line in two of them; other sets may
@@ -230,9 +249,9 @@ class Frame(Scene):
         >>> [beam.name for beam in frame.beams]
         ['column', 'girder']
         """
-        require_options("Frame.from_meshio", beam,
-                        ("mesh", "hinges", "elements", "sections", "groups", "tol", *BEAM))
         named = list(mapping_of("sections", sections))
+        beam = dict(height=height, material=material, width=width, section=section, element=element,
+                    formulation=formulation, damping=damping, compiled=compiled)
         return cls._made(graph_from_meshio(mesh, groups, named, tol), hinges, elements, sections,
                          beam)
 
@@ -256,8 +275,8 @@ class Frame(Scene):
             groups[REST] = rest
         beams = []
         for name, lines in groups.items():
-            given = {"element": ElementBeamCable(5), **options, **sections.get(name, {})}
-            if "height" not in given:
+            given = {**options, **sections.get(name, {})}
+            if given["height"] is None:
                 raise InputError("the lines need a height of their section: give height=, or one "
                                  f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
             numbers = lines if "height" in sections.get(name, {}) else np.arange(m)

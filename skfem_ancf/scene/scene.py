@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,10 +31,11 @@ from ..results.arguments import configuration, displacement
 from ..results.modes import Buckling, Modes
 from ..results.path import CriticalPoint, Path
 from ..results.state import State
-from ..solvers import continuation, eigen
+from ..solvers import continuation, eigen, newton
+from ..solvers.tracing import Point
 from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
-from .adapt import solve_adaptive
+from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
 from .model import Model
 from .plan import Plan, make_plan
 from .quasistatic import StepHistory, run
@@ -265,26 +267,30 @@ class Scene(Model):
         with self._lock:
             return solve_linear(self.system)
 
-    def solve_static(self, start: State | None = None, adapt: float | None = None,
-                     **options: Any) -> State:
+    def solve_static(self, start: State | None = None, adapt: float | None = None, *,
+                     method: str = "auto", tol: float = 1e-8, max_iterations: int = 30,
+                     first_step: float = 1.0, min_step: float = 1e-4, stable: bool = True,
+                     progress: bool | None = None, goal: str = GOALS[0],
+                     max_elements: int = MOST_ELEMENTS, max_degree: int = DEGREES[-1]) -> State:
         """The equilibrium under the full load.
 
         Parameters
         ----------
         start
             A State to start from, of this scene or of one whose beams have equal meshes and
-            elements; the reference configuration by default. :meth:`state` makes one of DOFs.
+            elements; the stress-free state by default. :meth:`state` makes one of DOFs.
         adapt
             Tolerance of the error: raise the degree of elements that have one where the solution is
-            smooth (up to ``max_degree=``), else refine the meshes. The state's ``error_estimate``
-            says what was reached, its ``refinements`` what was done; its beams are the refined
-            ones. With ``goal="strain"`` it is the error of the strain. See
-            :func:`skfem_ancf.scene.adapt.solve_adaptive`.
-        **options
-            Those of :func:`skfem_ancf.solvers.newton.solve_static`: ``method``, ``tol``,
-            ``max_iterations``, ``first_step``, ``min_step``, ``progress``, ``stable``. By default
-            the equilibrium is a stable one; ``stable=False`` takes any that the load steps lead
-            to, and ``state.stability`` says what it is.
+            smooth, else refine the meshes. The state's ``error_estimate`` says what was reached,
+            its ``refinements`` what was done; its beams are the refined ones.
+        method, tol, max_iterations, first_step, min_step, progress
+            As for :func:`skfem_ancf.solvers.solve_static`.
+        stable
+            Take stable equilibria alone; with False any that the load steps lead to, and
+            ``state.stability`` says what it is.
+        goal, max_elements, max_degree
+            With ``adapt``: the error is that of the "displacement" or of the "strain", see
+            :func:`skfem_ancf.scene.adapt.solve_adaptive`; how far elements are added and raised.
 
         Raises
         ------
@@ -301,16 +307,21 @@ class Scene(Model):
         ModelWarning
             If a fibre is compressed beyond what the law is good for, or the mesh is too coarse.
         """
+        find = partial(newton.solve_static, method=method, tol=tol, max_iterations=max_iterations,
+                       first_step=first_step, min_step=min_step, progress=progress, stable=stable)
         with self._lock:
             if adapt is None:
+                if (goal, max_elements, max_degree) != (GOALS[0], MOST_ELEMENTS, DEGREES[-1]):
+                    raise InputError("goal=, max_elements= and max_degree= are of an adaptive "
+                                     "solution: give adapt=, its tolerance, too")
                 u = None if start is None else displacement(self.system, start)
                 memory = self.system.forces.contacts.of_state(start)
-                state = solve_static(self.system, u, memory, **options)
+                state = solve_static(self.system, u, memory, find)
             elif start is None:
-                state = solve_adaptive(self, adapt, **options)
+                state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             else:
-                raise InputError("an adaptive solution begins each mesh from its reference "
-                                 "configuration: give adapt= without start=")
+                raise InputError("an adaptive solution begins each mesh from its stress-free "
+                                 "state: give adapt= without start=")
             warn_about(state)
             return state
 
@@ -375,7 +386,11 @@ class Scene(Model):
         return State(system, u, require_finite_scalar("load", load), converged=False,
                      message="given coordinates", multipliers=multipliers)
 
-    def continuation(self, branch: CriticalPoint | None = None, **options: Any) -> Path:
+    def continuation(self, branch: CriticalPoint | None = None, *, steps: int = 100,
+                     ds: float = 0.02, ds_max: float | None = None, max_load: float | None = None,
+                     until: Callable[[Point], bool] | None = None, tol: float = 1e-8,
+                     max_iterations: int = 15, locate: float | None = 1e-8, side: int = 1,
+                     progress: bool | None = None) -> Path:
         """The equilibrium path through limit and snap-back points, by arc length.
 
         Parameters
@@ -383,10 +398,8 @@ class Scene(Model):
         branch
             One of the ``critical_points`` of an earlier path of this scene, of kind "bifurcation":
             follow the path that leaves the other one there.
-        **options
-            Those of :func:`skfem_ancf.solvers.continuation.continuation`: ``steps``, ``ds``,
-            ``ds_max``, ``max_load``, ``until``, ``tol``, ``max_iterations``, ``locate``, ``side``,
-            ``progress``.
+        steps, ds, ds_max, max_load, until, tol, max_iterations, locate, side, progress
+            As for :func:`skfem_ancf.solvers.continuation`.
 
         Raises
         ------
@@ -417,7 +430,9 @@ class Scene(Model):
             system.forces.contacts.require_path()
             critical = None if branch is None else critical_of(branch, system)
             try:
-                return Path(system, *continuation(system, branch=critical, **options))
+                return Path(system, *continuation(
+                    system, steps, ds, ds_max, max_load, until, tol, max_iterations, locate,
+                    critical, side, progress))
             except (ConvergenceError, Interrupted) as error:
                 raise type(error)(str(error), Path(system, *error.state)) from None
 
@@ -445,7 +460,11 @@ class Scene(Model):
 
     def integrate(self, t_end: float, dt: float | str,
                   scheme: str | Scheme | type[Scheme] = "energy-momentum",
-                  start: State | None = None, **options: Any) -> History:
+                  start: State | None = None, *, t_start: float | None = None,
+                  t_eval: ArrayLike | None = None, tol: float | None = None, rtol: float = RTOL,
+                  breakpoints: ArrayLike = (), until: Callable[[State], float] | None = None,
+                  checkpoint: StrPath | None = None, every: int | None = None,
+                  check: bool = False, progress: bool | None = None) -> History:
         """The motion from the reference configuration, or from a given one.
 
         Parameters
@@ -453,7 +472,10 @@ class Scene(Model):
         t_end
             Time at the end.
         dt
-            Step size, or "auto".
+            Step size, or "auto": chosen by an estimate of the error of each step, see ``rtol``.
+            Functions of time are sampled ahead at 4097 times, so that no step passes over an event
+            that lasts longer than from one of these to the next; name shorter ones by
+            ``breakpoints``.
         scheme
             A scheme, a name from :data:`skfem_ancf.dynamics.SCHEMES`, or "auto": by joints,
             damping, stiffness, contact and ``rtol``, as :meth:`plan` says.
@@ -461,10 +483,35 @@ class Scene(Model):
             A State to start from, or None for the reference configuration. An instant of a motion
             (``history.state(k)``) goes on with its velocity, from its time; every other State
             starts with the scene's :meth:`initial_velocity`.
-        **options
-            Those of :func:`skfem_ancf.dynamics.integrate.integrate`: ``t_eval``, ``tol``,
-            ``rtol``, ``t_start``, ``breakpoints``, ``checkpoint``, ``every``, ``progress``,
-            ``until``, ``check``.
+        t_start
+            Time at the start; by default that of ``start``, or 0.
+        t_eval
+            Times to store, shape (n,); every step by default. An instant within a step is the end
+            of a shorter step from the same start: the steps of the motion do not depend on it.
+        tol
+            Tolerance of the iteration in a step; the scheme's own by default.
+        rtol
+            Tolerance of ``dt="auto"``: what a step adds to the error of the displacement of a point
+            is at most about ``rtol`` times the size of the scene, in proportion to the size of the
+            step. The error of the motion is more where small errors grow: ``check`` measures it.
+        breakpoints
+            Times, shape (n,), at which loads or motions jump or have a kink: a step ends there,
+            with the values before, and the next one starts from the values after.
+        until
+            A function of the State at an instant that returns a number: the motion ends where it
+            changes its sign, within a step; ``history.event`` is its time. It is asked after each
+            step: two changes within one are not seen. Not with ``checkpoint``.
+        checkpoint
+            A file to write now and then, ``.npz`` or ``.h5``, from which :meth:`resume` goes on.
+        every
+            Steps between two checkpoints; by default a minute, and so that writing takes less than
+            a twentieth of the time.
+        check
+            Integrate once more in steps half as long, three times the work in all:
+            ``history.error`` is the largest difference at the stored instants. Not with
+            ``checkpoint``.
+        progress
+            Show a progress bar: True, False, or None for "if it takes long".
 
         Raises
         ------
@@ -488,11 +535,11 @@ class Scene(Model):
                                        np.zeros(b.N) for k, b in enumerate(self.layout.members)])
             u = None if start is None else displacement(self.system, start)
             if isinstance(scheme, str) and scheme == "auto":
-                rtol = require_positive("rtol", options.get("rtol", RTOL))
-                scheme = choose_scheme(self.system, rtol).scheme
+                scheme = choose_scheme(self.system, require_positive("rtol", rtol)).scheme
             return integrate(self.system, t_end, dt, get_scheme(scheme), u,
-                             velocity if self._velocities else None, start=start,
-                             sensors=self._located(), **options)
+                             velocity if self._velocities else None, t_start, t_eval, tol, rtol,
+                             progress, start, breakpoints, checkpoint, every, until, check,
+                             self._located())
 
     def run(self, steps: Steps | ArrayLike, increments: int = 20, start: State | None = None, *,
             tol: float = 1e-8, max_iterations: int = 30, min_step: float = 1e-4,

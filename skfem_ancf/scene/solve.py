@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..beam.masses import projected
 from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
-                           SupportError, ask_field, require_finite, require_options, shown, warn)
+                           SupportError, ask_field, require_finite, shown, warn)
 from ..core.types import Array
 from ..equations.linearised import linear_external_force, linear_force
 from ..equations.system import System
@@ -24,9 +24,9 @@ from ..materials.damping import Damping
 from ..results.checks import warn_of
 from ..results.path import CriticalPoint
 from ..results.state import State
-from ..solvers import eigen, newton
+from ..solvers import eigen
+from ..solvers.outcome import StaticResult
 
-OPTIONS = ("method", "tol", "max_iterations", "first_step", "min_step", "progress", "stable")
 #: How often a linear system is solved at most, with one factorisation; the degrees of freedom up to
 #: which it is more than once; and the correction relative to the displacement at which it is
 #: enough.
@@ -89,16 +89,17 @@ def solve_linear(system: System) -> State:
                  multipliers=multipliers, base=State(system, zero, load=0.0))
 
 
-def solve_static(system: System, u: Array | None, memory: Any = None, **options: Any) -> State:
-    """The equilibrium under the full load, without warnings, see :func:`warn_about`."""
-    require_options("solve_static", options, OPTIONS,
-                    "; first_step=0.1 begins with a tenth of the load; with adapt= those of "
-                    "scene.adapt.solve_adaptive too")
+def solve_static(system: System, u: Array | None, memory: Array | None,
+                 find: Callable[..., StaticResult]) -> State:
+    """The equilibrium under the full load, without warnings, see :func:`warn_about`.
+
+    ``find`` is :func:`skfem_ancf.solvers.solve_static` with its options.
+    """
     system.constraints.require_independent_joints()
     if system.constraints.adrift:
         system.constraints.require_supports()
     try:
-        return _state(system, newton.solve_static(system, u, memory=memory, **options))
+        return _state(system, find(system, u, memory=memory))
     except Interrupted as error:
         raise Interrupted(str(error), _state(system, error.state)) from None
     except ConvergenceError as error:

@@ -21,9 +21,6 @@ from ..places import Vector
 from .shapes import Shape
 
 METHODS = ("penalty", "augmented")
-#: What an obstacle may be told; the last two may be left to it.
-KNOWN = ("friction", "stiffness", "beam", "method", "position", "angle", "damping", "points",
-         "width", "tolerance")
 #: The least length over which a strip that is pressed in one point sinks in, relative to its
 #: extent: shorter ones no mesh resolves, and Newton's method loses its way among single points.
 SPREAD = 1.0 / 200.0
@@ -88,10 +85,13 @@ class Obstacle(ForceElement):
         default two more than the degree of the element's axis, and so many such rules one after
         the other that a shape of a small radius cannot sink in between two points by more than a
         hundredth of the height.
-    **options
-        ``width``: of the transition from no pressure to one in proportion to the penetration, a
-        length, by default a thousandth of the height. ``tolerance``: the penetration that
-        "augmented" leaves, a length, by default 1e-5 of the height.
+    width
+        Of the transition from no pressure to one in proportion to the penetration, a length; by
+        default a thousandth of the height.
+    tolerance
+        The penetration that "augmented" leaves, a length; by default 1e-5 of the height.
+    slip_speed
+        Deprecated, without effect.
 
     References
     ----------
@@ -106,7 +106,11 @@ class Obstacle(ForceElement):
     def __init__(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
                  beam: WhichBeam = None, method: str = "penalty", position: Any = None,
                  angle: Any = None, damping: float = 0.0, points: int | None = None,
-                 **options: float | None) -> None:
+                 width: float | None = None, tolerance: float | None = None,
+                 slip_speed: float | None = None) -> None:
+        if slip_speed is not None:
+            warn("slip_speed= has no effect any more, leave it out: in a motion points stick as "
+                 "they do in statics", DeprecationWarning)
         if not isinstance(shape, Shape):
             raise InputError("an obstacle is a Circle, Line, Polygon or SignedDistance of "
                              f"skfem_ancf.actions.obstacles, got {shown(shape)}")
@@ -120,9 +124,9 @@ class Obstacle(ForceElement):
         for name, function in (("position", position), ("angle", angle)):
             if function is not None:
                 require_function(name, function, "of time")
-        self.options = _options(options)
+        self.width = None if width is None else require_positive("width", width)
+        self.tolerance = 0.0 if tolerance is None else require_positive("tolerance", tolerance)
         self.symmetric = self.friction == 0.0
-        self.tolerance = 0.0
 
     @property
     def moves(self) -> bool:
@@ -176,7 +180,7 @@ class Obstacle(ForceElement):
                              "none: hold what there is by one-sided springs, or add a beam")
         beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
-        self.tolerance = self.options["tolerance"] or TOLERANCE * height
+        self.tolerance = self.tolerance or TOLERANCE * height
         groups = [self._group(beam, layout.offset(beam)) for beam in beams]
         places = np.concatenate([group.starts[:2] for group in groups], axis=1)
         self.shape = self.shape.fitted(places, height)
@@ -229,7 +233,7 @@ class Obstacle(ForceElement):
         E, density = _stiffest(beam.across, np.arange(mesh.nelements))
         k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
         firmest = 1.0 if self.penalty or augmented else max(1.0, E / (h * k))
-        numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
+        numbers = np.array([k, self.width or WIDTH * h, self.friction, k, self.damping,
                             HARDER * density * h * augmented, radius.max(),
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
         return Group(nodes, weights, slopes, areas, offsets, starts, mesh.nelements + 2, m,
@@ -319,13 +323,3 @@ def _repeated(x, w, pieces):
     weights = np.tile(w[:-1], pieces) / pieces
     weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
     return np.append(points, 1.0), np.append(weights, w[-1] / pieces)
-
-
-def _options(options):
-    if options.pop("slip_speed", None) is not None:
-        warn("slip_speed= has no effect any more, leave it out: in a motion points stick as they "
-             "do in statics", DeprecationWarning)
-    for name in options:
-        require_option("option of an obstacle", name, KNOWN)
-    return {name: None if options.get(name) is None else require_positive(name, options[name])
-            for name in KNOWN[-2:]}
