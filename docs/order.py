@@ -6,7 +6,7 @@ ORDER = [
     "first_beam", "rollup", "plain_scikit_fem", "cantilever", "choose_element",
     "poisson_locking", "thick_beam",
     "tapered_blade", "catenary", "spring", "leaf_spring", "rubber_block",
-    "bimetal", "snap_fit", "soft_finger", "compliant_gripper", "frame",
+    "bimetal", "snap_fit", "soft_finger", "compliant_gripper", "live_view", "frame",
     "cylinder", "pipe_laying", "capstan", "ring",
     "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",
     "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "bridge_train",

@@ -80,9 +80,10 @@ def main(folder=DOCS):
     on_a_cylinder().plot("eps_xx", thickness=1, filename=folder / "obstacles.png", dpi=110)
     pushed_frame().plot("eps_xx", thickness=6, filename=folder / "frames.png", dpi=110)
     portal(folder / "model.png")
-    for demo in ("rollup", "spring"):
+    for demo, name, dpi in (("rollup", "rollup", 150), ("spring", "spring", 150),
+                            ("live_view", "live", 90)):
         figure = runpy.run_path(str(DEMOS / f"{demo}.py"))["fig"]
-        figure.savefig(folder / f"{demo}.png", dpi=150, bbox_inches="tight")
+        figure.savefig(folder / f"{name}.png", dpi=dpi, bbox_inches="tight")
 
 
 if __name__ == "__main__":

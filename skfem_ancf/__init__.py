@@ -45,6 +45,7 @@ from .sections import Section
 from .results.modes import Buckling, Modes
 from .sweeps.members import Sweep
 from .sweeps.parameter_sweep import sweep
+from .visuals.explore import Explorer
 
 __version__ = "0.1.0"
 
@@ -76,6 +77,7 @@ __all__ = [
     "EndMoment",
     "Energy",
     "EnergyMomentum",
+    "Explorer",
     "FileError",
     "FollowerForce",
     "ForceElement",

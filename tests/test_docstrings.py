@@ -86,13 +86,16 @@ def described(text):
 
 
 def documents(function, owner):
-    """Docstrings that may describe the arguments: its own, those it overrides, its class's.
+    """Docstrings that may describe the arguments: its own, those it overrides, its class's, and
+    that of the item which a method of a scene adds.
 
     A class says under Other Parameters what many of its methods take.
     """
     texts = [function.__doc__]
     for base in owner.__mro__ if owner else ():
-        texts += [getattr(vars(base).get(function.__name__), "__doc__", None), base.__doc__]
+        method = vars(base).get(function.__name__)
+        texts += [getattr(thing, "__doc__", None)
+                  for thing in (method, getattr(method, "item", None), base)]
     return [inspect.cleandoc(text) for text in texts if text]
 
 
@@ -130,7 +133,6 @@ def test_the_walk_finds_the_public_api():
     assert len(names) > 400 < 2 * len(PUBLIC)
     assert {"scene.model.Model.clamp", "beam.beam.Beam.__init__", "forms.weak.tangent",
             "mesh.places.facets_of", "mesh.mapping.MappingBeam.F"} <= names
-    assert "Parameters\n----------" in inspect.getdoc(skfem_ancf.Scene.clamp)
 
 
 @pytest.mark.parametrize("function, owner", PUBLIC)
@@ -166,3 +168,13 @@ def test_arguments_and_what_is_returned_have_types(function, owner):
     if inspect.signature(function).return_annotation is inspect.Signature.empty:
         bare.append("return")
     assert not bare, f"no types in {function.__qualname__}: {bare}"
+
+
+def test_help_of_a_scene_begins_with_a_table_of_its_methods():
+    about, items = inspect.getdoc(skfem_ancf.Scene), inspect.getmembers(skfem_ancf.Scene)
+    table = about[:about.index("Parameters\n")]
+    assert [name for name, _ in items if not name.startswith("_") and f"``{name}``" not in table
+            ] == []
+    for name, method in items:  # methods that add an item leave its arguments to its class
+        if hasattr(method, "item"):
+            assert f"skfem_ancf.{method.item.__name__}`" in inspect.getdoc(method), name

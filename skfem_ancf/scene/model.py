@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Callable
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
@@ -43,14 +42,20 @@ M = TypeVar("M", bound="Model")
 
 
 def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
-    """A method of a scene that adds an item of a class, whose arguments it takes."""
+    """A method of a scene that adds an item of a class, whose arguments it takes.
+
+    The class describes them, so that ``help(Scene)`` is short.
+    """
     def method(self, *arguments, **options):
         return self.add(item(*arguments, **options))
 
-    signature, about = inspect.signature(item), inspect.cleandoc(item.__doc__ or "")
+    signature, about = inspect.signature(item), (inspect.getdoc(item) or "").split("\n\n")[0]
     itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    other = re.search(r"^(?!Parameters$)\w[\w ]*\n-{3,}$", about, re.MULTILINE)
-    method.__doc__ = about[:other.start() if other else None].rstrip() + "\n"
+    of = getattr(item, "__name__", name)
+    method.__doc__ = f"""{about}
+
+    The arguments are those of :class:`~skfem_ancf.{of}`.
+    """
     method.__name__, method.__qualname__ = name, f"Model.{name}"
     vars(method).update(item=item, __signature__=signature.replace(
         parameters=[itself, *signature.parameters.values()], return_annotation="Self"))

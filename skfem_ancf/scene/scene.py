@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from skfem.assembly import Basis
 
+from ..actions.item import Item
 from ..actions.loads import Load
+from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
-from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite,
-                           require_finite_scalar, require_label, require_positive, shown)
+from ..core.errors import (ConvergenceError, InputError, Interrupted, ask, require_finite,
+                           require_finite_scalar, require_function, require_label,
+                           require_positive, shown)
 from ..core.steps import Steps
 from ..core.types import Array, StrPath
 from ..dynamics import choose_scheme, get_scheme
@@ -33,6 +36,7 @@ from ..results.path import CriticalPoint, Path
 from ..results.state import State
 from ..solvers import continuation, eigen, newton
 from ..solvers.tracing import Point
+from ..visuals.explore import Explorer, explorer
 from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
 from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
@@ -46,13 +50,33 @@ if TYPE_CHECKING:
 
 
 class Scene(Model):
-    """Beams, rigid bodies and domains with supports and loads, and their solutions.
+    """Beams, rigid bodies and domains, what acts on them, and their solutions.
 
-    Methods that add something return the scene, so that they can be chained, but for those of
-    joints, which return the joint: ``state.joint_force(joint)`` is its force. Each adds an item:
-    ``scene.spring(...)`` is ``scene.add(Spring(...))``. In a scene of several beams they take
-    ``beam=``: a Beam, its name or its number; many take a RigidBody there, too. Loads take
-    ``amplitude=``: a function of time by which they are multiplied in :meth:`integrate`.
+    ================  =========================================================================
+    *supports*        ``clamp``, ``pin``, ``fix`` (single degrees of freedom)
+    *loads*           ``gravity``, ``point_force``, ``follower_force``, ``moment``, ``line_load``,
+                      ``traction``, ``pressure``, ``temperature``, ``eigenstrain``,
+                      ``load`` (a form of scikit-fem), ``energy`` (a density of yours)
+    *joints*          ``hinge``, ``weld``, ``slider``, ``motor``, ``joint`` (others, by name)
+    *other forces*    ``spring``, ``torsional_spring``, ``foundation``, ``point_mass``, ``drag``,
+                      ``damping``, ``control``, ``obstacle``, ``add`` (any item, also yours)
+    *statics*         ``solve_static``, ``solve_linear``; ``run``: over a time, without inertia;
+                      ``continuation``: the path through snaps; ``buckling``
+    *motion*          ``integrate``, ``initial_velocity``, ``sensor``, ``resume``; ``modes``
+    *look*            ``plot``: before it is solved; ``plan``: what a solution will compute;
+                      ``explore``: solved as a slider or an arrow is moved;
+                      ``beams``, ``bodies``, ``domains``, ``items``, ``loads``, ``joints``,
+                      ``elements``, ``beam`` (by name)
+    *change*          ``replace``: the same with other loads, beams, materials
+    *equations*       ``matrices``, ``free``, ``basis``, ``state``, ``N``, ``system``
+    ================  =========================================================================
+
+    Methods that add something return the scene, so that they can be chained; those of joints
+    return the joint: ``state.joint_force(joint)`` is its force. Each adds an item:
+    ``scene.spring(...)`` is ``scene.add(Spring(...))``, and :class:`~skfem_ancf.Spring` describes
+    the arguments. In a scene of several beams they take ``beam=``: a Beam, its name or its number;
+    many take a RigidBody, too. Loads take ``amplitude=``: a function of time by which they are
+    multiplied in :meth:`run` and :meth:`integrate`.
 
     Parameters
     ----------
@@ -278,7 +302,7 @@ class Scene(Model):
         ----------
         start
             A State to start from, of this scene or of one whose beams have equal meshes and
-            elements; the stress-free state by default. :meth:`state` makes one of DOFs.
+            elements; the reference configuration by default. :meth:`state` makes one of DOFs.
         adapt
             Tolerance of the error: raise the degree of elements that have one where the solution is
             smooth, else refine the meshes. The state's ``error_estimate`` says what was reached,
@@ -320,8 +344,8 @@ class Scene(Model):
             elif start is None:
                 state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)
             else:
-                raise InputError("an adaptive solution begins each mesh from its stress-free "
-                                 "state: give adapt= without start=")
+                raise InputError("an adaptive solution begins each mesh from its reference "
+                                 "configuration: give adapt= without start=")
             warn_about(state)
             return state
 
@@ -352,6 +376,48 @@ class Scene(Model):
         return plot_scene(self.state(load=0.0), ax, nodes=nodes, names=names, loads=loads,
                           supports=supports, thickness=thickness, title=title,
                           filename=filename, dpi=dpi)
+
+    def explore(self, load: PointForce | Callable[[float], Item | Scene],
+                interval: ArrayLike = (0.0, 1.0), value: float | None = None, *, title: str = "",
+                field: Any = "eps_yy", limits: ArrayLike | None = None,
+                thickness: float | str = "auto", off_screen: bool | None = None,
+                window_size: tuple[int, int] = (1000, 700)) -> Explorer:
+        """A view of pyvista in which the equilibrium follows a slider, or a force that is dragged.
+
+        Parameters
+        ----------
+        load
+            A function of a number that returns an item that acts in addition, as a load, or another
+            scene of the same meshes: a slider sets the number. Or a PointForce that acts in
+            addition: its arrow is dragged by the handle at its tip.
+        interval, value, title
+            Ends of the slider, shape (2,), its start, by default the end, and its name.
+        field, limits, thickness, off_screen, window_size
+            As for :func:`skfem_ancf.visuals.pyvista.view`. Without limits the colours are those of
+            the states at the ends and at the start.
+
+        Returns
+        -------
+        Explorer
+            ``explorer.plotter.show()`` opens a window, or a cell of a notebook (by
+            ``pip install 'pyvista[jupyter]'``).
+        """
+        def solve(x, start):
+            made = PointForce(x, *at) if dragged else ask("load({:g})", load, x)
+            scene = made if isinstance(made, Scene) else copy(self).add(made)
+            try:
+                return scene.solve_static(start=start)
+            except (InputError, ConvergenceError):  # the start may be what is wrong
+                return scene.solve_static()
+
+        dragged = isinstance(load, PointForce)
+        at = (load.at, load.beam) if isinstance(load, PointForce) else ()
+        picture = dict(field=field, limits=limits, thickness=thickness, off_screen=off_screen,
+                       window_size=window_size)
+        if isinstance(load, PointForce):
+            return explorer(solve, None, load.total, "", lambda state: state.position(*at), picture)
+        require_function("load", load, "of a number that returns an item or a scene")
+        return explorer(solve, interval, value, title, None, picture)
 
     def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,
               load: float = 1.0) -> State:
