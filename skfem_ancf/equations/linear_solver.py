@@ -1,7 +1,7 @@
 """The linear systems of a scene: ``[K, J^T; J, 0] [x; l] = [b; c]``, and the signature of K.
 
 Four ways, by what there is beside the band of the beams: LAPACK alone; a Schur complement for a
-few multipliers of beams that their supports hold; sparse LU of the saddle-point matrix for others;
+few multipliers of beams that their supports hold; sparse LU on the null space of J for others;
 static condensation for frames.
 """
 
@@ -13,21 +13,18 @@ from typing import Any
 from weakref import proxy
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS, BandMatrix, Inertia
 from ..core.types import Array
 from .condensation import Condensed
-from .signature import determinant_sign, inertia_of, is_definite, null_basis
+from .null_space import NullSpace, Pattern
+from .signature import determinant_sign
 
 logger = logging.getLogger(__name__)
 
 #: Pivots of a positive definite matrix, over its diagonal, at least.
 SURE = 1e-10
-#: Degrees of freedom up to which the tangent on the tangent space of joints is a dense matrix.
-DENSE = 100
 
 
 class LinearSolver:
@@ -50,7 +47,7 @@ class LinearSolver:
     def __init__(self, system: Any) -> None:
         self._system = proxy(system)
         self._at: tuple[Array, float] = np.zeros(0), 0.0
-        self._joined: Schur | SaddlePoint | None = None
+        self._joined: Schur | NullSpace | None = None
         self._pattern = Pattern()
 
     @property
@@ -120,7 +117,7 @@ class LinearSolver:
                 return
             except np.linalg.LinAlgError:
                 logger.debug("joints hold what the supports leave free")
-        self._joined = SaddlePoint(s.K, J, entries, constraints, self._pattern)
+        self._joined = NullSpace(s.K, J, entries, constraints, self._pattern)
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """Solve with the factors.
@@ -185,7 +182,7 @@ class LinearSolver:
         """
         if not self.coupled:
             return self._system.K.determinant_sign()
-        if isinstance(self._joined, SaddlePoint):
+        if isinstance(self._joined, NullSpace):
             return determinant_sign(self._joined.reduced())
         return -1 if self.inertia().negative % 2 else 1
 
@@ -259,100 +256,3 @@ class Schur:
     def inertia(self) -> Inertia:
         """That of K where J x = 0."""
         return Inertia(0, False)
-
-
-class Pattern:
-    """Where a sparse matrix has entries, which are the same in each iteration."""
-
-    def __init__(self) -> None:
-        self._band = np.zeros(0, bool)
-        self._of: Any = None
-
-    def of_band(self, K: BandMatrix) -> tuple[Any, Any, Any]:
-        """Rows, columns and values of a band matrix, zeros included that were others before."""
-        flat = K.band.flat
-        used = flat != 0.0
-        if len(self._band) != len(used):
-            self._band = used
-        elif np.any(used > self._band):
-            self._band = self._band | used
-        at, = np.nonzero(self._band)
-        j = at // K.band.ld
-        i = j + at % K.band.ld - K.band.top
-        below, = np.nonzero(i > j) if K.symmetric else (np.zeros(0, int),)
-        return np.append(i, j[below]), np.append(j, i[below]), np.append(flat[at], flat[at[below]])
-
-    def csc(self, i: Array, j: Array, values: Array, n: int) -> sparse.csc_array:
-        """The matrix (n, n) of some entries (k,), which are summed."""
-        of = self._of
-        if of is None or len(of[0]) != len(i) or not (
-                np.array_equal(of[0], i) and np.array_equal(of[1], j)):
-            places, where = np.unique(j * np.int64(n) + i, return_inverse=True)
-            first = np.searchsorted(places, np.arange(n + 1) * np.int64(n)).astype(np.int32)
-            of = self._of = i, j, where, (places % n).astype(np.int32), first
-        data = np.bincount(of[2], values, len(of[3]))
-        return sparse.csc_array((data, of[3], of[4]), shape=(n, n))
-
-
-class SaddlePoint:
-    """Sparse factors of ``[K, J^T; J, 0]``.
-
-    Parameters
-    ----------
-    K
-        A :class:`~skfem_ancf.core.linalg.BandMatrix` with its supports fixed.
-    J, entries
-        Rows, columns and values of J, and of what K has outside of the band, shapes (k,).
-    constraints
-        The :class:`~skfem_ancf.equations.constraints.Constraints`.
-    pattern
-        That of the last matrix of this system.
-    """
-
-    def __init__(self, K: BandMatrix, J: Any, entries: Any, constraints: Any,
-                 pattern: Pattern) -> None:
-        self._J, self._sizes = J, constraints.coordinate_sizes
-        self._n, self._m = n, m = K.n, constraints.m
-        self._entries = i, j, v = [np.append(a, b) for a, b in zip(pattern.of_band(K), entries)]
-        free, (r, c, w) = constraints.free, J
-        root = np.sqrt(np.mean((np.abs(K.diagonal()) * self._sizes**2)[free])) or 1.0
-        size = np.zeros(m)
-        np.maximum.at(size, r, np.abs(w) * self._sizes[c])
-        #: rows and columns over their sizes: pivots need one unit
-        self._scale = scale = np.append(self._sizes / root, root / size)
-        i, j, v = (np.concatenate(x) for x in zip((i, j, v), (n + r, c, w), (c, n + r, w)))
-        self._lu = splu(pattern.csc(i, j, v * scale[i] * scale[j], n + m))
-
-    def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
-        """x (n,) and l (m,) for right-hand sides (n,) and (m,)."""
-        x = self._scale * self._lu.solve(self._scale * np.append(b, c))
-        return x[:self._n], x[self._n:]
-
-    def _matrices(self):
-        """K and J of degrees of freedom over their sizes, sparse."""
-        (r, c, w), (i, j, v), sizes = self._J, self._entries, self._sizes
-        return (sparse.csr_array((v * sizes[i] * sizes[j], (i, j)), shape=(self._n, self._n)),
-                sparse.csr_array((w * sizes[c], (r, c)), shape=(self._m, self._n)))
-
-    def reduced(self) -> Any:
-        """K where J x = 0, sparse of many degrees of freedom."""
-        K, J = self._matrices()
-        if self._n <= DENSE:
-            T = null_basis(J.toarray())
-            return T.T @ K.toarray() @ T
-        T = null_basis(J)
-        return (T.T @ K @ T).tocsc()
-
-    def inertia(self) -> Inertia:
-        """That of K, of its symmetric part, where J x = 0.
-
-        K is positive definite there if K plus a stiffness times J^T J is.
-        """
-        if self._n > DENSE:
-            K, J = self._matrices()
-            size = np.sqrt((J * J).sum(axis=1) / np.max(np.abs(K.diagonal())))
-            J = sparse.diags_array(1.0 / size) @ J
-            if is_definite(0.5 * (K + K.T) + J.T @ J):
-                return Inertia(0, False)
-        A = self.reduced()
-        return inertia_of(0.5 * (A + A.T))

@@ -83,69 +83,21 @@ def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
     (m, n), entries = J.shape, J.tocoo()
     links = sparse.coo_array((np.ones(J.nnz), (entries.row, m + entries.col)), (m + n, m + n))
     number, group = connected_components(links, directed=False)
-    rows, row = _members(group[:m], number)
-    columns, column = _members(group[m:], number)
-    for g, some in enumerate(_members(group[entries.row], number)[0]):
+    rows, row = members(group[:m], number)
+    columns, column = members(group[m:], number)
+    for g, some in enumerate(members(group[entries.row], number)[0]):
         if len(rows[g]):
             A = np.zeros((len(rows[g]), len(columns[g])))
             A[row[entries.row[some]], column[entries.col[some]]] = entries.data[some]
             yield rows[g], columns[g], A
 
 
-def _members(group, number):
+def members(group: Array, number: int) -> tuple[list[Array], Array]:
     """The members of each group, and the place that each member has in its group."""
     order, count = np.argsort(group, kind="stable"), np.bincount(group, minlength=number)
     place, ends = np.empty(len(group), dtype=int), np.cumsum(count)
     place[order] = np.arange(len(group)) - np.repeat(ends - count, count)
     return [order[last - n:last] for n, last in zip(count, ends)], place
-
-
-def null_basis(J: Array | sparse.csr_array) -> Array | sparse.csr_array:
-    """A matrix whose columns span the null space of a J of full rank, sparse if J is.
-
-    In each of the :func:`groups` of its rows as many coordinates as there are rows are given by
-    the others: those that QR with pivots takes first.
-
-    Parameters
-    ----------
-    J
-        Shape (m, N).
-
-    Returns
-    -------
-    ndarray or scipy.sparse.csr_array
-        Shape (N, N - m): every other coordinate is an unknown of its own.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the rows depend on each other.
-    """
-    n, given = J.shape[1], []
-    for rows, columns, A in groups(J):
-        k = len(rows)
-        size = row_sizes(A)
-        R, order = scipy.linalg.qr(A / np.where(size > 0.0, size, 1.0)[:, None], mode="r",
-                                   pivoting=True, check_finite=False)
-        rest = np.abs(np.diag(R))
-        if k > A.shape[1] or rest[k - 1] <= DEPENDENT * rest[0]:
-            raise np.linalg.LinAlgError("the joints are not independent in this state")
-        C = -scipy.linalg.solve_triangular(R[:, :k], R[:, k:])
-        given.append((np.repeat(columns[order[:k]], C.shape[1]), np.tile(columns[order[k:]], k),
-                      C.ravel(), columns[order[:k]]))
-    none = np.zeros(0, dtype=int)
-    rows, columns, values, pivots = map(np.concatenate, zip((none, none, np.zeros(0), none),
-                                                            *given))
-    own = np.delete(np.arange(n), pivots)
-    number = np.empty(n, dtype=int)
-    number[own] = np.arange(len(own))
-    rows, columns = np.append(rows, own), np.append(number[columns], number[own])
-    values, shape = np.append(values, np.ones(len(own))), (n, len(own))
-    if not isinstance(J, np.ndarray):
-        return sparse.csr_array((values, (rows, columns)), shape=shape)
-    out = np.zeros(shape)
-    out[rows, columns] = values
-    return out
 
 
 def inertia_of(A: Array | sparse.csr_array) -> Inertia:

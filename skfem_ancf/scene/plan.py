@@ -164,7 +164,7 @@ def _linear_solver(s, dynamic):
                 "nodes, sparse LDL^T of these: no multiplier is unknown")
     many = not s.constraints.few or s.forces.far or not s.symmetric
     if not dynamic and s.solver.coupled and many:
-        return "sparse LU of the saddle-point matrix with the multipliers"
+        return "sparse LU on the null space of the joints"
     solver = (f"banded Cholesky, half bandwidth {bandwidth}" if s.symmetric else
               f"banded LU, half bandwidth {bandwidth}: a force has no potential")
     if s.constraints.m:

@@ -1,0 +1,229 @@
+"""Factors of ``[K, J^T; J, 0]`` on the null space of J, where joints are many or hold the beams.
+
+Each equation of a joint gives one degree of freedom by others: ``x = T y + x_0`` with ``J T = 0``.
+What is left, ``T^T K T``, is symmetric if K is, and its pivots have the signs of its eigenvalues.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from ..core.linalg import SMALL, BandMatrix, Inertia
+from ..core.types import Array
+from .signature import DEPENDENT, inertia_of, members
+
+logger = logging.getLogger(__name__)
+
+#: Degrees of freedom up to which an inertia is that of a dense matrix.
+DENSE = 100
+#: Of a residual over its largest term, above which factors without pivoting are not trusted.
+ROUGH = 1e-8
+
+
+class Block(NamedTuple):
+    """Groups of equations, of one size, that have no degree of freedom in common.
+
+    Attributes
+    ----------
+    rows, columns
+        Numbers of the equations and of the degrees of freedom of each group, (g, k) and (g, c).
+    entries, places
+        Which entries of J are theirs, and where these go in a flat array of shape (g, k, c).
+    """
+
+    rows: Array
+    columns: Array
+    entries: Array
+    places: Array
+
+
+def blocks(rows: Array, columns: Array, m: int, n: int) -> list[Block]:
+    """The equations of the entries (k,) of a matrix (m, n), in groups that are independent."""
+    links = sparse.coo_array((np.ones(len(rows)), (rows, m + columns)), (m + n, m + n))
+    number, group = connected_components(links, directed=False)
+    (all_rows, row), (all_columns, column) = (members(x, number) for x in (group[:m], group[m:]))
+    shape = np.array([[len(x) for x in all_of] for all_of in (all_rows, all_columns)]).T
+    out = []
+    for k, c in np.unique(shape[shape[:, 0] > 0], axis=0):
+        some = np.flatnonzero(np.all(shape == (k, c), axis=1))
+        place = np.full(number, -1)
+        place[some] = np.arange(len(some))
+        entries = np.flatnonzero(place[group[rows]] >= 0)
+        i, j = rows[entries], columns[entries]
+        out.append(Block(np.array([all_rows[g] for g in some]),
+                         np.array([all_columns[g] for g in some]).reshape(len(some), c), entries,
+                         (place[group[i]] * k + row[i]) * c + column[j]))
+    return out
+
+
+def eliminated(A: Array) -> tuple[Array, Array, Array]:
+    """Reduced row echelon forms of matrices (g, k, c), by complete pivoting.
+
+    Returns
+    -------
+    pivots
+        The column of each row's pivot, (g, k).
+    R, M
+        ``M A = R``, (g, k, c) and (g, k, k): R has a 1 in each pivot, alone in its column.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the rows depend on each other.
+    """
+    g, k, c = A.shape
+    size = np.max(np.abs(A), axis=2, initial=0.0)
+    if not np.all(size):
+        raise np.linalg.LinAlgError("a joint holds what supports hold")
+    R = np.concatenate([A / size[:, :, None], np.broadcast_to(np.eye(k), (g, k, k))], axis=2)
+    each, pivots, left = np.arange(g), np.empty((g, k), int), np.ones((g, k, 1))
+    for _ in range(k):
+        row, column = np.divmod(np.argmax(np.abs(R[:, :, :c] * left).reshape(g, -1), axis=1), c)
+        pivot = R[each, row, column]
+        if np.any(np.abs(pivot) <= DEPENDENT):
+            raise np.linalg.LinAlgError("the joints are not independent in this state")
+        R[each, row] /= pivot[:, None]
+        factor = R[each, :, column]
+        factor[each, row] = 0.0
+        R -= factor[:, :, None] * R[each, row][:, None]
+        pivots[each, row], left[each, row] = column, 0.0
+    return pivots, R[:, :, :c], R[:, :, c:] / size[:, None]
+
+
+class Pattern:
+    """Where a sparse matrix has entries, which are the same in each iteration."""
+
+    def __init__(self) -> None:
+        self._band = np.zeros(0, bool)
+        self._of: Any = None
+        self._blocks: Any = None
+
+    def of_band(self, K: BandMatrix) -> tuple[Any, Any, Any]:
+        """Rows, columns and values of a band matrix, zeros included that were others before."""
+        flat = K.band.flat
+        used = flat != 0.0
+        if len(self._band) != len(used):
+            self._band = used
+        elif np.any(used > self._band):
+            self._band = self._band | used
+        at, = np.nonzero(self._band)
+        j = at // K.band.ld
+        i = j + at % K.band.ld - K.band.top
+        below, = np.nonzero(i > j) if K.symmetric else (np.zeros(0, int),)
+        return np.append(i, j[below]), np.append(j, i[below]), np.append(flat[at], flat[at[below]])
+
+    def blocks(self, rows: Array, columns: Array, m: int, n: int) -> list[Block]:
+        """The :func:`blocks` of J, which are those of the last call if its entries are."""
+        of = self._blocks
+        if of is None or not (np.array_equal(of[0], rows) and np.array_equal(of[1], columns)):
+            of = self._blocks = rows, columns, blocks(rows, columns, m, n)
+        return of[2]
+
+    def csc(self, i: Array, j: Array, values: Array, n: int) -> sparse.csc_array:
+        """The matrix (n, n) of some entries (k,), which are summed."""
+        of = self._of
+        if of is None or len(of[0]) != len(i) or not (
+                np.array_equal(of[0], i) and np.array_equal(of[1], j)):
+            places, where = np.unique(j * np.int64(n) + i, return_inverse=True)
+            first = np.searchsorted(places, np.arange(n + 1) * np.int64(n)).astype(np.int32)
+            of = self._of = i, j, where, (places % n).astype(np.int32), first
+        data = np.bincount(of[2], values, len(of[3]))
+        return sparse.csc_array((data, of[3], of[4]), shape=(n, n))
+
+
+class NullSpace:
+    """Sparse factors of ``[K, J^T; J, 0]``.
+
+    Parameters
+    ----------
+    K
+        A :class:`~skfem_ancf.core.linalg.BandMatrix` with its supports fixed.
+    J, entries
+        Rows, columns and values of J, and of what K has outside of the band, shapes (k,).
+    constraints
+        The :class:`~skfem_ancf.equations.constraints.Constraints`.
+    pattern
+        That of the last matrix of this system.
+    """
+
+    def __init__(self, K: BandMatrix, J: Any, entries: Any, constraints: Any,
+                 pattern: Pattern) -> None:
+        self._sizes, self._shape = s, (m, n) = constraints.coordinate_sizes, (constraints.m, K.n)
+        i, j, v = (np.append(a, b) for a, b in zip(pattern.of_band(K), entries))
+        self._K = pattern.csc(i, j, v * s[i] * s[j], n)
+        self._groups, given = [], np.zeros(n, bool)
+        rows, columns, values = J
+        for block in pattern.blocks(rows, columns, m, n):
+            (g, k), c = block.rows.shape, block.columns.shape[1]
+            A = np.bincount(block.places, (values * s[columns])[block.entries], g * k * c)
+            pivots, R, M = eliminated(A.reshape(g, k, c))
+            at = np.take_along_axis(block.columns, pivots, axis=1)
+            given[at] = True
+            self._groups.append((block, at, R, M))
+        self._T = self._basis(given)
+        self._reduced = (self._T.T @ self._K @ self._T).tocsc()
+        self._lu, self._plain = self._factors(K.symmetric)
+
+    def _basis(self, given):
+        """The matrix whose columns span the null space of J, (n, n - m)."""
+        free = np.flatnonzero(~given)
+        number = np.cumsum(~given) - 1
+        parts = [(free, number[free], np.ones(len(free)))]
+        for block, at, R, _ in self._groups:
+            g, a, b = np.nonzero(R * ~given[block.columns][:, None])
+            parts.append((at[g, a], number[block.columns[g, b]], -R[g, a, b]))
+        i, j, v = map(np.concatenate, zip(*parts))
+        return sparse.csc_array((v, (i, j)), shape=(len(given), len(free)))
+
+    def _factors(self, symmetric):
+        """Factors, and whether all their pivots are on the diagonal."""
+        if symmetric:
+            try:
+                lu = splu(self._reduced, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                          options={"SymmetricMode": True})
+                if np.array_equal(lu.perm_r, lu.perm_c):
+                    return lu, True
+            except RuntimeError:
+                logger.debug("a pivot on the diagonal is zero")
+        return splu(self._reduced), False
+
+    def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
+        """x (n,) and l (m,) for right-hand sides (n,) and (m,)."""
+        x, b, T = np.zeros(self._shape[1]), self._sizes * b, self._T
+        for block, at, _, M in self._groups:
+            x[at] = (M @ c[block.rows][:, :, None])[:, :, 0]
+        right = T.T @ (b - self._K @ x)
+        y = self._lu.solve(right)
+        if self._plain:
+            left = right - self._reduced @ y
+            largest = np.max(np.abs(right) + abs(self._reduced) @ np.abs(y), initial=0.0)
+            if np.max(np.abs(left), initial=0.0) > ROUGH * largest:
+                logger.debug("factors without pivoting are not accurate")
+                self._lu, self._plain = splu(self._reduced), False
+                y = self._lu.solve(right)
+            else:
+                y += self._lu.solve(left)
+        x += T @ y
+        rest, l = b - self._K @ x, np.empty(self._shape[0])
+        for block, at, _, M in self._groups:
+            l[block.rows] = (M.transpose(0, 2, 1) @ rest[at][:, :, None])[:, :, 0]
+        return self._sizes * x, l
+
+    def reduced(self) -> Any:
+        """K where J x = 0, sparse of many degrees of freedom."""
+        return self._reduced.toarray() if self._shape[1] <= DENSE else self._reduced
+
+    def inertia(self) -> Inertia:
+        """That of K, of its symmetric part, where J x = 0."""
+        if self._plain:
+            pivots, diagonal = self._lu.U.diagonal()[self._lu.perm_c], self._reduced.diagonal()
+            if np.all(pivots > SMALL * np.abs(diagonal)):
+                return Inertia(0, False)
+        A = self.reduced()
+        return inertia_of(0.5 * (A + A.T))
