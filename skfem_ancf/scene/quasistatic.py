@@ -48,7 +48,7 @@ class StepHistory(History):
     """A quasi-static run: its equilibria over the time of its steps.
 
     It is read as any History: positions, strains, reactions, sensors, pictures, films and files.
-    Velocities and accelerations are zero.
+    Velocities and accelerations are zero; ``dissipated`` is the work of friction.
 
     Attributes
     ----------
@@ -108,7 +108,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         t_start = float(start.t or 0.0)
         begin = Instant(t_start, StaticResult(
             displacement(system, start), start.multipliers, 1.0, np.zeros(system.N), [], True,
-            "given", memory=system.forces.contacts.of_state(start)), "given")
+            "given", memory=system.forces.contacts.of_state(start),
+            rubbed=0.0 if start._motion is None else start._motion.dissipated), "given")
     if not len(ends) or ends[-1] <= t_start:
         raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "
                          f"after the start at t = {t_start:g}")
@@ -150,8 +151,7 @@ class _Record:
         if memory is None and contacts.obstacles:
             memory = np.zeros(contacts.tables.memory.size)
         y = Motion(instant.t, u, zero, zero, zero, instant.result.multipliers,
-                   instant.result.multipliers, 0.0, np.nan if contacts.anchored else 0.0,
-                   memory, turns)
+                   instant.result.multipliers, 0.0, instant.result.rubbed, memory, turns)
         self._motions.append(y)
         self._instants.append(instant)
         self._recorder.record([y])

@@ -99,8 +99,8 @@ class Increment:
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with what it leaves behind at obstacles."""
         contacts, start = self.system.forces.contacts, self.start
-        contacts.settle(found.u, self.time)
-        return replace(start, steps=[*start.steps, self.record], load=self.level,
+        rubbed = start.rubbed + contacts.settle(found.u, self.time)
+        return replace(start, steps=[*start.steps, self.record], load=self.level, rubbed=rubbed,
                        memory=contacts.remember(), **found._asdict())
 
     def _augmented(self):

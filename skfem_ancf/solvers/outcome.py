@@ -64,6 +64,8 @@ class StaticResult:
         Whether the equilibrium gives way in some direction, and what could not be told.
     memory
         What load steps have left behind at obstacles, shape (n,), or None.
+    rubbed
+        The work of friction in all load steps.
     diverging
         Whether the equilibrium of the laws' first moduli was no better a start; then it is not
         looked for again.
@@ -82,6 +84,7 @@ class StaticResult:
     unstable: bool = False
     doubt: str = ""
     memory: Array | None = None
+    rubbed: float = 0.0
     diverging: bool = False
     attempts: tuple[Attempt, ...] = ()
 

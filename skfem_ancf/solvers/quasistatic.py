@@ -135,4 +135,5 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             raise failed
         logger.info("t = %.6g: %s, going on to another equilibrium", t, failed)
         result = Search(system, last.result.u, last.result.memory, rules, stable, False).find()
+        result.rubbed += last.result.rubbed
     return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")
