@@ -52,10 +52,7 @@ def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
     signature, about = inspect.signature(item), (inspect.getdoc(item) or "").split("\n\n")[0]
     itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
     of = getattr(item, "__name__", name)
-    method.__doc__ = f"""{about}
-
-    The arguments are those of :class:`~skfem_ancf.{of}`.
-    """
+    method.__doc__ = f"{about} Arguments: those of :class:`~skfem_ancf.{of}`."
     method.__name__, method.__qualname__ = name, f"Model.{name}"
     vars(method).update(item=item, __signature__=signature.replace(
         parameters=[itself, *signature.parameters.values()], return_annotation="Self"))

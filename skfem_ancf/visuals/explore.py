@@ -93,7 +93,8 @@ class Explorer:
             self.plotter.add_text(f"no equilibrium found at {shown(value)}", name="failed",
                                   position="lower_left", font_size=9, color=LOAD)
             return self.state
-        self.plotter.remove_actor("failed")
+        if "failed" in self.plotter.actors:
+            self.plotter.remove_actor("failed")
         now = Scenery([state], self._field, self._factor, False, self._limits, SUBDIVIDE, True)
         if now.points(0).shape != self.mesh.points.shape:
             raise InputError("the meshes of the scene must stay the same while it is explored")
