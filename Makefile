@@ -107,6 +107,7 @@ docs: $(VENV)/docs.stamp
 	$(PY) -m pytest -n 2 tests/test_readme.py tests/test_reference.py skfem_ancf
 	$(PY) -m sphinx -W --keep-going -d out/doctrees -b html docs out/docs
 	$(PY) docs/check_links.py out/docs
+	$(PY) -m pytest tests/test_search.py
 	@echo "open $(CURDIR)/out/docs/index.html"
 
 pictures: $(VENV)/test.stamp

@@ -28,7 +28,7 @@ release = version = skfem_ancf.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc",
               "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sphinx_design",
-              "sphinx_gallery.gen_gallery"]
+              "sphinx_gallery.gen_gallery", "thumbnails"]
 exclude_patterns = ["generated/verification.md"]  # a part of a page
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
@@ -50,7 +50,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
     "ignore_pattern": r"__init__\.py",
-    "image_scrapers": ("matplotlib", "films", DynamicScraper()),
+    "image_scrapers": ("thumbnails", "matplotlib", "films", DynamicScraper()),
     "matplotlib_animations": True,
     "abort_on_example_error": True,
     "remove_config_comments": True,

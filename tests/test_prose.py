@@ -37,7 +37,12 @@ WORDS = {
 LONGEST, MEAN = 40, 20
 #: Pages that are still to be rewritten.
 EXCEPTIONS = {
-    "benchmarks.md", "obstacles.md", "paper.md", "paraview.md", "scikit-fem.md"}
+    "benchmarks.md",
+    "obstacles.md",
+    "paper.md",
+    "paraview.md",
+    "scikit-fem.md",
+}
 
 
 def prose(text):

@@ -61,6 +61,19 @@ def test_links_lead_somewhere(page):
         assert (page.parent / target).exists(), target
 
 
+def anchors(page):
+    """Names of the headings of a page, as the site and GitHub make them."""
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in
+            re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_to_headings(page):
+    text = page.read_text(encoding="utf-8")
+    for target, anchor in re.findall(r"\]\(([^)#:]*\.md)?#([^)]+)\)", text):
+        assert anchor in anchors(page.parent / target if target else page), (target, anchor)
+
+
 def test_the_index_of_tasks_has_sixty():
     page = (ROOT / "docs" / "howto.md").read_text(encoding="utf-8")
     assert len(re.findall(r"^\| (?!task)", page, re.MULTILINE)) >= 60

@@ -1,0 +1,107 @@
+"""Thumbnails of the gallery: the largest drawing of an example, without axes, bars and words."""
+
+import ast
+import re
+from pathlib import Path
+
+from matplotlib import pyplot as plt
+from matplotlib.transforms import Bbox
+
+#: Pixels of a thumbnail.
+SIZE = 460, 300
+FOLDER = Path(__file__).resolve().parent / "generated" / "thumbnails"
+#: Characters of a sentence, beyond which it ends at its colon; and what is not shown as written.
+LONGEST = 130
+MARKS = {"``": "", " [1]_": "", "\\pi": "π", "\\mu": "μ", "\\alpha": "α", "{": "", "}": ""}
+#: The size of the largest drawing of each example so far.
+largest: dict[str, float] = {}
+
+
+def size(ax):
+    """Square inches of a drawing; of curves a tenth, of a colour bar nothing."""
+    if ax.get_label() == "<colorbar>":
+        return 0.0
+    box = ax.get_window_extent().transformed(ax.figure.dpi_scale_trans.inverted())
+    return box.width * box.height * (1.0 if ax.collections else 0.1)
+
+
+def draw(ax, filename):
+    """Save the inside of one drawing, and leave its figure as it was."""
+    figure = ax.figure
+    words = [*figure.texts, *(other for other in figure.axes if other is not ax),
+             *ax.child_axes, *ax.spines.values(), *ax.texts, ax.xaxis, ax.yaxis, ax.get_legend()]
+    hidden = [part for part in words if part is not None and part.get_visible()]
+    titles = {where: ax.get_title(where) for where in ("left", "center", "right")}
+    box = ax.get_window_extent().transformed(figure.dpi_scale_trans.inverted())
+    half = max(box.width, box.height * SIZE[0] / SIZE[1]) / 2.0
+    x, y = (box.x0 + box.x1) / 2.0, (box.y0 + box.y1) / 2.0
+    high = half * SIZE[1] / SIZE[0]
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine("none")
+    for part in hidden:
+        part.set_visible(False)
+    for where in titles:
+        ax.set_title("", loc=where)
+    figure.savefig(filename, dpi=SIZE[0] / (2.0 * half),
+                   bbox_inches=Bbox([[x - half, y - high], [x + half, y + high]]))
+    for part in hidden:
+        part.set_visible(True)
+    for where, title in titles.items():
+        ax.set_title(title, loc=where)
+    figure.set_layout_engine(engine)
+
+
+def thumbnails(block, block_vars, gallery_conf):
+    """Before matplotlib's figures are saved: the largest drawing of the example so far."""
+    stem = Path(block_vars["src_file"]).stem
+    for number in plt.get_fignums():
+        figure = plt.figure(number)
+        figure.canvas.draw()
+        for ax in figure.axes:
+            if ax.get_visible() and size(ax) > largest.get(stem, 0.0):
+                largest[stem] = size(ax)
+                FOLDER.mkdir(parents=True, exist_ok=True)
+                draw(ax, FOLDER / f"{stem}.png")
+    return ""
+
+
+def replace(app):
+    """After the gallery has run: these thumbnails in place of its own."""
+    for file in FOLDER.glob("*.png"):
+        target = Path(app.srcdir, "gallery", "images", "thumb", f"sphx_glr_{file.stem}_thumb.png")
+        if target.exists():
+            target.write_bytes(file.read_bytes())
+
+
+def sentence(example):
+    """The first sentence of an example."""
+    text = " ".join(ast.get_docstring(ast.parse(example.read_text())).split("\n\n")[1].split())
+    text = re.sub(r":\w+:`([^`]*)`", r"\1", text)
+    for written, shown in MARKS.items():
+        text = text.replace(written, shown)
+    first = re.match(r".*?[.?!](?= [A-Z]|$)", text)[0]
+    return first if len(first) <= LONGEST else first.partition(": ")[0].rstrip(".") + "."
+
+
+def captions(app, docname, source):
+    """A sentence under each thumbnail of the gallery."""
+    if docname != "gallery/index":
+        return
+    demos = Path(app.srcdir).parent / "demos"
+    parts = re.split(r'(:doc:`/gallery/(\w+)`)', re.sub(r' tooltip="[^"]*"', "", source[0]))
+    for k in range(2, len(parts), 3):
+        text = sentence(demos / f"{parts[k]}.py")
+        parts[k + 1] = parts[k + 1].replace(
+            "</div>\n", f'</div>\n      <div class="thumbnail-sentence">{text}</div>\n', 1)
+    source[0] = "".join(part for k, part in enumerate(parts) if k % 3 != 2)
+
+
+def _get_sg_image_scraper():
+    """What sphinx-gallery asks a module for."""
+    return thumbnails
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("builder-inited", replace, priority=900)
+    app.connect("source-read", captions)

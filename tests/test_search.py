@@ -1,0 +1,47 @@
+"""The search of the site finds what engineers look for; of the pages, if the site is not built."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+english = pytest.importorskip("sphinx.search.en")
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILT = ROOT / "out" / "docs" / "searchindex.js"
+#: What is looked for, and a page that the search has to name.
+PHRASES = {
+    "degrees of freedom": "glossary", "boundary condition": "supports", "transient": "motion",
+    "quasi-static": "solving", "export to ParaView": "recipes", "initial imperfection": "recipes",
+    "plastic": "limitations", "moving load": "recipes", "prescribed displacement": "recipes",
+    "force-displacement curve": "recipes", "natural frequencies": "modes",
+    "buckling load": "modes", "von Mises": "fields", "contact": "obstacles", "units": "units"}
+
+
+def stems(text):
+    """The stems of the words of a text that Sphinx's search knows."""
+    search = english.SearchEnglish({})
+    return {search.stem(word.lower()) for word in search.split(text)
+            if search.word_filter(word.lower())}
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """From the name of a page to the stems that find it."""
+    if not BUILT.exists():
+        return {page.stem: stems(page.read_text(encoding="utf-8"))
+                for page in (ROOT / "docs").glob("*.md")}
+    text = BUILT.read_text(encoding="utf-8")
+    index = json.loads(re.fullmatch(r"Search\.setIndex\((.*)\)", text, re.DOTALL)[1])
+    found = {name: set() for name in index["docnames"]}
+    for kind in ("terms", "titleterms"):
+        for stem, numbers in index[kind].items():
+            for number in [numbers] if isinstance(numbers, int) else numbers:
+                found[index["docnames"][number]].add(stem)
+    return found
+
+
+@pytest.mark.parametrize("phrase", PHRASES)
+def test_search_finds(phrase, pages):
+    assert stems(phrase) <= pages[PHRASES[phrase]]
