@@ -5,7 +5,7 @@ from pathlib import Path
 ORDER = [
     "first_beam", "rollup", "plain_scikit_fem", "cantilever", "choose_element",
     "poisson_locking", "thick_beam",
-    "tapered_blade", "catenary", "spring", "leaf_spring", "rubber_block",
+    "tapered_blade", "catenary", "spring", "leaf_spring", "measured_clip", "rubber_block",
     "bimetal", "snap_fit", "soft_finger", "compliant_gripper", "live_view", "frame",
     "cylinder", "pipe_laying", "capstan", "ring",
     "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",

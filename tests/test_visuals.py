@@ -107,7 +107,15 @@ def test_colour_bars_say_the_unit(state):
         return {text for bar in (*ax.figure.axes, *ax.child_axes)
                 for text in (bar.get_xlabel(), bar.get_ylabel())} - {"x", "y", ""}
 
-    assert labels(unit="Pa") == {"Pa"} and labels() == {"force / area"} and not labels(unit="")
+    assert labels(unit="Pa") == {"$S_{xx}$ (Pa)"} and labels(unit="") == {"$S_{xx}$"}
+    assert labels() == {"$S_{xx}$ (force / area)"}
+    scene = Scene(line()).units("N", "mm")
+    state = scene.state()
+    assert labels() == {"$S_{xx}$ (MPa)"}
+    state = scene.replace(beams=[line(4)]).state()
+    assert labels() == {"$S_{xx}$ (MPa)"}
+    with pytest.raises(InputError, match="length must be"):
+        scene.units("N", "")
     with pytest.raises(InputError, match="unit must be a text"):
         state.plot("S_xx", unit=1)
 

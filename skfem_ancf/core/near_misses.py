@@ -41,6 +41,8 @@ MEANT = {
     "resultants": "section_forces internal_forces bending_moment normal_force shear_force N Q M",
     "reactions": "support_forces support_reactions forces",
     "save": "export write to_vtk to_vtu",
+    "sensors.to_csv": "to_csv csv write_csv save_csv",
+    "to_xarray": "to_pandas to_dataframe dataset",
     "animate": "film movie video gif",
     "t": "time times",
     "frequencies": "omega omegas eigenfrequencies natural_frequencies",

@@ -17,9 +17,11 @@ from ..core.errors import InputError, require_finite, require_index, require_pat
 from ..core.types import Array, Place, StrPath
 from ..equations.momentum import angular_momentum, momentum
 from ..equations.system import System
+from ..io.tables import to_xarray
 from ..recovery.resultants import Resultants, over_time
 from ..results.points import MaterialPoints
 from ..results.state import Reaction, State
+from ..visuals.animation import animate
 from .base import Motion, Scheme
 from .sensors import Readings
 
@@ -376,21 +378,8 @@ class History(MaterialPoints):
                              f"give a pair of its name and a component, as ({sensor!r}, 1)")
         return values, " ".join(map(str, (sensor, *parts)))
 
-    def animate(self, filename: StrPath, field: Any = "eps_yy", **options: Any) -> Any:
-        """Write a film; see :func:`skfem_ancf.visuals.animation.animate`.
-
-        Parameters
-        ----------
-        filename
-            Ends with .gif or .mp4.
-        field
-            The field that colours the body.
-        **options
-            Those of :func:`skfem_ancf.visuals.animation.animate`.
-        """
-        from ..visuals.animation import animate
-
-        return animate(self, filename, field, **options)
+    animate = animate
+    to_xarray = to_xarray
 
     def save(self, filename: StrPath, progress: bool | None = None, **options: Any) -> None:
         """Write a time series for ParaView.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from ..beam.layout import WhichBeam
 from ..beam.points import Located
 from ..core.errors import CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown
 from ..core.immutable import Immutable
-from ..core.types import Array
+from ..core.types import Array, StrPath
 from ..equations.system import System
+from ..io.tables import readings_to_csv, readings_to_xarray
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
 from .base import Motion
@@ -131,6 +133,22 @@ class Readings(dict[str, "Array"]):
 
     def __missing__(self, name: str) -> Array:
         raise NameUnknown("sensor", name, self)
+
+    def to_csv(self, filename: StrPath) -> FilePath:
+        """Write a table of text, and return its file.
+
+        The columns are ``t`` and the sensors; of one with several numbers ``tip 0``, ``tip 1``.
+
+        Parameters
+        ----------
+        filename
+            Ends with .csv; missing folders are made.
+        """
+        return readings_to_csv(self.t, self, filename)
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset`` with a variable for each sensor, along "time"."""
+        return readings_to_xarray(self.t, self)
 
     def __repr__(self) -> str:
         return f"<Readings of {list(self)} at {len(self.t)} times>"

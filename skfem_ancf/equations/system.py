@@ -84,6 +84,8 @@ class System:
         The tangent is symmetric, as all loads and force elements have a potential.
     items : tuple or None
         What acts, as it was given, for pictures; None of a copy in another process.
+    units : tuple of str or None
+        Units of force and length, for pictures and files.
     clock : float or None
         The time at which statics takes functions of time, see :meth:`stopped_at`; None for full
         size of loads.
@@ -124,6 +126,7 @@ class System:
                              "damping=, and the scene damping(modal=...) or damping(mass=...)")
         self._rest_modes = rest_modes
         self.items: tuple[Any, ...] | None = None
+        self.units: tuple[str, str] | None = None
         self.clock: float | None = None
         self._varying: list[Any] = []
         self.constant_force = np.zeros(self.N)

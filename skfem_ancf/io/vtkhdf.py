@@ -109,7 +109,7 @@ class VtkHdfWriter(SeriesWriter):
             Its time, later than that of the frame before.
         """
         t = require_next(state, t, self.times[-1] if self.times else None)
-        body = body_fields(state, **self.options)
+        body = body_fields(state, **self.options, share=False)  # as many in all frames
         if not self.times:
             self._begin(body)
             self._cells = _cells(body)

@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
+from xml.sax.saxutils import escape, quoteattr
 
-import meshio
 import numpy as np
 
 from ..actions.obstacles.outlines import around, outlines
@@ -15,7 +15,8 @@ from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
                            require_option, require_path, warn)
 from ..core.types import Array, StrPath
-from ..recovery.fields import DomainValues, find_fields
+from ..recovery.arrays import COMPONENTS, body_of, facts_of
+from ..recovery.fields import find_fields, unit_of, units_of
 from ..recovery.grids import grids, in_space
 
 logger = logging.getLogger(__name__)
@@ -30,28 +31,31 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 class BodyFields(NamedTuple):
     """The body of a state on points: the arguments of a ``meshio.Mesh``.
 
-    ``points`` have the shape (n, 3); elements do not share points. ``cells`` has for each beam its
-    cell type and its cells, as rows of point numbers; of each rigid body its outline; of each
-    domain its triangles or quads.
-    ``point_data`` has fields by name, (n,) or (n, 3): vectors with a third component of zero,
-    tensors as (xx, yy, xy). ``cell_data`` has the numbers ``beam`` and ``element``, one array for
-    each beam.
+    ``points`` have the shape (n, 3). ``cells`` has for each beam its cell type and its cells, as
+    rows of point numbers; of each rigid body its outline; of each domain its triangles or quads.
+    ``point_data`` has fields by name, (n,), (n, 3) of vectors, with a third component of zero, and
+    (n, 6) of symmetric tensors (xx, yy, zz, xy, yz, xz). ``cell_data`` has the numbers ``beam`` and
+    ``element``, one array for each beam, ``field_data`` what is known of the whole.
     """
 
     points: np.ndarray
     cells: list
     point_data: dict
     cell_data: dict
+    field_data: dict
 
 
 def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
-                undeformed: bool = False, recover: bool = True, fields: Any = None) -> BodyFields:
+                undeformed: bool = False, recover: bool = True, fields: Any = None,
+                share: bool = True) -> BodyFields:
     """The body of a state on points, with the arguments of :func:`save_vtu`.
 
     Parameters
     ----------
     state, subdivide, lagrange, undeformed, recover, fields
         As for :func:`save_vtu`.
+    share
+        False for elements with points of their own, of which there are as many in each state.
 
     Examples
     --------
@@ -60,38 +64,22 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     >>> from skfem_ancf.io import body_fields
     >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
     ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> meshio.Mesh(*body_fields(Scene(beam).state())).points.shape  # 4 elements, 9 x 5 points
-    (180, 3)
+    >>> meshio.Mesh(*body_fields(Scene(beam).state())).points.shape  # 4 x 8 x 4 quads
+    (165, 3)
     """
-    found, wanted = grids(state, subdivide, lagrange, recover), find_fields(fields)
-    undeformed = require_flag("undeformed", undeformed)
-    first = np.cumsum([0] + [g.x.shape[1] for g in found])
-    data = {field.name: np.concatenate([_values(field, g, fields is None) for g in found])
-            for field in wanted
-            if field.name == "displacement" or any(g.values is not None for g in found)}
+    wanted, undeformed = find_fields(fields), require_flag("undeformed", undeformed)
+    found = grids(state, subdivide, lagrange, recover)
+    if all(grid.values is None for grid in found):
+        wanted = [field for field in wanted if field.name == "displacement"]
+    bodies = [body_of(grid, wanted, undeformed, fields is None, share) for grid in found]
+    first = np.cumsum([0] + [len(body.points) for body in bodies])
     return BodyFields(
-        np.concatenate([g.points(undeformed) for g in found]),
-        [(g.kind, start + g.cells) for start, g in zip(first, found)], data,
-        {"beam": [np.full(len(g.cells), k) for k, g in enumerate(found)],
-         "element": [g.elements for g in found]})
-
-
-def _values(field, grid, lenient):
-    """A field as meshio takes it; not a number where there is none, or where a law has none."""
-    n = grid.x.shape[1]
-    if field.name == "displacement":
-        return in_space(grid.u)
-    nan = np.full((n,) if field.components == 1 else (n, 3), np.nan)
-    if grid.values is None:
-        return nan
-    try:
-        value = field.of(grid.values)
-    except InputError as error:
-        if not lenient and not isinstance(grid.values, DomainValues):
-            raise
-        logger.info("%s is not a number: %s", field.name, error)
-        return nan
-    return in_space(value) if field.components == 2 else value.T
+        np.concatenate([body.points for body in bodies]),
+        [(grid.kind, start + body.cells) for start, grid, body in zip(first, found, bodies)],
+        {field.name: np.concatenate([body.data[field.name] for body in bodies])
+         for field in wanted},
+        {"beam": [np.full(len(grid.cells), k) for k, grid in enumerate(found)],
+         "element": [grid.elements for grid in found]}, facts_of(state))
 
 
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
@@ -99,19 +87,24 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              fields: Any = None, precision: str = "double", encoding: Any = None) -> Path:
     """Write the deformed body of a state for ParaView.
 
-    All beams go into one file, which replaces an older one only once it is complete. Points belong
-    to one element each, since strains and stresses may jump between elements.
+    All beams go into one file, which replaces an older one only once it is complete. Neighbouring
+    elements share the points between them where all fields of the file agree to round-off, as
+    recovered fields do; where one jumps, each has points of its own.
 
-    =============================  ==========================================================
-    on points                      meaning
-    =============================  ==========================================================
-    displacement                   from the reference configuration, 3 components
-    eps_xx, eps_yy, eps_xy         Green-Lagrange strain in the beam's own frame: x along the
-                                   axis, y across the section of the undeformed beam
-    S_xx, S_yy, S_xy               second Piola-Kirchhoff stress in the same frame
-    sigma_xx, sigma_yy, sigma_xy   Cauchy stress along the global axes; NaN where the material
-                                   has no thickness left, or a law does not say it
-    =============================  ==========================================================
+    =============  ==========================================================================
+    on points      meaning
+    =============  ==========================================================================
+    displacement   from the reference configuration, 3 components
+    strain         Green-Lagrange strain in the beam's own frame: x along the axis, y across
+                   the section of the undeformed beam; 6 components xx, yy, zz, xy, yz, xz
+    stress         second Piola-Kirchhoff stress in the same frame
+    cauchy_stress  along the global axes; NaN where the material has no thickness left
+    von_mises      von Mises stress
+    =============  ==========================================================================
+
+    What a law does not say, as the component zz in plane strain, is NaN. The file says the load
+    factor, the time and the version, the numbers of members that have names, and units
+    (:meth:`Scene.units <skfem_ancf.Scene.units>`), as VTK's field data and ``UNITS_LABEL``.
 
     ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
     outline, numbered behind the beams, without strain and stress (NaN). A domain has its
@@ -164,7 +157,9 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     if encoding is not None:
         warn("encoding= is no longer used: leave it out", DeprecationWarning)
     body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
-    _write(path, body, dtype)
+    scale = units_of(state)
+    units = {field.name: unit_of(field, scale) for field in find_fields(fields) if scale}
+    _write(path, body, dtype, units)
     logger.info("wrote %s: %d points", path, len(body.points))
     save_obstacles(outlines(state, around(body.points[:, :2].T)), path, dtype)
     return path
@@ -178,16 +173,42 @@ def save_obstacles(walls: list[Array], path: Path, dtype: Any = np.float64) -> N
     numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
     suffix = path.suffix if path.suffix.lower() in SUFFIXES else ".vtu"
     _write(path.with_name(f"{path.stem}_obstacles{suffix}"), BodyFields(
-        points, [("line", np.arange(len(points)).reshape(-1, 2))], {}, {"obstacle": [numbers]}),
+        points, [("line", np.arange(len(points)).reshape(-1, 2))], {}, {"obstacle": [numbers]}, {}),
         dtype)
 
 
-def _write(path, body, dtype):
+def _write(path, body, dtype, units=()):
+    import meshio
+
     with output_file(path) as temporary:
         meshio.write(temporary, meshio.Mesh(
             body.points.astype(dtype), body.cells,
             {name: values.astype(dtype) for name, values in body.point_data.items()},
             body.cell_data))
+        if path.suffix.lower() == ".vtu":
+            temporary.write_bytes(_completed(temporary.read_bytes(), body, dict(units)))
+
+
+def _completed(text, body, units):
+    """A file of meshio with what it does not write: field data, names of components, units."""
+    facts = "".join(
+        f'<DataArray type="{"Int64" if x.dtype.kind == "i" else "Float64"}" Name={quoteattr(name)}'
+        f' NumberOfTuples="{len(x)}" format="ascii">{" ".join(map(repr, x.tolist()))}</DataArray>\n'
+        for name, x in body.field_data.items())
+    start = b"<UnstructuredGrid>\n"
+    text = text.replace(start, start + f"<FieldData>\n{facts}</FieldData>\n".encode(), 1)
+    for name, values in body.point_data.items():
+        at = text.find(f"Name={quoteattr(name)}".encode(), text.find(b"<PointData>"))
+        end = text.find(b"</DataArray>", at)
+        if at < 0 or end < 0:
+            continue
+        unit = units.get(name, "")
+        label = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{escape(unit)}' \
+            "</InformationKey>\n" if unit not in ("", "1") else ""
+        parts = "".join(f'ComponentName{k}="{c}" ' for k, c in enumerate(
+            COMPONENTS.get(values.size // len(values), ())))
+        text = b"".join([text[:at], parts.encode(), text[at:end], label.encode(), text[end:]])
+    return text
 
 
 class SeriesWriter:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.errors import (FileError, InputError, MeshError, require_finite, require_names,
                            require_path, shown)
+from .dxf import mesh_of_dxf
 from .frame_graph import FrameGraph
 
 #: Kinds of cells of meshio that are lines: the ends first, then what is between them in order.
@@ -25,8 +26,8 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     Parameters
     ----------
     mesh
-        A ``meshio.Mesh``, or a file that meshio reads. Cells "line" are straight, "line3", "line4",
-        ... are polynomials through their points, "vertex" gives names to nodes.
+        A ``meshio.Mesh``, or a file that meshio reads, or of DXF. Cells "line" are straight,
+        "line3", "line4", ... are polynomials through their points, "vertex" gives names to nodes.
     groups
         Names of the sets of lines that are beams. By default those in ``named``, and those that
         share no line with another set.
@@ -86,6 +87,8 @@ def _mesh_of(mesh):
 
     if isinstance(mesh, (str, Path)):
         path = require_path("mesh", mesh)
+        if path.suffix.lower() == ".dxf":
+            return mesh_of_dxf(path)
         try:
             mesh = meshio.read(path)
         except (Exception, SystemExit) as error:  # meshio ends the process where it knows no format

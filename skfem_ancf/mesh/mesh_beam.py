@@ -27,6 +27,7 @@ from .numbering import NumberedMesh, default_tags
 from .places import as_point, is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
+from .spline import axis_of
 from .taper import heights_of, scaled
 
 EPS = float(np.finfo(float).eps)
@@ -44,9 +45,9 @@ class MeshBeam(NumberedMesh):
 
     A mesh does not change; its methods return other meshes.
 
-    Use :meth:`init_line` or :meth:`init_curve`. The nodes are numbered along the axis, which
-    keeps matrices banded; the boundaries ``left`` and ``right`` are the end sections, ``top``
-    and ``bottom`` the surfaces at Y = +h/2 and -h/2.
+    Use :meth:`init_line`, :meth:`init_curve` or :meth:`from_points`. The nodes are numbered along
+    the axis, which keeps matrices banded; the boundaries ``left`` and ``right`` are the end
+    sections, ``top`` and ``bottom`` the surfaces at Y = +h/2 and -h/2.
 
     Attributes
     ----------
@@ -203,6 +204,52 @@ class MeshBeam(NumberedMesh):
         check_curvature(bent, s, largest if heights is None else np.max(heights, axis=0))
         return cls._from_nodes(p, t, tangent, lengths, (largest, heights, taper), s.copy(), curve,
                                turning)
+
+    @classmethod
+    def from_points(cls, points: ArrayLike | StrPath,
+                    height: float | Callable[[Array], ArrayLike], elements: int | None = None,
+                    noise: float = 0.0) -> MeshBeam:
+        """A beam whose axis is a cubic spline through points, as of a drawing or a measurement.
+
+        Parameters
+        ----------
+        points
+            Points along the axis, shape (n, 2), at least four for a cubic; or a file of text with
+            rows x, y.
+        height
+            As for :meth:`init_curve`; its parameter s is the length along the polygon of the
+            points.
+        elements
+            Number of elements, of equal lengths; by default one between each two points.
+        noise
+            Root mean square distance by which the axis may miss points, as measured ones have it.
+
+        Raises
+        ------
+        MeshError
+            If two points that follow each other are the same, or the axis bends too sharply: at a
+            corner use two beams and a weld.
+        FileError
+            If the file cannot be read.
+
+        References
+        ----------
+        P. Dierckx, Curve and Surface Fitting with Splines, 1993: ``scipy.interpolate.splprep``.
+
+        Examples
+        --------
+        >>> angle = np.linspace(0, np.pi, 20)
+        >>> arc = MeshBeam.from_points(np.column_stack([np.cos(angle), np.sin(angle)]),
+        ...                            height=0.1, elements=8)
+        >>> arc.nelements, float(arc.lengths.sum().round(4))
+        (8, 3.1416)
+        """
+        curve, s = axis_of(points, elements, noise)
+        try:
+            return cls.init_curve(curve, s, height, curve.derivative())
+        except MeshError as error:
+            raise MeshError(f"the axis through the points: {error}. Measured points need noise=, "
+                            "a corner two beams and a weld") from None
 
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):

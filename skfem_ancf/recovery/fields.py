@@ -7,6 +7,7 @@ it has a sign, and how many components it has. A user-defined field is a functio
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -86,6 +87,12 @@ class Field:
     def label(self) -> str:
         """Title and unit."""
         return (self.title or self.name) + (f" ({self.unit})" if self.unit else "")
+
+    @property
+    def symbol(self) -> str:
+        """The formula in the title, or all of it."""
+        formula = re.search(r"\$[^$]+\$", self.title)
+        return formula.group() if formula else self.title or self.name
 
     def of(self, values: Values) -> Array:
         """The field at the points of Values, (n,) or (components, n)."""
@@ -362,11 +369,36 @@ def _table():
     yield Field("cauchy_stress", lambda v: v.sigma, "Cauchy stress", area, True, 3, "global")
 
 
+#: What a force per area is called, by the units of force and length.
+PRESSURES = {("N", "m"): "Pa", ("kN", "m"): "kPa", ("MN", "m"): "MPa", ("N", "mm"): "MPa"}
+
+
+def units_of(state: Any) -> tuple[str, str] | None:
+    """The units of force and length of the scene of a state, or None."""
+    return getattr(getattr(state, "system", None), "units", None)
+
+
+def unit_of(field: Field, units: tuple[str, str] | None) -> str:
+    """The unit of a field by those of force and length, or None; "1" of numbers.
+
+    Examples
+    --------
+    >>> from skfem_ancf.recovery.fields import FIELDS, unit_of
+    >>> [unit_of(FIELDS["von_mises"], units) for units in (None, ("N", "mm"), ("lbf", "in"))]
+    ['force / area', 'MPa', 'lbf/in²']
+    """
+    if units is None:
+        return field.unit
+    area = PRESSURES.get(units, f"{units[0]}/{units[1]}²")
+    return {"length": units[1], "force / area": area, "energy / volume": area}.get(
+        field.unit, field.unit)
+
+
 #: All fields by their names.
 FIELDS = {field.name: field for field in _table()}
 
 #: Those that files hold where none are named.
-DEFAULT = ("displacement", *(f"{a}_{c}" for a in ("eps", "S", "sigma") for c in COMPONENTS))
+DEFAULT = ("displacement", "strain", "stress", "cauchy_stress", "von_mises")
 
 #: Those that a picture can show.
 DRAWN = tuple(name for name, f in FIELDS.items() if f.components == 1 or name == "displacement")

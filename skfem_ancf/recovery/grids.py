@@ -31,7 +31,8 @@ class Grid(NamedTuple):
     ``kind`` is what meshio calls the cells: "quad", "triangle", "VTK_LAGRANGE_QUADRILATERAL", or
     "polygon"; ``cells`` (nc, k) are rows of point numbers, ``elements`` (nc,) their elements.
     ``rows`` points across a section follow each other. ``values`` are the :class:`~.fields.Values`
-    of a beam, :class:`~.fields.DomainValues`, or None of a rigid body.
+    of a beam, :class:`~.fields.DomainValues`, or None of a rigid body. ``between`` (2, k) are
+    numbers of points of neighbouring elements that are one point of the body.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Grid(NamedTuple):
     elements: Array
     rows: int
     values: Values | DomainValues | None
+    between: Array = np.zeros((2, 0), dtype=int)
 
     def points(self, undeformed: bool = False) -> Array:
         """Positions with a third component of zero, shape (n, 3)."""
@@ -65,10 +67,12 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
         X, local = lagrange_cell(beam) if lagrange else layout(beam, m, n)
         values, ne = values_on_grid(state, beam, X, recover), beam.mesh.nelements
         start = X.shape[-1] * np.arange(ne)
+        rows = X.shape[-1] // (1 + m) if not lagrange else round(X.shape[-1] ** 0.5)
         out.append(Grid(f"beam {k}" if beam.name is None else beam.name, values.x, values.u,
                         "VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
                         (start[:, None, None] + local).reshape(-1, local.shape[1]),
-                        np.repeat(np.arange(ne), len(local)), X.shape[-1] // (m + 1), values))
+                        np.repeat(np.arange(ne), len(local)), rows, values,
+                        _between(beam.mesh, X.shape[-1], rows)))
     for k, body in enumerate(getattr(state, "bodies", ())):
         x = body.outline_at(np.zeros(4))
         out.append(Grid(f"body {k}" if body.name is None else body.name, x,
@@ -82,6 +86,13 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
                         np.repeat(np.arange(number), len(cells) // number), 1,
                         DomainValues(x, u, gradient)))
     return out
+
+
+def _between(mesh, n, rows):
+    """Last points of elements and first ones of those behind, (2, k), with n points each."""
+    e = np.flatnonzero(mesh.t[1, :-1] == mesh.t[0, 1:])[:, None]
+    first = n * (e + 1) + np.arange(rows)
+    return np.array([first - rows, first]).reshape(2, -1)
 
 
 def subdivision(subdivide: Any) -> tuple[int, int]:

@@ -11,6 +11,7 @@ import numpy as np
 from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.strains import cable_axis, on_grid, stress_at
+from ..core.errors import MissingExtra
 from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
 from ..core.types import Array
@@ -85,6 +86,43 @@ class Resultants:
     def t(self) -> Array:
         """Unit vectors along the deformed axis, shape (..., 2, n)."""
         return np.stack([np.cos(self.angle), np.sin(self.angle)], -2)
+
+    def to_dataframe(self) -> Any:
+        """A ``pandas.DataFrame`` with a row for each section, in a motion for each instant too.
+
+        Its columns are the attributes, with ``x``, ``y`` and ``force_x``, ``force_y`` for the
+        components of places and forces.
+
+        Raises
+        ------
+        MissingExtra
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+        >>> state = Scene(beam).clamp("left").point_force((2, 0), at=(1, 0)).solve_static()
+        >>> state.resultants([(0.2, 0), (0.7, 0)]).to_dataframe().N.round(6).tolist()
+        [2.0, 2.0]
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MissingExtra("pandas", "arrays") from None
+        shape, several = self.N.shape, np.ndim(self.s)
+        axis = -1 - several
+        columns = {"s": self.s, "x": self.x[0], "y": self.x[1]} | {
+            name: getattr(self, name) for name in (
+                "N", "Q", "M", "curvature", "stretch", "shear", "angle")} | {
+            f"force_{c}": np.take(self.force, k, axis) for k, c in enumerate("xy")}
+        index = None
+        if len(shape) > several:
+            index = pandas.MultiIndex.from_product(
+                [range(shape[0]), range(np.size(self.s))], names=["instant", "section"])
+        return pandas.DataFrame({name: np.broadcast_to(values, shape).ravel()
+                                 for name, values in columns.items()}, index)
 
     def first(self) -> Resultants:
         """Those of the first section, without the axis n."""

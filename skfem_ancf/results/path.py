@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..beam.layout import WhichBeam
 from ..core.errors import require_index
 from ..core.types import Array
 from ..equations.system import System
+from ..visuals.matplotlib import plot_path
 from .points import MaterialPoints
 from .state import State
 
@@ -133,16 +132,4 @@ class Path(MaterialPoints):
     def _loads(self, kind):
         return np.array([c.load for c in self.critical_points if c.kind == kind])
 
-    def plot(self, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
-             **options: Any) -> Any:
-        """Draw load against a displacement; see :func:`skfem_ancf.visuals.matplotlib.plot_path`.
-
-        Parameters
-        ----------
-        point, component, beam, **options
-            A material point, shape (2,), the component 0 or 1 of its displacement, and its beam;
-            those of that function.
-        """
-        from ..visuals.matplotlib import plot_path
-
-        return plot_path(self, point, component, beam, **options)
+    plot = plot_path

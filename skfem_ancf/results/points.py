@@ -71,6 +71,11 @@ class MaterialPoints(NearMisses):
         """Velocity of material points, (..., 2) or (..., 2, n); zero where there is no motion."""
         return self.system.points.find(point, beam, line).velocity(self.u, self.v)
 
+    def angle(self, body: WhichMember) -> Any:
+        """The angle (...) of a rigid body, in radians, no more than pi from that of the start."""
+        found = require_body(self.system, body)
+        return first_order(found.angle_at(self._places[..., self.system.of(found)]))
+
     def angular_velocity(self, body: WhichMember) -> Any:
         """The angular velocity (...) of a rigid body, counterclockwise; zero without motion."""
         found = require_body(self.system, body)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 from functools import cached_property, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,19 +15,21 @@ from ..actions.obstacles.contact import Contact, contact_of
 from ..beam.beam import Beam
 from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
-from ..beam.points import BeamPoints, require_body
+from ..beam.points import BeamPoints
 from ..beam.rigid import RigidBody
 from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..core.immutable import Immutable
 from ..core.linear import first_order, step
-from ..core.types import Array, Place, StrPath
+from ..core.types import Array, Place
 from ..equations.linearised import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System
+from ..io import tables, vtu
 from ..recovery.fields import Values, find_field
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import Resultants, resultants
 from ..recovery.section_forces import NotRecovered
+from ..visuals import diagrams, html, matplotlib, pyvista
 from .acting import recover, stations
 from .checks import Checks, check
 from .points import MaterialPoints
@@ -273,11 +274,6 @@ class State(Immutable, MaterialPoints):
         return self.load if self.t is None else self.t
 
     # at material points
-
-    def angle(self, body: WhichMember) -> float:
-        """The angle of a rigid body, in radians, no more than pi from that of the start."""
-        found = require_body(self.system, body)
-        return float(first_order(found.angle_at(self._places_of(found))))
 
     def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
@@ -529,38 +525,11 @@ class State(Immutable, MaterialPoints):
     # files and pictures
 
     def _repr_html_(self) -> str:
-        from ..visuals.html import state_html
+        return html.state_html(self)
 
-        return state_html(self)
-
-    def save(self, filename: StrPath, **options: Any) -> Path:
-        """Write the deformed body for ParaView, as :func:`skfem_ancf.io.vtu.save_vtu`; returns the
-        file.
-        """
-        from ..io.vtu import save_vtu
-
-        return save_vtu(self, filename, **options)
-
-    def to_pyvista(self, **options: Any) -> Any:
-        """The body as a grid of pyvista; see :func:`skfem_ancf.visuals.pyvista.to_pyvista`."""
-        from ..visuals.pyvista import to_pyvista
-
-        return to_pyvista(self, **options)
-
-    def view(self, field: Any = "eps_yy", **options: Any) -> Any:
-        """Put the body into a plotter of pyvista; see :func:`skfem_ancf.visuals.pyvista.view`."""
-        from ..visuals.pyvista import view
-
-        return view(self, field, **options)
-
-    def plot_resultants(self, beam: WhichBeam = None, **options: Any) -> Any:
-        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`."""
-        from ..visuals.diagrams import plot_resultants
-
-        return plot_resultants(self, beam, **options)
-
-    def plot(self, field: str = "eps_yy", **options: Any) -> Any:
-        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""
-        from ..visuals.matplotlib import plot_state
-
-        return plot_state(self, field, **options)
+    save = vtu.save_vtu
+    to_xarray = tables.to_xarray
+    to_pyvista = pyvista.to_pyvista
+    view = pyvista.view
+    plot = matplotlib.plot_state
+    plot_resultants = diagrams.plot_resultants

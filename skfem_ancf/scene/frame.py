@@ -224,10 +224,11 @@ class Frame(Scene):
         Parameters
         ----------
         mesh
-            A ``meshio.Mesh``, or the name of a file. Each cell "line", or "line3", "line4", ...,
-            which are curved, is a line. Cell sets and physical groups are names: those of vertices,
-            and point sets, of nodes, those of lines of their ends, and in :meth:`line_load` of the
-            lines. Other kinds of cells are refused.
+            A ``meshio.Mesh``, or the name of a file that meshio reads, or of a drawing in DXF,
+            whose layers are sets. Each cell "line", or "line3", "line4", ..., which are curved, is
+            a line. Cell sets and physical groups are names: those of vertices, and point sets, of
+            nodes, those of lines of their ends, and in :meth:`line_load` of the lines. Other kinds
+            of cells are refused.
         hinges, elements, sections, tol
             As for :meth:`from_lines`.
         height, material, width, section, element, formulation, damping, compiled

@@ -28,7 +28,7 @@ from ..beam.beam import Beam
 from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
-from ..core.errors import InputError, shown
+from ..core.errors import InputError, require_text, shown
 from ..core.near_misses import NearMisses
 from ..core.types import TimeFunction
 from ..materials.damping import Damping
@@ -77,6 +77,7 @@ class Model(NearMisses):
         self._entries: tuple[Entry, ...] = ()
         self._fixed: dict[int, float] = {}
         self._damping: Damping | None = None
+        self._units: tuple[str, str] | None = None
         self._system: Any = None
         self._lock = RLock()
 
@@ -191,6 +192,30 @@ class Model(NearMisses):
         True
         """
         self._put(item)
+        return self
+
+    def units(self, force: str, length: str) -> Self:
+        """Say in which units the numbers of the scene are, for pictures, files and tables.
+
+        No number changes: all units fit together, as N, mm, MPa and tonnes.
+
+        Parameters
+        ----------
+        force, length
+            As "N" and "mm": stresses are then said to be in MPa, in other units in "lbf/in²".
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 500, 1000], height=10), ElementBeamANCF(2),
+        ...                    StVenantKirchhoff(E=2.1e5, nu=0.3), width=10)).units("N", "mm")
+        >>> state = scene.clamp("left").point_force((0, -5), at=(1000, 0)).solve_static()
+        >>> ax = state.plot("S_xx")                                 # $S_{xx}$ (MPa)
+        """
+        for name, value in (("force", force), ("length", length)):
+            if not require_text(name, value):
+                raise InputError(f"{name} must be the name of a unit, got {shown(value)}")
+        self._units = (force, length)
         return self
 
     # items: a new one is one line here
@@ -371,6 +396,6 @@ class Model(NearMisses):
                         which) in changed):
                     raise InputError(f"{item!r} is at facets given by numbers, {place!r}, and "
                                      "cannot be put on another mesh: give names or functions")
-        scene._damping = self._damping
+        scene._damping, scene._units = self._damping, self._units
         scene._put(*added)
         return scene

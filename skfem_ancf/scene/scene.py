@@ -64,7 +64,7 @@ class Scene(Model):
                       ``continuation``: the path through snaps; ``buckling``
     *motion*          ``integrate``, ``initial_velocity``, ``sensor``, ``resume``; ``modes``
     *look*            ``plot``: before it is solved; ``plan``: what a solution will compute;
-                      ``explore``: solved as a slider or an arrow is moved;
+                      ``explore``: solved as a slider or an arrow is moved; ``units``;
                       ``beams``, ``bodies``, ``domains``, ``items``, ``loads``, ``joints``,
                       ``elements``, ``beam`` (by name)
     *change*          ``replace``: the same with other loads, beams, materials
@@ -118,6 +118,7 @@ class Scene(Model):
             if self._system is None:
                 self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
                 self._system.items = self.items
+            self._system.units = self._units
             return self._system
 
     @property

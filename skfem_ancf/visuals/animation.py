@@ -125,9 +125,7 @@ def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) ->
     plain(ax)
     image, artists = paint(ax, scenery, [0], cmap)
     if image is not None:
-        unit = scenery.unit(unit)
-        label = (field.title or field.name) + (f" ({unit})" if unit else "")
-        colour_bar(ax, image, "neither", label)
+        colour_bar(ax, image, "neither", scenery.label(field.title or field.name, unit))
     ax.set_title(scenery.note, loc="left", fontsize=8, color=MUTED)
     clock = ax.set_title(" ", loc="right", fontsize=8, color=INK)
     canvas.draw()

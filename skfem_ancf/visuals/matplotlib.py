@@ -61,7 +61,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     title
         Title of the picture; the name of the field by default, "" for none.
     unit
-        For the colour bar, as "Pa".
+        For the colour bar, as "Pa"; by default that of the scene, see :meth:`Scene.units
+        <skfem_ancf.Scene.units>`.
     subdivide
         Patches along and across each element.
     filename, dpi
@@ -107,7 +108,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note)
     if colorbar and image is not None:
         ends = bool(np.any(values < scenery.low)), bool(np.any(values > scenery.high))
-        colour_bar(ax, image, _EXTEND[ends], scenery.unit(unit))
+        colour_bar(ax, image, _EXTEND[ends], scenery.label(drawn.symbol, unit))
     save(ax, filename, dpi=dpi, bbox_inches="tight")
     return ax
 

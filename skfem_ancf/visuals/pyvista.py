@@ -11,9 +11,10 @@ import numpy as np
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
-                           require_options, require_path, require_text)
+                           require_options, require_path, require_text, shown)
 from ..core.types import StrPath
-from ..recovery.fields import FIELDS, DomainValues, find_fields
+from ..recovery.arrays import COMPONENTS, body_of, facts_of
+from ..recovery.fields import FIELDS, find_fields
 from ..recovery.grids import CELL_TYPES, grids, in_space
 from .animation import pixels
 from .matplotlib import colormap
@@ -29,43 +30,6 @@ def _pyvista():
     except ImportError:
         raise MissingExtra("pyvista", "view") from None
     return pyvista
-
-
-def _normal(field, values):
-    """The component of a tensor normal to the plane, (n,); NaN where the law does not say it."""
-    try:
-        strain, cable = values.elastic, not values.beam.has_sections
-        if field.name == "strain":
-            return values.of_materials(lambda law: 0.5 * (law.thickness_stretch(strain)**2 - 1.0))
-        if field.name == "stress":
-            return values.of_materials(lambda law: (
-                law.nu * values.S[0] * (law.plane == "strain") if cable else
-                law.stress_zz(strain)), not cable)
-        return values.sigma_zz
-    except InputError:
-        return np.full(values.n, np.nan)
-
-
-def _arrays(values, wanted, lenient):
-    """Arrays by the names that they have in VTK."""
-    out = {}
-    for field in wanted:
-        try:
-            value = field.of(values)
-        except InputError:
-            if not lenient and not isinstance(values, DomainValues):
-                raise
-            continue  # a law without a stress normal to the plane
-        name = f"{field.name} ({field.frame} frame)" if field.components > 1 and field.frame else (
-            field.name)
-        if field.components == 2:
-            value = in_space(value)
-        elif field.components == 3:
-            xx, yy, xy = value
-            zero = np.zeros(values.n)
-            value = np.array([xx, yy, _normal(field, values), xy, zero, zero]).T
-        out[name] = np.ascontiguousarray(value)
-    return out
 
 
 class Series:
@@ -105,25 +69,14 @@ class Series:
     def update(self, k: int) -> Any:
         """Put the mesh at instant ``k``, in the arrays that it has; returns the mesh."""
         k = require_index("k", k, len(self))
-        now = to_pyvista(self._history.state(k), **self._options)
-        for block, new in zip(_blocks(self.mesh), _blocks(now)):
-            if isinstance(block, _pyvista().PolyData):  # the outline of an obstacle
-                block.copy_from(new)
-                continue
-            block.points[:] = new.points
-            for name in new.point_data:
-                block.point_data[name][:] = new.point_data[name]
-            block.Modified()
+        to_pyvista(self._history.state(k), **self._options, out=self.mesh)
         self.k = k
         return self.mesh
 
 
-def _blocks(mesh):
-    return list(mesh) if isinstance(mesh, _pyvista().MultiBlock) else [mesh]
-
-
 def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
-               lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Any:
+               lagrange: bool = False, undeformed: bool = False, recover: bool = True,
+               out: Any = None) -> Any:
     """The body of a state as a grid of pyvista.
 
     Parameters
@@ -132,32 +85,76 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
         A :class:`~skfem_ancf.results.State`.
     fields
         Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; all of the table by
-        default. Tensors have VTK's six components xx, yy, zz, xy, yz, xz; the name of a vector
-        or tensor says its frame, as "stress (beam frame)".
+        default. Arrays have the names and components of files.
     subdivide, lagrange, undeformed, recover
         Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+    out
+        What this function has returned for a state of the same scene: it is changed in place, and
+        returned. What shows it needs no more than to be rendered again.
 
     Returns
     -------
     pyvista.UnstructuredGrid, or pyvista.MultiBlock
         Of one beam, or of several and of the outlines of rigid bodies and obstacles by name.
+
+    Raises
+    ------
+    InputError
+        If ``out`` has other members.
     """
     pv, found = _pyvista(), grids(state, subdivide, lagrange, recover)
     wanted = list(FIELDS.values()) if fields is None else find_fields(fields)
-    undeformed = require_flag("undeformed", undeformed)
-    mesh = pv.MultiBlock()
-    for grid in found:
-        cells = np.insert(grid.cells, 0, grid.cells.shape[1], axis=1).ravel()
-        types = np.full(len(grid.cells), CELL_TYPES[grid.kind], np.uint8)
-        block = pv.UnstructuredGrid(cells, types, grid.points(undeformed))
-        if grid.values is not None:
-            block.point_data.update(_arrays(grid.values, wanted, fields is None))
-            block.cell_data["element"] = grid.elements
-        mesh.append(block, name=grid.name)
+    undeformed, facts = require_flag("undeformed", undeformed), facts_of(state)
     box = around(np.concatenate([grid.points(undeformed)[:, :2] for grid in found]).T)
-    for k, wall in enumerate(outlines(state, box)):
-        mesh.append(_lines(wall), name=f"obstacle {k}")
-    return mesh if len(mesh) > 1 else mesh[0]
+    walls = outlines(state, box)
+    names = [grid.name for grid in found] + [f"obstacle {k}" for k in range(len(walls))]
+    blocks = [None] * len(names) if out is None else _blocks_of(out, names)
+    bodies = [_fill(block, grid, body_of(grid, wanted, undeformed, fields is None), facts)
+              for block, grid in zip(blocks, found)]
+    for block, wall in zip(blocks[len(found):], walls):
+        bodies.append(_lines(wall))
+        if block is not None:
+            block.copy_from(bodies[-1])
+    if out is None:
+        out = pv.MultiBlock(dict(zip(names, bodies))) if len(names) > 1 else bodies[0]
+    return out
+
+
+def _blocks_of(mesh, names):
+    """The blocks of a mesh that was made of members with these names."""
+    pv = _pyvista()
+    several = isinstance(mesh, pv.MultiBlock)
+    if not several and not isinstance(mesh, pv.UnstructuredGrid):
+        raise InputError(f"out must be a mesh that to_pyvista returned, got {shown(mesh)}")
+    blocks, known = (list(mesh), list(mesh.keys())) if several else ([mesh], names[:1])
+    if known != names:
+        raise InputError(f"out must be of the same scene: it has {known}, the state {names}")
+    return blocks
+
+
+def _fill(block, grid, body, facts):
+    """A block with what a body is now; a new one for None, or in place."""
+    if block is None or len(block.points) != len(body.points) or not np.array_equal(
+            block.cell_connectivity, body.cells.ravel()):
+        cells = np.insert(body.cells, 0, body.cells.shape[1], axis=1).ravel()
+        types = np.full(len(body.cells), CELL_TYPES[grid.kind], np.uint8)
+        new = _pyvista().UnstructuredGrid(cells, types, body.points)
+        new.cell_data["element"] = grid.elements
+        if block is not None:
+            block.copy_from(new)
+        block = new if block is None else block
+    block.points[:] = body.points
+    for name, values in body.data.items():
+        if name in block.point_data:
+            block.point_data[name][:] = values
+            continue
+        block.point_data[name] = values
+        array = block.GetPointData().GetArray(name)
+        for k, component in enumerate(COMPONENTS.get(array.GetNumberOfComponents(), ())):
+            array.SetComponentName(k, component)
+    block.field_data.update(facts)
+    block.Modified()
+    return block
 
 
 def has_display() -> bool:
@@ -202,7 +199,7 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
     scenery = Scenery([state], field, thickness, undeformed, limits, subdivide, recover)
     if plotter is None:
         plotter = _new_plotter(off_screen if path is None else True, window_size)
-    name, faces, unit = scenery.field.name, scenery.faces, scenery.unit(unit)
+    name, faces = scenery.field.name, scenery.faces
     if undeformed:
         ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
         plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
@@ -211,7 +208,7 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
     plotter.add_mesh(
         mesh, scalars=name, clim=(scenery.low, scenery.high), lighting=False,
         cmap=scenery.colours(cmap), nan_color=RIGID,
-        scalar_bar_args=dict(title=f"{name} ({unit})\n" if unit else f"{name}\n",
+        scalar_bar_args=dict(title=scenery.label(name, unit) + "\n",
                              color="black", vertical=False, title_font_size=18,
                              label_font_size=14, n_labels=5, position_x=0.2, width=0.6,
                              height=0.09, fmt="%.3g"))

@@ -12,7 +12,8 @@ from ..actions.obstacles.outlines import around, outlines
 from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
                            require_positive, require_unmasked, shown)
 from ..core.types import Array
-from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
+from ..recovery.fields import (DRAWN, Field, find_field, unit_of, units_of,
+                               values_on_grid)
 from ..recovery.grids import Grid, grids, in_space
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
@@ -248,10 +249,10 @@ class Scenery:
         return ", ".join(said + [f"displacements {self.scale:g} times as large"] * (
             self.scale != 1.0))
 
-    def unit(self, unit: str | None) -> str:
-        """What the picture says of the unit, if None is given that of the field; "" for numbers."""
-        unit = self.field.unit if unit is None else unit
-        return "" if unit == "1" else unit
+    def label(self, text: str, unit: str | None) -> str:
+        """A text with the unit: if None is given that of the field in the scene; "" for none."""
+        unit = unit_of(self.field, units_of(self._states[0])) if unit is None else unit
+        return text if unit in ("", "1") else f"{text} ({unit})"
 
     def colours(self, cmap: Any) -> Any:
         """The colour map that is given, or for None one that fits the field."""

@@ -1,0 +1,145 @@
+"""Fields and readings of sensors as labelled arrays of xarray, and as text."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.archive import output_file
+from ..core.errors import InputError, MissingExtra, require_path
+from ..core.types import Array, StrPath
+from ..recovery.arrays import body_of
+from ..recovery.fields import find_fields, unit_of, units_of
+from ..recovery.grids import grids
+
+#: The dimension and the labels of the components of vectors and tensors, and their columns in
+#: arrays of VTK.
+PARTS = {2: ("component", ("x", "y"), (0, 1)), 3: ("tensor", ("xx", "yy", "xy"), (0, 1, 3))}
+
+
+def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = None,
+              line: int | None = None, subdivide: tuple[int, int] = (8, 4),
+              recover: bool = True) -> Any:
+    """Fields as an ``xarray.Dataset``, with the names of files, and units where they are known.
+
+    Its dimensions are "point", "component" (x, y) of vectors, "tensor" (xx, yy, xy), and of a
+    History first "time". Coordinates "x" and "y" are the places of the points in the reference
+    configuration, in the body also "member", the name of their beam.
+
+    Parameters
+    ----------
+    solution
+        A State, or a :class:`~skfem_ancf.History` with all its instants.
+    fields
+        Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; those of files by
+        default.
+    at, beam, line
+        Points of the body as for :meth:`State.displacement <skfem_ancf.State.displacement>`, shape
+        (2,) or (2, n); by default points all over it, as many as ``subdivide`` says.
+    subdivide, recover
+        Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+
+    Raises
+    ------
+    MissingExtra
+        If xarray is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    >>> data = state.to_xarray(["displacement", "S_xx"], at=[(0.5, 0), (1, 0)])
+    >>> bool(data.displacement.sel(component="y")[1] == state.displacement((1, 0))[1])
+    True
+    """
+    xarray, wanted = find_xarray(), find_fields(fields)
+    motion = hasattr(solution, "states")
+    states = list(solution) if motion else [solution]
+    if not states:
+        raise InputError("the history has no instants")
+    if at is None:
+        tables = [_of_body(state, wanted, subdivide, recover, fields is None) for state in states]
+    else:
+        found = states[0].system.points.find(at, beam, line, ask=True)
+        x = found.start.reshape(2, -1)
+        place = {"x": ("point", x[0]), "y": ("point", x[1])}
+        tables = [(place, {field.name: _rows(field, state.field(field, found, recover=recover))
+                           for field in wanted}) for state in states]
+    units, arrays, parts = units_of(states[0]), {}, {}
+    for field in wanted:
+        values = np.array([table[field.name] for _, table in tables])
+        dims: tuple[str, ...] = ("point",)
+        if field.components > 1:
+            name, labels, _ = PARTS[field.components]
+            dims, parts[name] = ("point", name), list(labels)
+        arrays[field.name] = (("time", *dims), values, _about(field, units)) if motion else (
+            dims, values[0], _about(field, units))
+    places, length = tables[0][0], {} if units is None else {"units": units[1]}
+    coords = {name: (*entry, length if name in "xy" else {}) for name, entry in places.items()}
+    facts = {} if motion else {"load_factor": states[0].load}
+    return xarray.Dataset(arrays, coords | parts | ({"time": solution.t} if motion else {}), facts)
+
+
+def _of_body(state, wanted, subdivide, recover, lenient):
+    """Coordinates of points all over the body, and fields there by name."""
+    found = grids(state, subdivide, False, recover)
+    bodies = [body_of(grid, wanted, True, lenient, share=False) for grid in found]
+    x = np.concatenate([body.points for body in bodies]).T
+    names = np.repeat([grid.name for grid in found], [len(body.points) for body in bodies])
+    table = {}
+    for field in wanted:
+        values = np.concatenate([body.data[field.name] for body in bodies])
+        table[field.name] = values if field.components == 1 else (
+            values[:, PARTS[field.components][2]])
+    return {"x": ("point", x[0]), "y": ("point", x[1]), "member": ("point", names)}, table
+
+
+def _rows(field, values):
+    """Values at points with the points first, (n,) or (n, components)."""
+    return np.reshape(values, -1) if field.components == 1 else (
+        np.reshape(values, (field.components, -1)).T)
+
+
+def _about(field, units):
+    """Attributes of an array: what it is, and its unit if it is known."""
+    name = re.sub(r"\s*\$[^$]*\$", "", field.title) or field.name
+    unit = "1" if field.unit == "1" else "" if units is None else unit_of(field, units)
+    return {"long_name": name} | ({"units": unit} if unit else {})
+
+
+def find_xarray() -> Any:
+    """The module xarray; raises MissingExtra."""
+    try:
+        import xarray
+    except ImportError:
+        raise MissingExtra("xarray", "arrays") from None
+    return xarray
+
+
+def readings_to_xarray(t: Array, values: Mapping[str, Array]) -> Any:
+    """Arrays (nt, ...) by name as an ``xarray.Dataset`` with the coordinate "time"."""
+    return find_xarray().Dataset(
+        {name: (("time", *(f"{name}_{k}" for k in range(1, x.ndim))), x)
+         for name, x in values.items()}, {"time": t})
+
+
+def readings_to_csv(t: Array, values: Mapping[str, Array], filename: StrPath) -> Path:
+    """Write a column for the time and one for each component of arrays (nt, ...) by name."""
+    path, names, columns = require_path("filename", filename, (".csv",)), ["t"], [t]
+    for name, x in values.items():
+        x = x.reshape(len(t), -1)
+        names += [name] if values[name].ndim == 1 else [f"{name} {k}" for k in range(x.shape[1])]
+        columns.append(x)
+    with output_file(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        writer.writerows(np.column_stack(columns).tolist())
+    return path

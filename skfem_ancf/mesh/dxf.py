@@ -1,0 +1,59 @@
+"""Lines of a drawing in DXF as a mesh of meshio."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import FileError, MeshError, MissingExtra
+
+#: What is no straight line, and would be missing.
+CURVES = ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
+
+
+def mesh_of_dxf(path: Path) -> Any:
+    """The lines of the model space, and points, as sets with the names of their layers.
+
+    Polylines are taken apart. Texts, dimensions and hatches are left out.
+
+    Raises
+    ------
+    MissingExtra
+        If ezdxf is not installed.
+    FileError, MeshError
+        If the file cannot be read, or has curves or blocks.
+    """
+    import meshio
+
+    try:
+        import ezdxf
+    except ImportError:
+        raise MissingExtra("ezdxf", "dxf") from None
+    try:
+        entities = list(ezdxf.readfile(path).modelspace())
+    except (OSError, ezdxf.DXFError) as error:
+        raise FileError(f"{path} cannot be read as a drawing: {error}") from error
+    places: list[Any] = []  # two of each line, then one of each point
+    lines, points = list[str](), list[tuple[str, Any]]()
+    for entity in entities:
+        whole = entity.dxftype() in ("LWPOLYLINE", "POLYLINE")
+        for part in entity.virtual_entities() if whole else [entity]:
+            kind = part.dxftype()
+            if kind == "LINE":
+                places += [part.dxf.start.xyz, part.dxf.end.xyz]
+                lines.append(entity.dxf.layer)
+            elif kind == "POINT":
+                points.append((entity.dxf.layer, part.dxf.location.xyz))
+            elif kind in CURVES:
+                raise MeshError(f"{path} has a {kind} in the layer {entity.dxf.layer!r}, which is "
+                                "no straight line: explode blocks, and draw curves as polylines")
+    if not lines:
+        raise MeshError(f"{path} has no lines and no polylines in its model space")
+    at, number = np.unique(places + [x for _, x in points], axis=0, return_inverse=True)
+    ends, alone = np.split(number.ravel(), [2 * len(lines)])
+    layers, of = np.array(lines), np.array([name for name, _ in points])
+    return meshio.Mesh(at, [("line", ends.reshape(-1, 2)), ("vertex", alone[:, None])], cell_sets={
+        name: [np.flatnonzero(layers == name), np.flatnonzero(of == name)]
+        for name in dict.fromkeys([*lines, *of.tolist()])})
