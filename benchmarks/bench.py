@@ -15,13 +15,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
 from tqdm import tqdm
-from work_precision import figures, frames, large, micro, runs, sweeps
+from work_precision import figures, frames, large, micro, runs, steps, sweeps
 from work_precision.cases import CASES, runs_of, warm_up
 from work_precision.problems import PROBLEMS
 from work_precision.references import reference
 from work_precision.report import OURS, goals, report
 
-OPERATIONS = ("tangent", "iteration", "scaling", "frames", "large", "sweep")
+OPERATIONS = ("tangent", "iteration", "steps", "scaling", "frames", "large", "sweep")
 SIZES = {False: dict(tangent=(16, 256, 4096), scaling=(16, 64, 256, 1024, 4096, 16384, 100000),
                      frames=(14, 30, 100), large=(14, 30, 65, 100, 204), sweep=(500,)),
          True: dict(tangent=(16,), scaling=(16, 64), frames=(2,), large=(2, 3), sweep=(5,))}
@@ -77,7 +77,8 @@ def run(out, names, quick):
     sizes = SIZES[quick]
     total = (sum((2 + PASSES) * len(runs_of(name, quick)) for name in cases)
              + sum({"tangent": len(sizes["tangent"]), "iteration": 2,
-                    "scaling": 3 * len(sizes["scaling"]), "frames": len(sizes["frames"]),
+                    "steps": len(steps.KINDS), "scaling": 3 * len(sizes["scaling"]),
+                    "frames": len(sizes["frames"]),
                     "large": len(sizes["large"]), "sweep": len(sizes["sweep"])}[name]
                    for name in names if name in OPERATIONS))
     with tqdm(total=total, unit="run", dynamic_ncols=True) as bar, runs.Memory(quick) as memory:
@@ -96,6 +97,8 @@ def run(out, names, quick):
                 rows = micro.tangents(sizes["tangent"], about, watch)
             elif name == "iteration":
                 rows = micro.iteration(about, watch)
+            elif name == "steps":
+                rows = steps.measure(about, watch)
             elif name == "frames":
                 rows = frames.measure(sizes["frames"], about, watch, memory)
             elif name == "large":

@@ -136,6 +136,12 @@ def iteration(results):
     return table(["what", "ms"], [(r["variant"], ms(r["seconds"])) for r in results["iteration"]])
 
 
+def steps(results):
+    return table(["what", "elements", "steps", "error", "ms a step"], [
+        (r["variant"], r["elements"], r["steps"], f"{r['error']:.0e}", ms(r["seconds"]))
+        for r in results["steps"]])
+
+
 def frames(results):
     return table(["cells", "code", "elements", "error", "ms", "MB"], [
         (f"{r['cells']} x {r['cells']}", r["code"], r["variant"], f"{r['error']:.0e}",
@@ -176,7 +182,8 @@ def about(results):
 #: The lines of each table, by the case that it needs; "about" and "others" take all of them.
 TABLES = {"about": about, "5.2": duel("5.2", EXUDYN), "pendulum": duel("pendulum", EXUDYN),
           "thick": duel("thick", Q2), "others": others, "sweep": sweep, "tangent": tangent,
-          "iteration": iteration, "frames": frames, "large": large_frames, "scaling": scaling}
+          "iteration": iteration, "steps": steps, "frames": frames, "large": large_frames,
+          "scaling": scaling}
 
 
 def renewed(text, results):

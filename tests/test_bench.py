@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 bench = pytest.importorskip("bench")
 
 
-@pytest.mark.parametrize("case", ["5.1", "tangent"])
+@pytest.mark.parametrize("case", ["5.1", "tangent", "steps"])
 def test_quick_case_writes_rows_picture_and_report(case, tmp_path, monkeypatch):
     monkeypatch.setattr(bench.runs, "single_core", lambda: None)  # leave the other tests a core
     bench.run(tmp_path, [case], quick=True)
@@ -24,6 +24,8 @@ def test_quick_case_writes_rows_picture_and_report(case, tmp_path, monkeypatch):
     if case == "5.1":
         assert all(float(r["whole_seconds"]) > 0 for r in ours)
         assert sum(r["cold_seconds"] != "" for r in ours) == 1
+    if case == "steps":
+        assert max(float(r["error"]) for r in ours) < 0.05
     if case == "5.1":
         assert min(float(r["error"]) for r in ours if r["error"]) < 1e-4
     assert case in (tmp_path / "report.md").read_text(encoding="utf-8").lower()

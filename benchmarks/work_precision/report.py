@@ -212,6 +212,16 @@ def goal_iteration(results):
             *table(["what", "ms"], [(r["variant"], f"{1e3 * r['seconds']:.3g}") for r in rows])]
 
 
+def steps(results):
+    """Lines for a step of each kind."""
+    if "steps" not in results:
+        return []
+    return ["**A step of each kind**, in a whole run.", "", *table(
+        ["what", "elements", "steps", "error", "ms a step"],
+        [(r["variant"], r["elements"], r["steps"], f"{r['error']:.1e}", f"{1e3 * r['seconds']:.3g}")
+         for r in results["steps"]])]
+
+
 def scaling(rows):
     """Lines about size."""
     lines = []
@@ -308,7 +318,8 @@ def report(results, about, loading, quick):
                   "missing.**", ""]
     lines += ["## Goals", "",
               *(line for goal in GOALS for line in goal_against(results, goal)),
-              *goal_tangent(results), *goal_iteration(results), *sweep(results)]
+              *goal_tangent(results), *goal_iteration(results), *steps(results),
+              *sweep(results)]
     others = [name for name in ("5.2-1e3", "5.2-1e4", "5.1", "roll-up")
               if name in results and any(r["code"] == EXUDYN for r in results[name])]
     if others:
