@@ -34,8 +34,8 @@ COMPILING = {"StrainTables": 24.0, "elements": 3.0, "contacts": 12.0,
 WHERE_USED = {"collocate": 25.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
-#: Seconds that NumPy takes for an iteration, about, and what each element adds to them.
-ITERATION, ELEMENT = 1e-3, 1.2e-5
+#: Seconds that NumPy takes for an iteration, about, and what an element and a point of contact add.
+ITERATION, ELEMENT, POINT = 1e-3, 1.2e-5, 4e-6
 #: How many tasks of one size code that is kept on disk is assumed to serve.
 SERVES = 5
 
@@ -53,11 +53,11 @@ _IS_LOADED = Choice("loaded", "compiled code is loaded")
 class Backend:
     """Runs the kernels of a system.
 
-    The size of the task decides, which is known before it starts: the iterations that are expected,
-    see :func:`~skfem_ancf.core.switch.expecting`, and the number of elements. What is compiled
-    already in this process is used at once. What lies on disk is loaded for a task for which NumPy
-    would take longer than loading takes. What has to be compiled first is compiled, and kept on
-    disk, for a task that pays for it in :data:`SERVES` runs.
+    The size of the task decides, which is known before it starts: the iterations that are expected
+    (:func:`~skfem_ancf.core.switch.expecting`), the elements, and the points of contact. What is
+    compiled already in this process is used at once. What lies on disk is loaded for a task for
+    which NumPy would take longer than loading takes. What has to be compiled first is compiled, and
+    kept on disk, for a task that pays for it in :data:`SERVES` runs.
 
     Parameters
     ----------
@@ -161,8 +161,10 @@ class Backend:
         iterations
             Their number.
         """
-        beams = self.tables.system.beams
-        return iterations * (ITERATION + ELEMENT * sum(beam.mesh.nelements for beam in beams))
+        system = self.tables.system
+        elements = sum(beam.mesh.nelements for beam in system.beams)
+        points = sum(len(group.first) for _, group in system.forces.contacts.groups)
+        return iterations * (ITERATION + ELEMENT * elements + POINT * points)
 
     def workspace(self, make: Callable, *sizes: int) -> Any:
         """Work arrays of a kernel, made once.
