@@ -25,7 +25,8 @@ LARGER = {
 LARGER.update(dict.fromkeys((
     "actions/obstacles/obstacle.py::Obstacle.__init__", "scene/frame.py::Frame.from_lines",
     "scene/frame.py::Frame.from_meshio", "scene/scene.py::Scene.continuation",
-    "scene/scene.py::Scene.integrate", "scene/scene.py::Scene.solve_static"),
+    "dynamics/history.py::History.plot", "scene/scene.py::Scene.integrate",
+    "scene/scene.py::Scene.solve_static"),
     "options of a user, each with a default, by keyword"))
 
 #: Lines of code of a file, and public names of a class.

@@ -22,6 +22,7 @@ from ..recovery.resultants import Resultants, over_time
 from ..results.points import MaterialPoints
 from ..results.state import Reaction, State
 from ..visuals.animation import animate
+from ..visuals.pyvista import Series
 from .base import Motion, Scheme
 from .sensors import Readings
 
@@ -280,18 +281,26 @@ class History(MaterialPoints):
 
         return history_html(self)
 
-    def to_pyvista(self, **options: Any) -> Any:
+    def to_pyvista(self, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
+                   lagrange: bool = False, undeformed: bool = False,
+                   recover: bool = True) -> Series:
         """One mesh of pyvista that takes every instant, in place.
 
-        A :class:`skfem_ancf.visuals.pyvista.Series`: its ``mesh`` is at the first instant,
-        ``update(k)`` puts it at another. Options are those of
-        :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
+        Its ``mesh`` is at the first instant, ``update(k)`` puts it at another.
+
+        Parameters
+        ----------
+        fields, subdivide, lagrange, undeformed, recover
+            As for :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
         """
-        from ..visuals.pyvista import Series
+        return Series(self, fields, subdivide, lagrange, undeformed, recover)
 
-        return Series(self, **options)
-
-    def plot(self, field: Any = "eps_yy", times: ArrayLike | None = None, **options: Any) -> Any:
+    def plot(self, field: Any = "eps_yy", times: ArrayLike | None = None, ax: Any = None, *,
+             thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
+             cmap: Any = None, limits: tuple[float, float] | None = None, title: str | None = None,
+             unit: str | None = None, subdivide: tuple[int, int] = (16, 8),
+             filename: StrPath | None = None, dpi: float = 200, recover: bool = True,
+             scale: float | str = 1.0, loads: bool = False, supports: bool = False) -> Any:
         """Draw the body at several times in one picture, as a stroboscope shows it.
 
         Parameters
@@ -301,8 +310,10 @@ class History(MaterialPoints):
         times
             Of each the stored instant that is nearest is drawn, shape (n,); by default eight, from
             first to last.
-        **options
-            Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+        ax, thickness, undeformed, colorbar, cmap, limits, title, unit
+            As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+        subdivide, filename, dpi, recover, scale, loads, supports
+            As there.
 
         Returns
         -------
@@ -329,9 +340,14 @@ class History(MaterialPoints):
             raise InputError(f"times must be instants of the motion, from {first:g} to {last:g}, "
                              f"at least one; got {shown(times)}")
         instants = np.unique(np.argmin(np.abs(self.t - wanted[:, None]), axis=1))
-        return plot_state(list(self.states(instants)), field, **options)
+        return plot_state(list(self.states(instants)), field, ax, thickness=thickness,
+                          undeformed=undeformed, colorbar=colorbar, cmap=cmap, limits=limits,
+                          title=title, unit=unit, subdivide=subdivide, filename=filename, dpi=dpi,
+                          recover=recover, scale=scale, loads=loads, supports=supports)
 
-    def plot_curve(self, x: Any, y: Any, **options: Any) -> Any:
+    def plot_curve(self, x: Any, y: Any, ax: Any = None, *, xlabel: str | None = None,
+                   ylabel: str | None = None, title: str | None = None,
+                   filename: StrPath | None = None, dpi: float = 200, **line: Any) -> Any:
         """Draw one quantity against another, as a force over a displacement.
 
         Parameters
@@ -339,9 +355,12 @@ class History(MaterialPoints):
         x, y
             "t"; the name of a sensor with one number at each instant; a pair of the name and the
             component of one with more, as ("tip", 1); or an array (nt,).
-        **options
-            ``ax``, ``xlabel``, ``ylabel``, ``title``, ``filename``, ``dpi``; others go to
-            matplotlib's ``Axes.plot``.
+        ax, title, filename, dpi
+            As for :meth:`plot`.
+        xlabel, ylabel
+            Labels of the axes; the names of sensors by default.
+        **line
+            Of matplotlib's ``Axes.plot``, as ``color=`` and ``label=``.
 
         Returns
         -------
@@ -360,7 +379,9 @@ class History(MaterialPoints):
         from ..visuals.matplotlib import plot_curve
 
         (x, one), (y, two) = (self._curve(name, z) for name, z in (("x", x), ("y", y)))
-        return plot_curve(x, y, **{"xlabel": one, "ylabel": two, **options})
+        return plot_curve(x, y, ax, xlabel=one if xlabel is None else xlabel,
+                          ylabel=two if ylabel is None else ylabel, title=title,
+                          filename=filename, dpi=dpi, **line)
 
     def _curve(self, name, of):
         """Numbers at all instants, and what to call them."""
@@ -381,7 +402,10 @@ class History(MaterialPoints):
     animate = animate
     to_xarray = to_xarray
 
-    def save(self, filename: StrPath, progress: bool | None = None, **options: Any) -> None:
+    def save(self, filename: StrPath, progress: bool | None = None, *,
+             subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
+             undeformed: bool = False, recover: bool = True, fields: Any = None,
+             precision: str = "double", encoding: str | None = None) -> None:
         """Write a time series for ParaView.
 
         Parameters
@@ -391,15 +415,17 @@ class History(MaterialPoints):
             with all of them, in which the cells are stored once.
         progress
             Show a progress bar: True, False, or None for "if it takes long".
-        **options
-            Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+        subdivide, lagrange, undeformed, recover, fields, precision, encoding
+            As for :func:`skfem_ancf.io.save_vtu`.
         """
         from ..io.pvd import PvdWriter
         from ..io.vtkhdf import VtkHdfWriter
         from ..core.progress import progress_bar
 
         path = require_path("filename", filename, (".pvd", ".vtkhdf"))
-        kind = VtkHdfWriter if path.suffix.lower() == ".vtkhdf" else PvdWriter
-        with kind(path, **options) as writer, progress_bar(
+        look = subdivide, lagrange, undeformed, recover, fields, precision
+        made = VtkHdfWriter(path, *look) if path.suffix.lower() == ".vtkhdf" else PvdWriter(
+            path, *look, encoding)
+        with made as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
             writer.extend(self, lambda: bar.update(1))

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 from ..actions.obstacles.outlines import obstacles_of
 from ..core.archive import output_file
-from ..core.errors import require_options, require_path, require_text
+from ..core.errors import require_path, require_text
 from ..core.types import StrPath
 from ..recovery.fields import find_fields
 from .vtu import SeriesWriter, require_next, save_vtu
@@ -28,8 +28,8 @@ class PvdWriter(SeriesWriter):
     filename
         Path that ends with .pvd. Missing folders are made; an older file is replaced by the first
         frame.
-    **options
-        Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
+    subdivide, lagrange, undeformed, recover, fields, precision, encoding
+        As for :func:`~skfem_ancf.io.vtu.save_vtu`.
 
     Examples
     --------
@@ -47,14 +47,16 @@ class PvdWriter(SeriesWriter):
     load_00001.vtu
     """
 
-    def __init__(self, filename: StrPath, **options: Any) -> None:
+    def __init__(self, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
+                 lagrange: bool = False, undeformed: bool = False, recover: bool = True,
+                 fields: Any = None, precision: str = "double",
+                 encoding: str | None = None) -> None:
         self.path = require_path("filename", filename, (".pvd",))
         require_text("filename", self.path.name)  # names of frames are written in Unicode
-        self.options = require_options("PvdWriter", options,
-                                       ("subdivide", "lagrange", "undeformed", "recover",
-                                        "fields", "precision", "encoding"))
-        if "fields" in self.options:
-            find_fields(self.options["fields"])
+        self.options: dict[str, Any] = dict(
+            subdivide=subdivide, lagrange=lagrange, undeformed=undeformed, recover=recover,
+            fields=fields, precision=precision, encoding=encoding)
+        find_fields(fields)
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
 
     def __exit__(self, *_):

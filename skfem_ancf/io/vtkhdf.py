@@ -11,7 +11,7 @@ import numpy as np
 
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import find_h5py, new_file, put_in_place
-from ..core.errors import FileError, InputError, require_option, require_options, require_path
+from ..core.errors import FileError, InputError, require_option, require_path
 from ..core.types import StrPath
 from ..recovery.fields import find_fields
 from ..recovery.grids import CELL_TYPES
@@ -31,8 +31,8 @@ class VtkHdfWriter(SeriesWriter):
     ----------
     filename
         Path that ends with .vtkhdf. Missing folders are made.
-    **options
-        Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
+    subdivide, lagrange, undeformed, recover, fields, precision
+        As for :func:`~skfem_ancf.io.vtu.save_vtu`.
 
     Raises
     ------
@@ -46,13 +46,15 @@ class VtkHdfWriter(SeriesWriter):
     VTK file formats, "VTKHDF", version 2: temporal UnstructuredGrid.
     """
 
-    def __init__(self, filename: StrPath, **options: Any) -> None:
+    def __init__(self, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
+                 lagrange: bool = False, undeformed: bool = False, recover: bool = True,
+                 fields: Any = None, precision: str = "double") -> None:
         self.path = require_path("filename", filename, (".vtkhdf",))
-        known = ("subdivide", "lagrange", "undeformed", "recover", "fields", "precision")
-        self.options = require_options("VtkHdfWriter", options, known)
-        precision = self.options.pop("precision", "double")
+        self.options: dict[str, Any] = dict(
+            subdivide=subdivide, lagrange=lagrange, undeformed=undeformed, recover=recover,
+            fields=fields)
         self._dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
-        find_fields(self.options.get("fields"))
+        find_fields(fields)
         files = find_h5py()
         self._made: list[Path] = []
         try:

@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
-                           require_options, require_path, require_text, shown)
+                           require_path, require_text, shown)
 from ..core.types import StrPath
 from ..recovery.arrays import COMPONENTS, body_of, facts_of
 from ..recovery.fields import FIELDS, find_fields
@@ -39,8 +39,8 @@ class Series:
     ----------
     history
         A :class:`~skfem_ancf.dynamics.history.History`.
-    **options
-        Those of :func:`to_pyvista`.
+    fields, subdivide, lagrange, undeformed, recover
+        As for :func:`to_pyvista`.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Series:
         The instant that the mesh shows.
     """
 
-    def __init__(self, history: Any, **options: Any) -> None:
-        self._options = require_options("to_pyvista", options, (
-            "fields", "subdivide", "lagrange", "undeformed", "recover"))
+    def __init__(self, history: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
+                 lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> None:
+        self._options = fields, subdivide, lagrange, undeformed, recover
         self._history, self.t, self.k = history, history.t, 0
         if not len(history):
             raise InputError("the history has no instants")
-        self.mesh = to_pyvista(history.state(0), **options)
+        self.mesh = to_pyvista(history.state(0), *self._options)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -69,7 +69,7 @@ class Series:
     def update(self, k: int) -> Any:
         """Put the mesh at instant ``k``, in the arrays that it has; returns the mesh."""
         k = require_index("k", k, len(self))
-        to_pyvista(self._history.state(k), **self._options, out=self.mesh)
+        to_pyvista(self._history.state(k), *self._options, out=self.mesh)
         self.k = k
         return self.mesh
 
