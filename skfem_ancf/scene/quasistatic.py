@@ -24,7 +24,7 @@ from ..results.arguments import displacement
 from ..results.state import State
 from ..solvers.newton import Steps as Rules
 from ..solvers.outcome import StaticResult, StepFailed
-from ..solvers.quasistatic import JUMPED, Instant, follow
+from ..solvers.quasistatic import JUMPED, Instant, first, follow
 
 logger = logging.getLogger(__name__)
 
@@ -103,22 +103,18 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
                   require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
                   require_positive("min_step", min_step))
     require_flag("stable", stable)
-    t_start, begin, turns = 0.0, None, Turns(system)
-    if start is not None:
-        t_start = float(start.t or 0.0)
-        begin = Instant(t_start, StaticResult(
-            displacement(system, start), start.multipliers, 1.0, np.zeros(system.N), [], True,
-            "given", memory=system.forces.contacts.of_state(start),
-            rubbed=0.0 if start._motion is None else start._motion.dissipated), "given")
+    t_start = 0.0 if start is None else float(start.t or 0.0)
+    u = None if start is None else displacement(system, start)
     if not len(ends) or ends[-1] <= t_start:
         raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "
                          f"after the start at t = {t_start:g}")
-    made = _Record(system, steps if isinstance(steps, Steps) else None, sensors, turns)
+    made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     count = increments * len(ends)
     try:
         with (system.forces.contacts.lent(), expecting(ITERATIONS * count),
               progress_bar(progress, total=ends[-1] - t_start, desc="time") as bar):
-            for instant in follow(system, ends, increments, begin, t_start, rules, stable):
+            begin = _begin(system, t_start, start, u, rules, stable)
+            for instant in follow(system, ends, increments, begin, rules, stable):
                 bar.update(instant.t - made.t)
                 made.add(instant)
     except (StepFailed, ConvergenceError) as failure:
@@ -132,12 +128,28 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     return made.history()
 
 
+def _begin(system, t, start, u, rules, stable):
+    """The instant to begin with: that given, if it is one of a run of the scene, or found from it.
+    """
+    memory = system.forces.contacts.of_state(start)
+    motion = None if start is None else start._motion
+    if motion is None or start.system is not system or not isinstance(
+            start._origin[0], QuasiStatic):
+        begin = first(system, t, u, memory, rules, stable)
+    else:
+        begin = Instant(t, StaticResult(u, start.multipliers, 1.0, np.zeros(system.N), [], True,
+                                        "given", memory=memory), "given")
+    begin.result.rubbed = 0.0 if motion is None else motion.dissipated
+    return begin
+
+
 class _Record:
     """What has been found so far."""
 
     def __init__(self, system: System, plan: Steps | None,
-                 sensors: Sequence[tuple[str, Sensor]], turns: Turns) -> None:
-        self.system, self.plan, self.scheme, self._turns = system, plan, QuasiStatic(), turns
+                 sensors: Sequence[tuple[str, Sensor]]) -> None:
+        self.system, self.plan, self.scheme = system, plan, QuasiStatic()
+        self._turns = Turns(system)
         self._instants: list[Instant] = []
         self._motions: list[Motion] = []
         self._recorder = Recorder(sensors, system, lambda y: state_of(system, self.scheme, y))

@@ -627,7 +627,9 @@ class Scene(Model):
             Increments of each step at least, if none is cut; each is an instant of the history.
         start
             A State to begin with, or None for the equilibrium at the time 0. An instant of a
-            history goes on from its time, other states from 0.
+            history goes on from its time, other states from 0. It may be one of a scene of the
+            same beams with other supports, joints and loads, as of the phase of an assembly
+            before: what held it and is not there any more lets go in load steps.
         tol, max_iterations, stable, progress
             As for :meth:`solve_static`.
         min_step

@@ -49,9 +49,21 @@ class Instant(NamedTuple):
     rate: float | None = None
 
 
-def follow(system: System, ends: Array, increments: int, begin: Instant | None, t_start: float,
-           rules: Rules, stable: bool) -> Iterator[Instant]:
-    """Equilibria from the start on, one after the other.
+def first(system: System, t: float, u: Array | None, memory: Array | None, rules: Rules,
+          stable: bool) -> Instant:
+    """The equilibrium at a time, from a displacement (N,) that need be none, or from rest.
+
+    From a displacement what is missing to equilibrium, as the force of a support that is no longer
+    there, is reduced to nothing. ``memory`` is what is left behind there at obstacles.
+    """
+    with system.stopped_at(t):
+        result = Search(system, u, memory, rules, stable, False).find()
+    return Instant(t, result, result.attempts[-1].strategy)
+
+
+def follow(system: System, ends: Array, increments: int, begin: Instant, rules: Rules,
+           stable: bool) -> Iterator[Instant]:
+    """Equilibria from the one given on, one after the other.
 
     Each is looked for from the one before, by the mixed iteration and by Newton's method. An
     increment that fails is cut, and one that moves the scene far: several equilibria may be near.
@@ -67,8 +79,8 @@ def follow(system: System, ends: Array, increments: int, begin: Instant | None, 
         Times at which an increment has to end, ascending.
     increments
         Increments from one end to the next at least.
-    begin, t_start
-        An equilibrium to begin with, or None for the reference configuration, and its time.
+    begin
+        The equilibrium to begin with.
     rules, stable
         Of each increment, as for :func:`~skfem_ancf.solvers.newton.solve_static`.
 
@@ -77,10 +89,6 @@ def follow(system: System, ends: Array, increments: int, begin: Instant | None, 
     StepFailed, ConvergenceError
         If an equilibrium is not found; what was found before has been given.
     """
-    if begin is None:
-        with system.stopped_at(t_start):
-            result = Search(system, None, None, rules, stable, False).find()
-        begin = Instant(t_start, result, result.attempts[-1].strategy)
     yield begin
     jumps = 0
     for end in ends[ends > begin.t]:
