@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_bvp
 
 from skfem_ancf import (Beam, Circle, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, MeshBeam, NameUnknown, Ramp, Scene, Section,
-                        StepHistory, Steps, StVenantKirchhoff, SupportError)
+                        ElementBeamCable, InputError, Line, MeshBeam, NameUnknown, Ramp, Scene,
+                        Section, StepHistory, Steps, StVenantKirchhoff, SupportError)
 
 SOFT = StVenantKirchhoff(2e8, 0.3, 7800)
 
@@ -208,6 +209,83 @@ def test_a_strip_is_bent_around_a_drum_drawn_over_it_and_springs_back():
     # Eytelwein; the strip leaves the drum at the angle at which it hangs, but for its bending
     angle = -history.state(drawn).resultants("right").angle
     assert np.isclose(force[drawn] / pull, np.exp(0.2 * angle), rtol=0.03)
+
+
+# phases of an assembly
+
+
+def elastica_bow(string, places):
+    """Draw forces over EI / L^2 and energies over EI / L of a bow, by shooting.
+
+    Both halves are an inextensible elastica of length 1 and a straight ``string``, whose lower end,
+    the nock, is at a place (n,): theta'' = -T sin(theta + beta), with the angles theta of the limb
+    and beta of the string, and the tension T.
+    """
+    s, out = np.linspace(0, 1, 41), []
+    y, p = np.array([0.4 * np.sin(np.pi * s / 2), 0.6 * np.cos(np.pi * s / 2), 0.25 * s**2,
+                     s - 0.04 * s**2]), np.array([2.6, 0.0])
+    for x in places:
+        result = solve_bvp(
+            lambda s, y, p: [y[1], -p[0] * np.sin(y[0] + p[1]), np.sin(y[0]), np.cos(y[0])],
+            lambda a, b, p: np.array([a[0], a[2], a[3], b[1], b[2] + string * np.sin(p[1]) - x,
+                                      b[3] - string * np.cos(p[1])]), s, y, p, tol=1e-6)
+        assert result.success
+        s, y, p = result.x, result.y, result.p
+        out.append((2 * p[0] * np.sin(p[1]), np.trapezoid(y[1]**2, s)))
+    return np.array(out).T
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=repr)
+def test_a_bow_is_bent_strung_and_drawn(element):
+    """Three phases, each from the equilibrium of the one before: half of a bow and its string."""
+    length, string, height, E, width = 0.8, 0.77, 0.01, 1e10, 0.03
+    limb = Beam(MeshBeam.init_line(np.linspace(0, length, 9), height, angle=np.pi / 2), element,
+                StVenantKirchhoff(E, 0.0), width=width, name="limb")
+    cord = Beam(MeshBeam.init_line([0, string], 2e-3, origin=(0.16, 0), angle=np.pi / 2),
+                ElementBeamCable(), StVenantKirchhoff(1e13, 0.0), width=2e-3, name="cord")
+    steps = Steps(bend=1.0, draw=1.0)
+    tip, end = (0.0, length), (0.16, string)
+    bending = Scene(limb, cord).clamp("left", "limb").clamp("left", "cord")
+    bending.joint("position", at=tip, beam="limb", r=steps.ramp(tip, bend=end))
+    bent = bending.run(1.0, increments=8)
+    strung = Scene(limb, cord).clamp("left", "limb").fix("left", "r^2", beam="cord")
+    strung.hinge(("limb", tip), ("cord", end))
+    strung.point_force((25.0, 0), at="left", beam="cord", amplitude=steps.ramp(draw=1.0))
+    history = strung.run(steps, increments=8, start=bent.state(-1))
+    assert history.t[0] == 1.0 and not len(history.jumps)
+    nock, force = history.position((0.16, 0.0), beam="cord")[:, 0], 50.0 * (history.t - 1.0)
+    EI = E * width * height**3 / 12
+    exact, energy = elastica_bow(string / length, nock / length)
+    assert np.allclose(force, exact * EI / length**2, atol=1e-3 * force.max())
+    energy *= EI / length
+    assert np.allclose(2 * history.strain_energy, energy, atol=1e-3 * energy.max())
+    assert nock[0] > 0.19 and nock[-1] > 0.6
+
+
+def test_a_phase_remembers_friction_and_what_lets_go_slips_as_it_would():
+    """A slab on a floor is pulled until it slips: by one scene, and by two of which the second has
+    another load in place of the first at the moment of the change.
+    """
+    slab = Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamCable(),
+                StVenantKirchhoff(2e8, 0.0, 1000), width=0.1)
+    weight, friction = 1000 * 0.1 * 0.1 * 9.81, 0.3
+
+    def lying():
+        return Scene(slab).gravity((0, -9.81)).obstacle(Line((0, -0.05)), friction=friction).spring(
+            2e3, between=((0, 0), (-1.0, 0)), length=1.0)
+
+    pull = Ramp([0.0, 1.0, 2.0], [0.0, 2.0 * friction * weight, 0.0])
+    one = lying().point_force((1, 0), at="right", amplitude=pull).run([1.0, 2.0], increments=10)
+    first = lying().point_force((1, 0), at="right", amplitude=pull).run(1.0, increments=10)
+    second = lying().point_force((1, 0), at=(0.5, 0), amplitude=pull)
+    again = second.run([2.0], increments=10, start=first.state(-1))
+    middle = (0.5, 0.0)
+    pulled = one.displacement(middle)[:, 0]
+    moved, last = pulled[one.t == 1.0][0], pulled[-1]
+    assert np.isclose(moved, friction * weight / 2e3, rtol=0.01) and last > 0.9 * moved
+    assert np.isclose(again.displacement(middle)[-1, 0], last, rtol=0.01)
+    assert again.dissipated[0] == first.dissipated[-1] > 0.0
+    assert np.isclose(again.dissipated[-1], one.dissipated[-1], rtol=0.02)
 
 
 # what goes wrong

@@ -35,7 +35,9 @@ STROBES = 8
 
 def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> State:
     """A Motion as a State, with what the run goes on with from there, or None."""
-    inertia = system.mass.multiply(y.acceleration)
+    inertia = np.zeros(system.N)
+    if np.any(y.acceleration):  # a quasi-static run needs no density
+        inertia = system.mass.multiply(y.acceleration)
     if system.damped:
         with system.forces.contacts.lent(y.contacts):
             inertia = inertia + system.damping_force(y.u, y.v, y.t)
@@ -248,6 +250,8 @@ class History(MaterialPoints):
     @cached_property
     def kinetic_energy(self) -> Array:
         """Kinetic energy, shape (nt,)."""
+        if not np.any(self.v):
+            return np.zeros(len(self))
         return np.array([0.5 * v @ self.system.mass.multiply(v) for v in self.v])
 
     @cached_property
