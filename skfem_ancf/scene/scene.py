@@ -628,8 +628,8 @@ class Scene(Model):
         start
             A State to begin with, or None for the equilibrium at the time 0. An instant of a
             history goes on from its time, other states from 0. It may be one of a scene of the
-            same beams with other supports, joints and loads, as of the phase of an assembly
-            before: what held it and is not there any more lets go in load steps.
+            same beams with other supports, joints and loads, as the phase before in an assembly.
+            Forces of supports and joints that are no longer there are reduced in load steps.
         tol, max_iterations, stable, progress
             As for :meth:`solve_static`.
         min_step
