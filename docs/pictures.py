@@ -14,6 +14,11 @@ from skfem_ancf.actions.obstacles import Circle, Line
 
 DOCS = Path(__file__).resolve().parent
 DEMOS = DOCS.parent / "demos"
+#: Demos in the picture of the start page.
+STARTS = {"compliant_gripper": "a soft gripper closes",
+          "hanging_bridge": "a bridge swings in gusts", "soft_finger": "a finger is pumped up",
+          "frame": "a frame is pushed sideways", "column": "a strip buckles",
+          "rollup": "a beam is bent to a circle"}
 
 
 def cantilever(elements):
@@ -72,6 +77,26 @@ def portal(filename):
     figure.savefig(filename, dpi=110, bbox_inches="tight")
 
 
+def start(filename):
+    """Six demos at first sight."""
+    import matplotlib.pyplot as plt
+    import thumbnails
+
+    plt.show = lambda: None
+    figure, axes = plt.subplots(2, 3, figsize=(9.6, 4.2), layout="constrained")
+    for ax, (demo, title) in zip(axes.flat, STARTS.items(), strict=True):
+        others = set(plt.get_fignums())
+        runpy.run_path(str(DEMOS / f"{demo}.py"))
+        drawn = [plt.figure(k) for k in sorted(set(plt.get_fignums()) - others)]
+        thumbnails.largest_of(drawn, filename.with_name("part.png"))
+        ax.imshow(plt.imread(filename.with_name("part.png")))
+        ax.set_title(title, fontsize=9)
+        ax.set_axis_off()
+    filename.with_name("part.png").unlink()
+    figure.savefig(filename, dpi=120)
+    plt.close("all")
+
+
 def main(folder=DOCS):
     """Write cantilever.png (64 elements), cantilever_16.png (not recovered), frames, others."""
     folder = Path(folder)
@@ -80,6 +105,7 @@ def main(folder=DOCS):
     on_a_cylinder().plot("eps_xx", thickness=1, filename=folder / "obstacles.png", dpi=110)
     pushed_frame().plot("eps_xx", thickness=6, filename=folder / "frames.png", dpi=110)
     portal(folder / "model.png")
+    start(folder / "start.png")
     for demo, name, dpi in (("rollup", "rollup", 150), ("spring", "spring", 150),
                             ("live_view", "live", 90)):
         figure = runpy.run_path(str(DEMOS / f"{demo}.py"))["fig"]

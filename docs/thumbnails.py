@@ -18,18 +18,19 @@ largest: dict[str, float] = {}
 
 
 def size(ax):
-    """Square inches of a drawing; of curves a tenth, of a colour bar nothing."""
+    """Square inches of a drawing; of what has no field a tenth, of a colour bar nothing."""
     if ax.get_label() == "<colorbar>":
         return 0.0
     box = ax.get_window_extent().transformed(ax.figure.dpi_scale_trans.inverted())
-    return box.width * box.height * (1.0 if ax.collections else 0.1)
+    field = any(part.get_array() is not None for part in ax.collections)
+    return box.width * box.height * (1.0 if field else 0.1)
 
 
-def draw(ax, filename):
+def draw(figure, ax, filename):
     """Save the inside of one drawing, and leave its figure as it was."""
-    figure = ax.figure
-    words = [*figure.texts, *(other for other in figure.axes if other is not ax),
-             *ax.child_axes, *ax.spines.values(), *ax.texts, ax.xaxis, ax.yaxis, ax.get_legend()]
+    words = [*figure.texts, *(text for part in figure.subfigs for text in part.texts),
+             *(other for other in figure.axes if other is not ax), *ax.child_axes,
+             *ax.spines.values(), *ax.texts, ax.xaxis, ax.yaxis, ax.get_legend()]
     hidden = [part for part in words if part is not None and part.get_visible()]
     titles = {where: ax.get_title(where) for where in ("left", "center", "right")}
     box = ax.get_window_extent().transformed(figure.dpi_scale_trans.inverted())
@@ -54,15 +55,21 @@ def draw(ax, filename):
 def thumbnails(block, block_vars, gallery_conf):
     """Before matplotlib's figures are saved: the largest drawing of the example so far."""
     stem = Path(block_vars["src_file"]).stem
-    for number in plt.get_fignums():
-        figure = plt.figure(number)
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    figures = [plt.figure(number) for number in plt.get_fignums()]
+    largest[stem] = largest_of(figures, FOLDER / f"{stem}.png", largest.get(stem, 0.0))
+    return ""
+
+
+def largest_of(figures, filename, least=0.0):
+    """Save the largest drawing of figures, if it is larger than ``least``; returns its size."""
+    for figure in figures:
         figure.canvas.draw()
         for ax in figure.axes:
-            if ax.get_visible() and size(ax) > largest.get(stem, 0.0):
-                largest[stem] = size(ax)
-                FOLDER.mkdir(parents=True, exist_ok=True)
-                draw(ax, FOLDER / f"{stem}.png")
-    return ""
+            if ax.get_visible() and size(ax) > least:
+                least = size(ax)
+                draw(figure, ax, filename)
+    return least
 
 
 def replace(app):
