@@ -2,8 +2,8 @@ r"""A bow is strung and drawn
 =========================
 
 How hard is a bow to draw, what does it store, and how much stress does its limb bear? A limb of
-wood between glass is bent, the string is put on, and the archer draws: three phases, each of which
-begins where the one before has come to rest.
+wood between glass is bent, the string is put on, and the archer draws. Each of the three phases
+starts from the equilibrium of the one before.
 """
 
 import matplotlib.pyplot as plt

@@ -14,7 +14,7 @@ from skfem_ancf import (Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, St
 
 # %%
 # A strip 30 mm long and 0.2 mm high that rises by 0.25 mm as a sine. Its layers want to be longer
-# by 9e-6 for each kelvin, and shorter. Millimetres, newtons, kelvin.
+# by 9e-6 for each kelvin, and by as much shorter. Millimetres, newtons, kelvin.
 
 span, height, rise, alpha, modulus = 30.0, 0.2, 0.25, 9e-6, 1.4e5
 below, above = (StVenantKirchhoff(E=modulus, nu=0.3, thermal_expansion=x) for x in (alpha, -alpha))

@@ -109,6 +109,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "
                          f"after the start at t = {t_start:g}")
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
+    made.t = t_start
     count = increments * len(ends)
     try:
         with (system.forces.contacts.lent(), expecting(ITERATIONS * count),
