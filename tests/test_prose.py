@@ -35,9 +35,6 @@ WORDS = {
 }
 #: A sentence of a page, and a page's mean, in words; a formula or a piece of code is one.
 LONGEST, MEAN = 40, 20
-#: Pages that are still to be rewritten.
-EXCEPTIONS = {
-    "paper.md", "scikit-fem.md"}
 
 
 def prose(text):
@@ -78,8 +75,6 @@ def dialect(text):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_pages_have_no_dialect(page):
-    if page.name in EXCEPTIONS:
-        pytest.skip("to be rewritten")
     assert not dialect(re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8")))
 
 
@@ -91,8 +86,6 @@ def test_docstrings_and_errors_have_no_dialect():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_sentences_of_a_page_are_short(page):
-    if page.name in EXCEPTIONS:
-        pytest.skip("to be rewritten")
     found = sentences(page.read_text(encoding="utf-8"))
     long = [" ".join(words) for words in found if len(words) > LONGEST]
     assert not long, f"more than {LONGEST} words: " + "\n".join(long)
