@@ -271,7 +271,7 @@ def compute(cases=None, elements=None):
 def table(rows):
     """The rows as Markdown."""
     names = list(ELEMENTS)
-    lines = ["| case | asked | reference | " + " | ".join(names) + " | source |",
+    lines = ["| case | quantity | reference | " + " | ".join(names) + " | source |",
              "|---|---|---|" + "---|" * len(names) + "---|"]
     for row in rows:
         # a hyphen at which no line is broken
@@ -284,8 +284,8 @@ def table(rows):
         lines.append(f"| {row.case.name} | {row.case.quantity} | {row.reference:.8g} | "
                      + " | ".join(errors) + f" | {source} |")
     sizes = [row.coordinates[n] for row in rows for n in row.coordinates]
-    lines += ["", f"Relative errors, with {min(sizes)} to {max(sizes)} coordinates. \"-\": the "
-              "element has no shear, or no strain of its own across the section."]
+    lines += ["", f"Relative errors, with {min(sizes)} to {max(sizes)} degrees of freedom. \"-\": "
+              "the element has no shear, or no independent strain across the section."]
     return "\n".join(lines) + "\n"
 
 
