@@ -1,10 +1,11 @@
 r"""A wire in gel
 =============
 
-A thin wire that is pushed along its axis buckles into one arc. In something soft that holds it, as
-gel, soil or a cell, it buckles into many short waves. The gel is an energy density of three lines:
-the wire under a force across it, the force at which the waves appear, and what comes after, in a
-gel that becomes stiffer and in one that yields.
+An axially loaded wire in an elastic medium buckles into many short waves, at a load that is
+compared with Hetenyi's theory.
+
+Without the medium, here a gel, it buckles into one arc. The gel is an energy density of three
+lines, which hardens or softens.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +15,8 @@ from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirc
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# A polymer wire, and the stiffness k of the gel per length and deflection: such that the wire has
-# eight half waves, by the theory of a long beam on Winkler's bedding.
+# A polymer wire. The stiffness k of the gel, per length and deflection, makes the wire buckle into
+# eight half waves, by the theory of a long beam on Winkler's foundation.
 
 length, side, waves = 0.2, 1e-3, 8
 polymer = StVenantKirchhoff(E=2e9, nu=0.3)
@@ -25,8 +26,8 @@ beam = Beam(MeshBeam.init_line(np.linspace(0, length, 41), side), ElementBeamANC
             polymer, side)
 
 # %%
-# The energy per length of the axis, of the deflection r - X, hardening or not. It is there before
-# any load: ``scaled=False``, so that load factors are those of the forces alone.
+# The energy per length is a function of the deflection r - X. With ``scaled=False`` it does not
+# scale with the load, so that load factors are those of the forces alone.
 
 
 def gel(hardening, size=2 * side):
@@ -38,8 +39,8 @@ def gel(hardening, size=2 * side):
 
 
 # %%
-# **A force across the middle**, so small that both are linear, against Hetenyi ("Beams on Elastic
-# Foundation", 1946): the deflection dies away in waves.
+# **A transverse force in the middle**, small enough for linear theory, against Hetenyi ("Beams on
+# Elastic Foundation", 1946): the deflection decays in waves.
 
 force, decay = 1e-3, (k / (4 * EI)) ** 0.25
 state = gel(True).fix("left", "r^1").point_force((0, -force), at=(length / 2, 0)).solve_static()
@@ -51,8 +52,8 @@ print(f"deflection at most {np.max(abs(found - exact)) / np.max(abs(exact)):.1e}
 assert np.allclose(found, exact, rtol=0, atol=0.02 * np.max(abs(exact)))
 
 # %%
-# **The force at which it buckles** is :math:`2 \sqrt{k EI}`, however long the wire is. Without the
-# gel 1/128 of it would do.
+# **The critical load** is :math:`2 \sqrt{k EI}` for any length of the wire. Without the gel it is
+# 128 times smaller.
 
 critical = 2 * np.sqrt(k * EI)
 
@@ -67,11 +68,11 @@ print(f"it buckles at {factor * critical:.4f} N, Hetenyi {critical:.4f} N")
 assert np.isclose(factor, 1, rtol=5e-3)
 
 # %%
-# **Beyond it** the straight wire is one solution, and the waves branch off. In a gel that hardens
-# they grow with the force; in one that yields they carry less the larger they are, and snap.
+# **Beyond the critical load** waves branch off the straight wire. The load grows with them in a gel
+# that hardens, and decreases in one that softens: the wire snaps.
 #
-# **The check**: waves of one harmonic of the height a, whose mean energy gives the stiffness k of
-# the gel the factor :math:`1 + 3 a^2 / 4` or :math:`(1 + a^2)^{-3/2}`, a in units of ``size``.
+# **Check**: for waves of one harmonic with amplitude a, in units of ``size``, the mean energy
+# multiplies the stiffness k by :math:`1 + 3 a^2 / 4` or :math:`(1 + a^2)^{-3/2}`.
 
 factors = {"hardening": lambda a: 1 + 0.75 * a**2, "yielding": lambda a: (1 + a**2) ** -1.5}
 fig, (upper, lower) = plt.subplots(2, 1, figsize=(7, 5), height_ratios=(2, 1),
@@ -91,7 +92,7 @@ for name, factor in factors.items():
                    title=f"stress $S_{{xx}}$ in the gel that hardens, at {path.load[-1]:.2f}")
 
 # %%
-# The force over the height of the waves, broad by one harmonic, and the wire.
+# The load against the amplitude of the waves (broad line: one harmonic), and the wire.
 
 upper.set(xlabel="height of the waves / side of the wire", ylabel=r"force / $2\sqrt{k EI}$")
 upper.legend(frameon=False)

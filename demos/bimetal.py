@@ -1,9 +1,12 @@
 r"""A bimetal strip
 ===============
 
-Two metals, bonded face to face, curl when they are heated, since one of them wants to be longer. So
-thermostats switch. Timoshenko's formula of 1925 [1]_ gives the curvature; what it does not show is
-how the stress jumps in the joint of the two metals, although nothing from outside holds the strip.
+The curvature of a heated strip of two bonded metals, compared with Timoshenko's formula, and the
+stress across it.
+
+One metal expands more than the other, so the strip bends; thermostats switch in this way.
+Timoshenko's formula [1]_ gives the curvature. It does not show the stress, which jumps at the
+interface of the metals although no external force acts.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +16,8 @@ from scipy.integrate import trapezoid
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, StVenantKirchhoff
 
 # %%
-# Invar below, brass above, 0.5 mm each; 150 mm long, 10 mm wide, heated by 200 K.
+# Invar below, brass above, 0.5 mm each. The strip is 150 mm long and 10 mm wide, and is heated by
+# 200 K.
 
 invar = StVenantKirchhoff(E=1.41e11, nu=0.29, thermal_expansion=1.2e-6)
 brass = StVenantKirchhoff(E=1.05e11, nu=0.34, thermal_expansion=19e-6)
@@ -27,7 +31,7 @@ state = Scene(beam).clamp("left", thickness="free").temperature(heat).solve_stat
 tip = state.displacement((length, 0))
 
 # %%
-# **Timoshenko**: m is the ratio of the thicknesses, n that of the moduli.
+# **Timoshenko's formula**: m is the ratio of the thicknesses, n that of the moduli.
 
 m, n = 1.0, invar.E / brass.E
 kappa = (6 * (brass.thermal_expansion - invar.thermal_expansion) * heat * (1 + m)**2
@@ -37,7 +41,7 @@ print(f"tip {1e3 * tip[1]:.4f} mm, Timoshenko {-1e3 * expected:.4f} mm")
 assert np.isclose(-tip[1], expected, rtol=5e-3)
 
 # %%
-# **Stress in the middle**: linear in each layer, with zero force and moment over the section.
+# **Stress in the middle**: linear in each layer, with zero force and zero moment over the section.
 
 y = height * np.concatenate([np.linspace(-0.5, -1e-6, 41), np.linspace(1e-6, 0.5, 41)])
 stress = state.stress(np.array([np.full_like(y, length / 2), y]))[0]
@@ -49,7 +53,7 @@ print(f"jump in the joint: {1e-6 * (stress[41] - stress[40]):.1f} MPa; "
 assert abs(force) < 5e-3 * largest and abs(moment) < 5e-3 * largest * height
 
 # %%
-# The strip, and the stress from face to face.
+# The strip, and the stress across its section.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 4.2), width_ratios=(1.7, 1),
                                   layout="constrained")

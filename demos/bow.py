@@ -1,9 +1,11 @@
 r"""A bow is strung and drawn
 =========================
 
-How hard is a bow to draw, what does it store, and how much stress does its limb bear? A limb of
-wood between glass is bent, the string is put on, and the archer draws. Each of the three phases
-starts from the equilibrium of the one before.
+The draw force, the stored energy and the stress of a bow that is bent, strung and drawn, compared
+with the elastica.
+
+The limb is of wood between glass. The archer bends it, puts the string on, and draws. Each of the
+three phases starts from the equilibrium of the one before.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +16,7 @@ from skfem_ancf import (Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, St
                         StVenantKirchhoff)
 
 # %%
-# One half: the limb stands on the grip, and the string is a bar that does not stretch.
+# One half: the limb on the grip, and the string, a bar that does not stretch.
 
 length, string, pull, inch = 0.8, 0.77, 200.0, 0.0254                       # m, N
 wood, glass = StVenantKirchhoff(E=1.2e10, nu=0.3), StVenantKirchhoff(E=4e10, nu=0.25)
@@ -65,7 +67,7 @@ print(f"a limb of wood: the draw curve within {max(abs(force - expected)) / pull
 assert np.allclose(force, expected, atol=1e-3 * pull)
 
 # %%
-# The laminated limb, of glass 1 mm thick on both faces, is thinner and narrower towards its tip.
+# The laminated limb has glass of 1 mm on both faces, and is thinner and narrower towards its tip.
 
 history = draw(lambda s: 11e-3 - 4e-3 * s / length, section=Section.layers(
     (1e-3, glass), (None, wood), (1e-3, glass), width=lambda x, y: 0.045 - 0.025 * x / length))
@@ -76,7 +78,7 @@ print(f"brace height {100 * nock[0]:.1f} cm; {pull:g} N at {nock[-1] / inch:.1f}
 assert np.isclose(stored, np.trapezoid(force, nock), rtol=5e-3)
 
 # %%
-# The draw curve, and the stress on the back of the limb, which the archer does not see.
+# The draw curve, and the stress on the back of the limb, the face away from the archer.
 
 fig, (left, middle, right) = plt.subplots(1, 3, figsize=(11, 4.4), layout="constrained")
 history.plot(lambda v: 1e-6 * v["S_xx"], times=[1.0, 1.5, 2.0], ax=left, unit="MPa",

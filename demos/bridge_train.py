@@ -1,9 +1,11 @@
 r"""A train on a bridge of three spans
 ==================================
 
-Bogies that follow each other at equal distances push a bridge at a beat. At the speed at which one
-comes with every swing of the bridge, the swings add up: engineers of fast lines keep away from it.
-A train creeps over a continuous girder here, then hurries.
+A train crosses a bridge of three spans, at low speed and at the speed where its bogies excite the
+lowest mode.
+
+The bogies follow each other at equal distances, so they load the bridge periodically. If the period
+is that of the lowest mode, the vibration grows with each bogie.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +14,8 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, Train
 
 # %%
-# Three spans of 25 m, 2 % damping, and an articulated train with a bogie every 18.7 m.
+# Three spans of 25 m with a damping ratio of 2 %, and an articulated train with a bogie every
+# 18.7 m.
 
 span, height, width, gap, bogies, load = 25.0, 1.6, 3.0, 18.7, 10, 3e5      # m, N
 concrete = StVenantKirchhoff(E=3e10, nu=0.2, density=2500)
@@ -34,8 +37,8 @@ def cross(speed):
 
 
 # %%
-# **Creeping**: the moment over the second pier, by equilibria one after the other.
-# **The check** is Clapeyron's equation of three moments. Forces act inside of elements.
+# **Low speed**: the moment over the second pier, by a sequence of static solutions. Forces may act
+# inside elements. **Check**: Clapeyron's equation of three moments.
 
 creeping = cross(1.0).run(way, increments=150)
 over_pier = creeping.resultants((span, 0)).M
@@ -59,8 +62,8 @@ print(f"largest moment over the pier {-1e-6 * over_pier.min():.4f} MN m, by Clap
 assert np.allclose(over_pier, expected, atol=1e-3 * abs(expected).max())
 
 # %%
-# **Hurrying**: a bogie comes with every swing at the distance of bogies times the lowest frequency,
-# which is that of a single span, since three of them swing up and down in turn.
+# **Critical speed**: the distance of the bogies times the lowest frequency. This is the frequency
+# of a single span, since neighbouring spans move in opposite directions.
 
 lowest = bridge().modes(1).frequencies[0] / (2 * np.pi)
 print(f"lowest frequency {lowest:.3f} Hz, of one span {frequency:.3f} Hz")
@@ -76,7 +79,8 @@ print("largest sag over that of the creeping train:", largest.round(2))
 assert ratios[np.argmax(largest)] == 1.0 and largest.max() > 2
 
 # %%
-# The sag of the first span over the place of the train, and the bridge when it is largest.
+# The deflection of the first span against the position of the train, and the bridge at its largest
+# deflection.
 
 fig, axes = plt.subplot_mosaic("ab;cc", figsize=(10, 6), height_ratios=(1.5, 1),
                                layout="constrained")

@@ -1,10 +1,12 @@
-"""A slender cantilever, in numbers of a paper
-===========================================
+"""The cantilever of the paper
+===========================
 
-A beam a hundred times as long as high hangs under its own weight, and carries a small force at its
-tip: the examples 5.1 and 5.2 of the paper from which these elements come [1]_. Its numbers are met
-to every digit; then the same beam with the default formulation shows how far sixteen of the paper's
-elements are from the answer. This is what ``make demo`` runs.
+A slender cantilever under a tip force and under its weight, compared with examples 5.1 and 5.2 of
+the paper.
+
+The paper [1]_ defines the elements of this package. The last part solves the same problem with the
+default formulation. It shows that sixteen of the paper's elements are far from the limit. ``make
+demo`` runs this script.
 """
 
 from pathlib import Path
@@ -19,9 +21,9 @@ out = Path("out")
 mesh = MeshBeam.init_line(np.linspace(0, length, elements + 1), height=side)
 
 # %%
-# The paper's beam: sections of order 3, the strain taken at every point ("continuum"), the shear
-# modulus with a factor, and what is fixed at the root, by scikit-fem's names of the coordinates. A
-# welded face, ``clamp("left")``, would fix r and all of r_Y and leave r_X free.
+# The beam of the paper: sections of order 3, the formulation "continuum", a shear correction
+# factor, and the degrees of freedom that it fixes at the root, by name. This is not
+# ``clamp("left")``, which fixes r and all of r_Y and leaves r_X free.
 
 
 def paper(E):
@@ -51,7 +53,7 @@ for name, here, reference, tolerance, source in rows:
     assert abs(here - reference) < tolerance
 
 # %%
-# The default formulation with as many elements, welded. The limit of fine meshes is -0.9033 m.
+# The default formulation with as many elements, clamped. The limit of fine meshes is -0.9033 m.
 
 soft = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
 ours = Scene(Beam(mesh, ElementBeamANCF(3), soft, width=side)).clamp("left").gravity((0, -9.81))
@@ -59,7 +61,7 @@ ours = ours.solve_static()
 print(f"\ndefault formulation: gravity, tip u_y = {ours.displacement((length, 0))[1]:.6f}")
 
 # %%
-# Both bodies, coloured by the strain across the section, and their roots to scale.
+# Both beams, coloured by the strain across the section, and their roots to scale.
 
 figure, axes = plt.subplots(1, 2, figsize=(11.5, 6), layout="constrained")
 for ax, state, recover, title in (

@@ -1,9 +1,12 @@
-r"""A rope on a pulley that does not turn
-=====================================
+r"""A rope on a fixed pulley
+========================
 
-A sailor holds a ship with one hand, if the rope goes round a bollard: friction lets the tension
-grow along the contact, by the factor :math:`e^{\mu \alpha}` of Euler and Eytelwein [1]_. Here a
-rope lies over half a pulley with a weight at one end, and the other end is pulled until it slips.
+A rope slips on a pulley that does not turn, and the ratio of its end forces is compared with
+Euler's and Eytelwein's formula.
+
+Friction increases the tension along the contact angle :math:`\alpha` by the factor
+:math:`e^{\mu \alpha}` [1]_. This is how a sailor holds a ship with one hand and a bollard. Here the
+rope lies on half a pulley. One end carries a weight, the other is pulled until the rope slips.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +15,8 @@ import numpy as np
 from skfem_ancf import Beam, Circle, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# The rope hangs over the pulley from the start: straight, half a circle, straight. It is thin, and
-# the arc is its stress-free shape, so that bending plays no part.
+# The reference configuration of the rope is already on the pulley: straight, half a circle,
+# straight. The rope is thin, and stress-free in this shape, so bending has no effect.
 
 radius, hanging, thickness, friction = 0.1, 0.1, 2e-3, 0.25
 cord = StVenantKirchhoff(E=5e7, nu=0.0)
@@ -40,7 +43,7 @@ scene.fix("right", "r^2", displacement=-way)
 state = scene.solve_static(first_step=0.1)
 
 # %%
-# **The check**: the force of the hand over the weight, and the tension all along the contact.
+# **Check**: the force of the hand over the weight, and the tension along the contact.
 
 hand = -state.reactions("right").force[1]
 wanted = weight * np.exp(friction * np.pi)
@@ -54,7 +57,8 @@ print(f"tension along the rope within {100 * np.max(abs(tension / expected - 1))
 assert np.max(abs(tension / expected - 1)) < 0.05
 
 # %%
-# The pulley feels both ends; and where the rope presses.
+# The force on the pulley is the sum of both end forces. The figure shows the stress, and the
+# tension along the contact.
 
 contact = state.contact()
 print("force on the rope from the pulley:", contact.total.round(3), "N")

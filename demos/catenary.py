@@ -1,10 +1,10 @@
 r"""A hanging rope and the catenary
 ===============================
 
-A rope between two hooks hangs in the curve that Leibniz, Huygens and Johann Bernoulli found in
-1691. A beam so thin that its bending does not matter should do the same. It starts as a straight
-piece of rope, too long for the two hooks; one of its ends is carried to the other hook while it
-sags.
+A rope hangs between two hooks, and its shape and tension are compared with the catenary.
+
+The rope is a beam whose bending stiffness is negligible. It starts straight, with one end far from
+its hook. This end moves to the hook in steps, while the rope sags.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhof
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# Two and a half metres of cord 1 mm thick, two metres between the hooks.
+# A cord 2.5 m long and 1 mm thick; the hooks are 2 m apart.
 
 length, span, height, g = 2.5, 2.0, 1e-3, 9.81
 hemp = StVenantKirchhoff(E=1e8, nu=0.0, density=1200)
@@ -32,7 +32,7 @@ def hang(distance, start=None):
 
 
 # %%
-# The end comes in step by step, each solution the start of the next.
+# The end moves in steps. Each solution starts from the one before.
 
 states = [hang(0.99 * length)]
 for distance in np.linspace(0.97 * length, span, 4):
@@ -40,7 +40,7 @@ for distance in np.linspace(0.97 * length, span, 4):
 state = states[-1]
 
 # %%
-# **The catenary** :math:`y = a \cosh(x / a)` of the length of the rope: a is the horizontal force
+# **The catenary** :math:`y = a \cosh(x / a)` with the length of the rope; a is the horizontal force
 # over the weight per length.
 
 a = brentq(lambda a: 2 * a * np.sinh(span / 2 / a) - length, 0.1, 10)
@@ -52,7 +52,8 @@ print(f"horizontal force {horizontal:.4f} N, catenary {weight * a:.4f} N")
 assert np.isclose(-middle[1], sag, rtol=1e-3) and np.isclose(horizontal, weight * a, rtol=5e-3)
 
 # %%
-# All along: the tension is the weight per length times the height over the directrix of the curve.
+# The tension at each point is the weight per length times the height above the directrix of the
+# catenary.
 
 s = np.linspace(0.05, 0.95, 19) * length
 points = np.array([s, 0 * s])

@@ -1,10 +1,11 @@
 r"""A column past its Euler load
 ============================
 
-Press a thin strip on its end: nothing happens, until at Euler's load it steps aside and bows. A
-textbook stops there. Here the straight column is followed through its critical load, the bowed one
-branches off, and bows until its head comes down to its foot; it carries more load all the way,
-which Euler's elastica gives in closed form.
+The path of a compressed column, through its critical load and along the bent branch, compared with
+Euler's elastica.
+
+The straight column loses its stability at Euler's load, and the bent column branches off. Its load
+increases along the whole branch, until the head comes down to the foot.
 """
 
 import matplotlib.pyplot as plt
@@ -28,8 +29,8 @@ head = (0, length)
 scene = Scene(beam).clamp("left", thickness="free").point_force((0, -euler), at=head)
 
 # %%
-# The path of the straight column, in small steps: it is hardly compressed. Where it loses its
-# stability the load is solved for, and the other path starts from there.
+# The path of the straight column, in small steps since it hardly shortens. The critical load is
+# computed, and the branch starts there.
 
 trunk = scene.continuation(ds=2e-6 * length, max_load=1.5)
 point = trunk.critical_points[0]
@@ -41,9 +42,9 @@ sideways, down = np.abs(branch.displacement(head).T) / length
 print(f"the bowed column: {len(branch)} points, all stable: {all(branch.stable[1:])}")
 
 # %%
-# Euler's elastica: with :math:`k = \sin(\theta/2)` of the angle at the head, the load is :math:`(2
-# K(k) / \pi)^2`, the head moves sideways by :math:`2 k / K` and down by :math:`2 - 2 E / K`, in
-# lengths.
+# Euler's elastica, with :math:`k = \sin(\theta/2)` of the angle at the head: the load is
+# :math:`(2 K(k) / \pi)^2`. The head moves sideways by :math:`2 k / K` and down by
+# :math:`2 - 2 E / K`, in lengths.
 
 
 def elastica(load):
@@ -58,7 +59,7 @@ print(f"head at most {error:.1e} lengths from the elastica")
 assert error < 1e-3 and all(branch.stable[1:])
 
 # %%
-# Load against what the head moves, and the column at some loads.
+# The load against the displacement of the head, and the column at some loads.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
 loads = np.linspace(1.0005, 5, 200)

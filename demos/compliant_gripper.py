@@ -1,10 +1,12 @@
 r"""A compliant gripper
 ===================
 
-Fingers like the fin of a fish grip what they touch: each is a wedge of two thin walls with ribs
-between them, printed in one piece, without a hinge. Pressed at its side such a finger does not give
-way: its wall wraps around the thing that presses, and its tip stays where it is, or bends towards
-it. Two of them grip a plate by its edges.
+Two compliant fingers grip a plate by its edges, and the work of the hands is compared with the
+stored energy.
+
+A finger is a wedge of two thin walls with ribs between them, in one piece without hinges, like the
+fin of a fish. Its wall wraps around an object that presses on it. Its tip stays in place or bends
+towards the object.
 """
 
 import matplotlib.pyplot as plt
@@ -14,9 +16,9 @@ from scipy.integrate import simpson
 from skfem_ancf import Frame, StVenantKirchhoff
 
 # %%
-# A finger is 100 mm high and 30 mm wide at its base, of a soft plastic. Its walls are 1.5 mm thick,
-# its ribs 0.4 mm. The nodes of its front wall come first, then those of its back. The plate is
-# 40 mm wide.
+# A finger is 100 mm high, 30 mm wide at its base, and made of a soft plastic. Its walls are 1.5 mm
+# thick, its ribs 0.4 mm. The nodes of the front wall come first, then those of the back wall. The
+# plate is 40 mm wide.
 
 height, base, ribs, half, touched = 0.1, 0.03, 5, 0.02, 2
 plastic = StVenantKirchhoff(E=30e6, nu=0.4, density=1200)
@@ -29,7 +31,7 @@ across = np.column_stack([k[1:], n + k[1:]])
 
 
 # %%
-# The gripper: a finger and its mirror image. ``settle`` moves their bases towards each other; the
+# The gripper: a finger and its mirror image. ``settle`` moves their bases towards each other. The
 # plate stops one node of each front wall.
 
 
@@ -56,13 +58,14 @@ for closing, F, d in zip(closings, force, lean, strict=True):
           f"the tip leans {1e3 * d:5.2f} mm")
 
 # %%
-# **The fin effect**: the plate pushes a wall at a third of its height. The tip of a single strip
-# would lean outwards by (3 - 1/3) / (2/3) = 4 times that push. This one stays, then leans inwards.
+# **The fin effect**: the plate presses on a wall at a third of its height. The tip of a single
+# strip would move outwards by (3 - 1/3) / (2/3) = 4 times the displacement there. This tip stays,
+# then moves inwards.
 
 assert np.all(abs(lean) < 0.1 * closings) and lean[-1] < 0
 
 # %%
-# **The check** is the work: the force over the closing, of both hands, is stored as strain energy.
+# **Check**: the work of both hands, the integral of force over closing, is the strain energy.
 
 work = 2 * simpson(np.r_[0, force], x=np.r_[0, closings])
 stored = states[-1].strain_energy

@@ -1,10 +1,12 @@
 r"""A strip pressed on a cylinder
 =============================
 
-Bend a strip over a cylinder by pulling its end down. As long as it is bent less than the cylinder
-it touches it at its root alone; then it lies on it, farther and farther, as bent as the cylinder.
-What presses is concentrated at the place where it takes off. That is what a tape, a leaf spring on
-its stop and a gripper do.
+A strip is bent over a cylinder by a force at its end, and the end of the contact is compared with
+beam theory.
+
+At small forces the strip touches the cylinder at its root only. At larger forces it lies on the
+cylinder up to a point that moves outwards, with the curvature of the cylinder. The contact force is
+concentrated at this point. Tapes, leaf springs with a stop and grippers work like this.
 """
 
 import matplotlib.pyplot as plt
@@ -30,9 +32,9 @@ def pulled(force, start=None):
 
 
 # %%
-# **The check**: where the strip lies on the cylinder, it is as bent. Where it takes off, the moment
-# of the force is EI over the radius of the axis; so the lever of the force there is known, and the
-# place where the pressure ends.
+# **Check**: on the cylinder the strip has the curvature of the cylinder. At the end of the contact
+# its moment is EI over the radius of the axis. This determines the lever of the force, and so the
+# end of the contact.
 
 bend = EI / (radius + height / 2)
 states, lifts = [], []
@@ -48,7 +50,7 @@ for force in forces:
     assert lifts[-1] < 1e-3 or abs(lever - bend / force) < length / 40
 
 # %%
-# Bending along the strip, in radii of the cylinder: 1 where it lies on it.
+# The curvature along the strip, times the radius of the cylinder: 1 in contact.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 4.4), layout="constrained")
 plot_state(states, "S_xx", ax=left, thickness=4, unit="Pa", title="stress along the strip $S_{xx}$")

@@ -1,9 +1,12 @@
-r"""Damping, and coming to rest
-===========================
+r"""Damping: a ruler comes to rest
+==============================
 
-A plastic ruler is bent at the edge of a table and let go: it rings, ever less, and ends where
-statics says. Where the energy goes is in the material, whose stress resists the rate of its strain
-(Kelvin and Voigt), and the computation accounts for every bit of it.
+A plastic ruler vibrates with material damping, and its decay is compared with the damping ratio of
+the first mode.
+
+The ruler is bent and released. Its material is viscoelastic (Kelvin and Voigt): its stress depends
+on the strain rate, too. The computation accounts for all dissipated energy. In the end the ruler is
+in static equilibrium.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +15,8 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# The time of the damper sets the decay: a vibration of the angular frequency omega loses the part
-# pi omega time of its amplitude in each period.
+# The relaxation time sets the decay: a vibration with angular frequency omega loses the fraction pi
+# omega time of its amplitude in each period.
 
 length, height, width = 0.25, 2e-3, 25e-3
 plastic = StVenantKirchhoff(E=3e9, nu=0.35, density=1200)
@@ -27,8 +30,8 @@ def held():
 
 
 # %%
-# Pulled down by a force at its tip, then let go: the state of the one scene starts the motion of
-# the other.
+# The ruler is bent by a force at its tip, then released: the motion starts from the static state of
+# the other scene.
 
 bent = held().point_force((0, -0.3), at=tip).solve_static()
 scene = held()
@@ -51,8 +54,8 @@ print(f"frequency: {1 / period:.3f} Hz, mode {omega / (2 * np.pi):.3f} Hz")
 assert np.isclose(measured, ratio, rtol=0.03) and np.isclose(2 * np.pi / period, omega, rtol=0.02)
 
 # %%
-# **The balance**: energy and what was dissipated add up to a constant; in the end the ruler is
-# where it rests.
+# **The balance**: the sum of total and dissipated energy is constant. In the end the ruler is in
+# its static equilibrium.
 
 total = history.total_energy + history.dissipated
 print(f"balance of energy: {np.ptp(total):.1e} J of {np.ptp(history.total_energy):.1e} J lost; "

@@ -1,10 +1,12 @@
 r"""A driven arm and its stiffening
 ===============================
 
-A slender arm is spun up by a motor. While it speeds up its tip lags behind, as a fishing rod does;
-once it turns steadily the centrifugal force keeps it straight, and longer. That force also stiffens
-the arm on the way: a linear theory, which does not know this, bends it too far, and at higher
-speeds ends in nonsense. The example is Simo and Vu-Quoc's [1]_.
+A slender arm is spun up by a motor, and the lag of its tip is compared with linear theory and with
+centrifugal stiffening.
+
+While the arm accelerates its tip lags behind. In steady rotation the arm is straight and slightly
+longer. The centrifugal force stiffens it. A linear theory without this effect bends the arm too
+far, and fails at higher speeds. The example is by Simo and Vu-Quoc [1]_.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +23,7 @@ beam = Beam(mesh, ElementBeamCable(5), section=arm, damping=KelvinVoigt(0.02))
 scene = Scene(beam).pin("left")
 
 # %%
-# The angle of the hub: its acceleration is a smooth hump, its speed reaches 6 rad/s.
+# The angle of the hub. Its acceleration is smooth, its final speed is 6 rad/s.
 
 
 def angle(t):
@@ -34,7 +36,7 @@ scene.joint("angle", at="left", angle=angle)
 history = scene.integrate(t_end=20.0, dt=0.02)
 
 # %%
-# Position of the tip in axes that turn with the hub: how far it lags, how much longer the arm is.
+# The tip in axes that turn with the hub: its lag, and the elongation of the arm.
 
 t, x = history.t, history.position((length, 0))
 c, s = np.cos(angle(t)), np.sin(angle(t))
@@ -49,9 +51,10 @@ print(f"longer by {1e4 * mean:.3f}e-4, formula {1e4 * steady:.3f}e-4")
 assert np.isclose(mean, steady, rtol=0.01)
 
 # %%
-# **On the way.** The inertia of the acceleration bends a cantilever by :math:`11 \rho A\, \alpha
-# L^4 \cdot L / 120 EI`. Centrifugal force raises the lowest eigenvalue from :math:`\omega_0^2` by
-# :math:`0.193\, \Omega^2` (Southwell), and divides the lag accordingly.
+# **Acceleration.** The inertia force bends the cantilever by
+# :math:`11 \rho A\, \alpha L^4 \cdot L / 120 EI`. The centrifugal force raises the lowest
+# eigenvalue from :math:`\omega_0^2` by :math:`0.193\, \Omega^2` (Southwell), and reduces the lag by
+# the same factor.
 
 S = np.minimum(t, ramp) / ramp
 alpha = speed / ramp * (1 - np.cos(2 * np.pi * S)) * (t < ramp)

@@ -1,9 +1,10 @@
 """A first beam: a ruler bent by its tip
 =====================================
 
-A steel ruler is clamped at its left end and pulled down at the other, much farther than the
-formulas of a handbook allow: its tip ends up below its clamp. Mesh, element, material, supports and
-load take six lines; the rest looks at the answer.
+A steel ruler is clamped at its left end and bent by a force at the other, far beyond linear theory.
+
+Its tip ends up below the clamp. Mesh, element, material, support and load take six lines. The rest
+of the script evaluates the solution.
 """
 
 import matplotlib.pyplot as plt
@@ -12,15 +13,15 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# The ruler: 300 mm long, 25 mm wide, 0.5 mm thick. All numbers are in metres, newtons, kilograms.
+# The ruler: 300 mm long, 25 mm wide, 0.5 mm thick. Units are metres, newtons and kilograms.
 
 length, height, width = 0.3, 0.5e-3, 25e-3
 steel = StVenantKirchhoff(E=2.1e11, nu=0.3, density=7850)
 
 # %%
-# The beam is cut into elements along its axis. The cubic element of order 2 knows strain along the
-# beam and across its section. ``thickness="free"`` holds the clamped section in its plane and lets
-# it get thinner or thicker, as the rest of the beam does.
+# The mesh divides the axis into elements. The cubic element of order 2 has strain along the beam
+# and across its section. ``thickness="free"`` keeps the clamped section plane but does not fix its
+# thickness, as in the rest of the beam.
 
 mesh = MeshBeam.init_line(np.linspace(0, length, 25), height)
 beam = Beam(mesh, ElementBeamANCFCubic(2), steel, width)
@@ -32,24 +33,24 @@ state = scene.solve_static()
 print(state)
 
 # %%
-# Points are named by where they were before the beam was bent. With :math:`P L^2 / EI = 10` the tip
-# of an elastic line goes down by 0.81061 L and back by 0.55500 L [1]_. The formula for small
-# displacements, :math:`P L^3 / 3 EI`, says 3.3 L.
+# Points are given in the undeformed beam. With :math:`P L^2 / EI = 10` the tip of the elastica
+# moves down by 0.81061 L and back by 0.55500 L [1]_. The formula for small displacements,
+# :math:`P L^3 / 3 EI`, gives 3.3 L.
 
 u = state.displacement((length, 0)) / length
 print(f"tip: {-u[0]:.5f} L back, {-u[1]:.5f} L down; line: 0.55500 and 0.81061")
 assert np.allclose(u, [-0.55500, -0.81061], rtol=0, atol=2e-5)
 
 # %%
-# The clamp has to carry the force, and the force times the lever that is left of the beam.
+# The clamp carries the force, and the moment of the force in the deformed beam.
 
 root = state.reactions("left")
 print("force and moment of the clamp:", root.force, root.moment)
 assert np.isclose(root.moment, force * state.position((length, 0))[0], rtol=1e-6)
 
 # %%
-# Strain along and across the beam at the surface of the root: 0.4 per cent would break many steels.
-# The compressed lower side gets thicker, by Poisson's ratio.
+# Strain along and across the beam at the lower surface of the root. 0.4 % would break many steels.
+# The compressed side becomes thicker, by Poisson's ratio.
 
 eps_xx, eps_yy, _ = state.strain((0, -height / 2))
 print(f"lower surface of the root: eps_xx = {eps_xx:.5f}, eps_yy = {eps_yy:.5f}")

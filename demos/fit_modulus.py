@@ -1,9 +1,10 @@
 """Fitting a modulus to a measurement
 ==================================
 
-How stiff is this strip of rubber? Clamp it, let it hang, photograph it, and read off where some
-marks are. The strip bends so far that no formula of a handbook applies; but a computed shape with
-the right modulus has to lie on the marks. SciPy finds it, and how well the marks determine it.
+Young's modulus of a rubber strip is fitted to measured points of its shape under its weight.
+
+The strip is clamped at one end and bends far, so no handbook formula applies. The computed shape
+must match the measured marks. SciPy finds the modulus and its standard deviation.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +14,7 @@ from scipy.optimize import least_squares
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# The strip: 300 mm long and 4 mm thick, its density weighed. Seven marks on its axis.
+# The strip is 300 mm long and 4 mm thick, with known density and seven marks on its axis.
 
 length, height, width, density, g = 0.3, 4e-3, 20e-3, 1150.0, 9.81
 mesh = MeshBeam.init_line(np.linspace(0, length, 25), height)
@@ -27,16 +28,16 @@ def hanging(E, start=None):
 
 
 # %%
-# **The measurement**: made up here, so that the answer is known. A modulus, the shape it gives, and
-# errors of reading of half a millimetre.
+# **The measurement** is synthetic, so the result is known: the shape for a given modulus, with
+# reading errors of half a millimetre.
 
 true, reading = 5e6, 0.5e-3
 rng = np.random.default_rng(1)
 measured = hanging(true).position(marks) + reading * rng.standard_normal(marks.shape)
 
 # %%
-# **The fit**: the unknown is the logarithm of E, so that it stays positive. Each solution starts
-# from the one before, and takes a few milliseconds.
+# **The fit**: the unknown is the logarithm of E, which keeps E positive. Each solution starts from
+# the one before and takes a few milliseconds.
 
 state = hanging(3e6)
 solutions = 0
@@ -58,7 +59,7 @@ assert abs(E - true) < 3 * deviation and deviation < 0.02 * true
 assert 2 * fit.cost < 2 * measured.size
 
 # %%
-# The strip with the modulus found, and the marks.
+# The strip with the fitted modulus, and the marks.
 
 fig, ax = plt.subplots(figsize=(6.4, 5), layout="constrained")
 hanging(E, state).plot("eps_xx", ax=ax, title=r"strain along the strip $\varepsilon_{xx}$, fitted")

@@ -1,10 +1,12 @@
 """A four-bar linkage with a flexible coupler
 ==========================================
 
-A crank turns, a rocker swings, and the bar that couples them should be stiff. Here it is a thin
-strip: at a walking pace the linkage moves as the drawing board says, at speed the inertia of the
-coupler bends it and the rocker strays. Crank and rocker are rigid bodies, joined by hinges; a motor
-drives the crank.
+A four-bar linkage with a flexible coupler runs slowly and fast, and its rocker is compared with the
+rigid linkage.
+
+The coupler is a thin strip. At low speed the linkage moves like a rigid one. At high speed inertia
+bends the coupler, and the rocker deviates. Crank and rocker are rigid bodies, joined by hinges; a
+motor drives the crank.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +16,7 @@ from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, RigidBody
                         StVenantKirchhoff)
 
 # %%
-# Lengths of the linkage; where its hinges are when the crank points to the right.
+# The lengths of the linkage, and its hinges in the initial position.
 
 crank, coupler, rocker, ground = 0.10, 0.45, 0.30, 0.40
 
@@ -38,8 +40,8 @@ def bar(a, b, name, mass):
 
 
 # %%
-# The linkage at a speed, which the motor reaches within the first half turn. A little damping in
-# the steel lets the start die out.
+# The linkage at a given speed, which the motor reaches in the first half turn. Some material
+# damping lets the initial vibration decay.
 
 
 def linkage(speed, turns=2.5):
@@ -66,7 +68,7 @@ def linkage(speed, turns=2.5):
 
 
 # %%
-# **The check**: at one turn in two seconds the rocker is where the law of cosines puts it.
+# **Check**: at half a turn per second the rocker follows the law of cosines.
 
 fig, axes = plt.subplot_mosaic([["body", "angle"], ["body", "moment"]], figsize=(10, 5),
                                width_ratios=(1.2, 1), layout="constrained")

@@ -1,10 +1,11 @@
 r"""A frame from a mesh of lines
 ============================
 
-Columns and girders of a building come as lines between nodes, from a drawing or a mesh program. A
-``Frame`` takes such a mesh, makes each line a beam and joins them rigidly. First a portal of three
-lines, whose moments stand in every handbook; then a building that is pushed sideways until nobody
-would want to be in it.
+A portal and a building, made from a mesh of lines, are compared with handbook formulas for moment
+and buckling.
+
+The lines come from a drawing or a mesh program. A ``Frame`` makes each line a beam and joins them
+rigidly. The building is then pushed sideways far beyond its design load.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +15,7 @@ import numpy as np
 from skfem_ancf import Frame, StVenantKirchhoff
 
 # %%
-# The mesh: here made by a few lines of NumPy, in practice read by ``meshio.read("building.msh")``.
+# The mesh is made by a few lines of NumPy. In practice, ``meshio.read("building.msh")`` reads it.
 
 storey, bay = 3.0, 5.0
 
@@ -44,8 +45,9 @@ def building(storeys, bays):
 
 
 # %%
-# **The check**: a portal with clamped feet, pushed by H at its eaves. With k, the stiffness of the
-# girder over that of a column, the feet carry the moment :math:`H h\, (3 k + 1) / (12 k + 2)`.
+# **Check**: a portal with clamped feet and a horizontal force H at its eaves. With the ratio k of
+# the stiffnesses of girder and column, the moment at the feet is
+# :math:`H h\, (3 k + 1) / (12 k + 2)`.
 
 push = 100.0
 portal = building(1, 1).point_force((push, 0), at="side")
@@ -56,9 +58,8 @@ print(f"moment at the feet: {np.max(abs(feet)):.3f} N m, handbook {expected:.3f}
 assert np.isclose(np.max(abs(feet)), expected, rtol=0.01)
 
 # %%
-# **The building**: four storeys, three bays, 20 kN on each metre of girder. The weight leans when
-# the frame is pushed, and makes it softer: by 1 / (1 - 1 / c), where c is how many times the weight
-# would make it buckle.
+# **The building**: four storeys, three bays, 20 kN per metre of girder. Its weight makes it softer
+# against horizontal forces, by 1 / (1 - 1 / c), where c is the buckling factor of the weight.
 
 top = (0, 4 * storey)
 
@@ -75,7 +76,7 @@ print(f"buckles at {critical:.2f} times its weight; pushed, it is {softer:.4f} t
 assert np.isclose(softer, 1 / (1 - 1 / critical), rtol=0.02)
 
 # %%
-# Larger and larger pushes at each floor, each solution the start of the next.
+# Increasing horizontal forces at each floor. Each solution starts from the one before.
 
 states = [None]
 for push in 1e3 * np.array([50, 100, 200, 300]):

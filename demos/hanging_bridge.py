@@ -1,9 +1,11 @@
-r"""A hanging bridge in the wind
-============================
+r"""A suspension footbridge in gusts
+================================
 
-A footbridge hangs from two cables over a gorge. Gusts strike one half of it. If they come at the
-pace of the bridge's own swing, each one adds to the last, and a wind that nobody would notice makes
-the deck heave. The swing is compared with the formula for a cable that carries a stiff deck.
+Gusts excite a suspension bridge at its lowest frequency, which is compared with the formula for a
+cable with a stiff deck.
+
+A footbridge hangs from two cables. Gusts act on one half of it. At the lowest frequency of the
+bridge even a weak wind makes the deck heave, since the vibration grows with each gust.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +14,8 @@ import numpy as np
 from skfem_ancf import Frame, StVenantKirchhoff
 
 # %%
-# A span of 60 m in ten panels; the cables sag by 6 m and hang at towers of 7 m. Cables and
-# hangers are of steel, the deck is of timber, 2 m wide and 150 mm thick. Hangers are hinged.
+# The span is 60 m in ten panels. The cables sag by 6 m and hang from towers of 7 m. Cables and
+# hangers are of steel, the deck is of timber, 2 m wide and 150 mm thick. The hangers are hinged.
 
 span, sag, panels, g = 60.0, 6.0, 10, 9.81
 steel = StVenantKirchhoff(E=2.1e11, nu=0.3, density=7850)
@@ -43,7 +45,7 @@ def bridge(wind=None):
 
 
 # %%
-# **At rest** the cables pull at their towers as a parabola under the weight, :math:`w L^2 / 8 f`.
+# **At rest** the cables pull at their towers like a parabola under the weight, :math:`w L^2 / 8 f`.
 
 rest = bridge().solve_static()
 mass = 0.06 * 0.12 * steel.density + 0.15 * 2.0 * timber.density
@@ -52,8 +54,8 @@ print(f"pull of the cables {1e-3 * pull:.1f} kN, parabola {1e-3 * H:.1f} kN")
 assert np.isclose(pull, H, rtol=0.03)
 
 # %%
-# **The slowest swing** has one half up and the other down. The cables do not stretch, so that its
-# frequency is that of a string and a beam with two waves [1]_.
+# **The lowest mode** moves one half up and the other down. The cables do not stretch, so its
+# frequency is that of a string and a beam with one full wave [1]_.
 
 slowest = bridge().modes(1, rest).frequencies[0]
 EI, wave = timber.E * 2.0 * 0.15**3 / 12, 2 * np.pi / span
@@ -62,8 +64,8 @@ print(f"swing {slowest:.3f} rad/s, string and beam {string:.3f} rad/s")
 assert np.isclose(slowest, string, rtol=0.05)
 
 # %%
-# **The wind** lifts one half by 40 N/m in gusts, a fiftieth of the weight: at the pace of the
-# swing, and at half of that.
+# **The wind** lifts one half by 40 N/m in gusts, a fiftieth of the weight, at the lowest frequency
+# and at half of it.
 
 quarter, runs = (0.25 * span, 0.0), {}
 for name, pace in ("the pace of the swing", slowest), ("half that pace", 0.5 * slowest):

@@ -1,9 +1,11 @@
 r"""A leaf spring with a shackle
 ============================
 
-The leaf of a cart's spring hangs between a fixed eye and a shackle, a short link that lets the leaf
-get longer when it is pressed flat. How stiff is it when the axle pushes from below, and what does
-the shackle do to that? The leaf is thick in the middle and thin at its ends.
+The stiffness of a leaf spring with a shackle, compared with Castigliano's theorem, and its
+force-displacement curve.
+
+The leaf connects a fixed eye and a shackle, a short link that lets the leaf become longer when it
+is pressed flat. The axle presses from below. The leaf is thick in the middle and thin at its ends.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +16,7 @@ from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, RigidBody, Scene, S
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# A parabola of 1 m between the eyes, 120 mm deep, of spring steel.
+# A parabola of spring steel, 1 m between the eyes and 120 mm deep.
 
 span, depth, width, thick, thin = 1.0, 0.12, 0.06, 12e-3, 6e-3
 steel = StVenantKirchhoff(E=2.06e11, nu=0.3)
@@ -34,7 +36,7 @@ left, right, middle = leaf(0.0), leaf(span), leaf(span / 2)
 
 
 # %%
-# The shackle is 80 mm long, hangs from the frame and carries the right eye.
+# The shackle is 80 mm long, hangs from the chassis and carries the right eye.
 
 link = 0.08
 top = right + [0, link]
@@ -51,8 +53,8 @@ def loaded(force, start=None):
 
 
 # %%
-# **The check**: the shackle hangs straight at first, and acts as a roller. Castigliano's theorem
-# gives the flexibility of the middle as an integral of the moment of a unit force along the leaf.
+# **Check**: at first the shackle is vertical and acts as a roller. Castigliano's theorem gives the
+# flexibility in the middle, an integral of the moment of a unit force along the leaf.
 
 
 def flexibility(x):
@@ -70,8 +72,8 @@ print(f"stiffness at rest: {1e-3 * found:.3f} N/mm, Castigliano {1e-3 * expected
 assert np.isclose(found, expected, rtol=3e-3)
 
 # %%
-# Up to a load that presses the leaf flat. Its eyes move apart on the way, the shackle swings out,
-# and the spring is softer than at rest.
+# The load increases until the leaf is flat. Its eyes move apart, the shackle swings out, and the
+# spring becomes softer.
 
 forces = np.linspace(500, 5000, 10)
 states = []

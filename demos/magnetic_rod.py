@@ -1,10 +1,12 @@
-r"""A magnetic rod that turns around
-================================
+r"""A magnetic rod in an opposing field
+===================================
 
-A soft rod that is magnetised along its axis lies in a magnetic field. Along its magnetisation the
-field keeps it straight; an opposing field wants to turn it around, and above a critical one it
-buckles. The field is no load of the library: it is an energy density, and three lines of a function
-are enough for the critical field, the path beyond it, and motion.
+A soft magnetised rod buckles in an opposing magnetic field, and its path is compared with Euler's
+elastica.
+
+A field along the magnetisation keeps the rod straight. An opposing field makes it buckle above a
+critical value. The field is an energy density, a user-defined function of three lines. It is enough
+for the critical field and the path beyond it.
 """
 
 import matplotlib.pyplot as plt
@@ -16,8 +18,8 @@ from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirc
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# A rod of silicone filled with hard magnetic particles: its magnetisation M goes with the material.
-# The energy per volume in a field B is :math:`-B \cdot F M`, with the deformation gradient F (Zhao,
+# A rod of silicone with hard magnetic particles. Its magnetisation M moves with the material. In a
+# field B, with the deformation gradient F, the energy per volume is :math:`-B \cdot F M` (Zhao,
 # Kim, Cheng, Zhao, "Mechanics of hard-magnetic soft materials", J. Mech. Phys. Solids 124, 2019).
 
 length, height, width = 40e-3, 0.4e-3, 5e-3
@@ -25,8 +27,8 @@ silicone = StVenantKirchhoff(E=1e6, nu=0.3)
 M = 1e5  # A/m, along the axis
 
 # %%
-# The integral of :math:`F e_x` along the rod is r at its end less r at its root: an opposing field
-# acts as a dead force A M B on the end, and the critical field is that of Euler's column.
+# The integral of :math:`F e_x` along the rod is r at its end minus r at its root. So an opposing
+# field acts as a dead force A M B on the end, and the critical field is that of Euler's column.
 
 critical = np.pi**2 / 4 * silicone.E * height**2 / 12 / length**2 / M
 
@@ -43,7 +45,8 @@ print(f"critical field {1e3 * factor * critical:.4f} mT, Euler's {1e3 * critical
 assert np.isclose(factor, 1, rtol=2e-4)
 
 # %%
-# **The path**: the straight rod is followed past the critical field, and the bent one branches off.
+# **The path**: the straight rod is followed beyond the critical field, and the bent one branches
+# off.
 
 trunk = scene.continuation(ds=2e-5 * length, max_load=1.5)
 point = trunk.critical_points[0]
@@ -53,7 +56,7 @@ back, sideways = np.abs(branch.displacement(end).T) / length
 print(f"{point}; bent: {len(branch)} points, all stable: {all(branch.stable[1:])}")
 
 # %%
-# **The check**: Euler's elastica, by the angle at the end, :math:`k = \sin(\theta/2)`.
+# **Check**: Euler's elastica as a function of the angle at the end, :math:`k = \sin(\theta/2)`.
 
 
 def elastica(load):
@@ -68,7 +71,7 @@ print(f"end at most {error:.1e} lengths from the elastica")
 assert error < 2e-3 and all(branch.stable[1:]) and np.isclose(branch.load[-1], 5)
 
 # %%
-# The field against what the end moves, and the rod in some fields.
+# The field against the displacement of the end, and the rod in some fields.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
 fields = np.linspace(1.0005, 5, 200)

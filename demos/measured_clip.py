@@ -1,9 +1,12 @@
 r"""A clip from measured points
 ===========================
 
-A spring clip has the shape of a U. Nobody has its drawing: points along its axis were measured,
-each to a twentieth of a millimetre. A smooth spline through them is the axis of a beam. The clip is
-spread open, and what comes out goes into a file for ParaView and into tables.
+A spring clip whose axis is measured point by point is spread open, and its stiffness is compared
+with Castigliano's theorem.
+
+The clip has the shape of a U. There is no drawing, only points along its axis with an error of a
+twentieth of a millimetre. A smoothing spline through them is the axis of the beam. The results are
+written to a file for ParaView and to tables.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +15,7 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# The file has rows x, y in mm: two legs of 30 mm and half a circle of 8 mm, read off with an error.
+# The file has rows x, y in mm: two legs of 30 mm and half a circle of 8 mm, with errors.
 
 R, L, noise = 8.0, 30.0, 0.05
 s = np.linspace(-L - np.pi / 2 * R, L + np.pi / 2 * R, 160)
@@ -22,8 +25,8 @@ points += noise * np.random.default_rng(4).standard_normal(points.shape) / np.sq
 np.savetxt("clip.csv", points, delimiter=",", header="x, y", comments="")
 
 # %%
-# The axis misses the points by as much as they are wrong, in the root mean square. A curve through
-# every point would have kinks of ten degrees.
+# The root mean square distance of the axis from the points is their error. A curve through all
+# points would have kinks of ten degrees.
 
 mesh = MeshBeam.from_points("clip.csv", height=1.0, elements=48, noise=noise)
 steel = StVenantKirchhoff(E=2.1e5, nu=0.3)  # in MPa
@@ -32,7 +35,8 @@ lower, upper = mesh.p[:, 0], mesh.p[:, -1]
 print(f"length {mesh.lengths.sum():.2f} mm, of the U {2 * L + np.pi * R:.2f} mm")
 
 # %%
-# Forces of 10 N at the ends spread it. ``units`` are said at the colour bar, in files and tables.
+# Forces of 10 N at the ends spread the clip. The ``units`` appear at the colour bar, in files and
+# in tables.
 
 scene = Scene(clip).units("N", "mm").pin("left").fix("right", "r^1")
 state = scene.point_force((0, 10.0), at="right").solve_static()
@@ -53,7 +57,7 @@ assert np.isclose(linear, handbook, rtol=0.02)
 
 # %%
 # Section forces as a table, and stress as a labelled array, need the extra ``arrays``. The largest
-# moment is at the vertex, :math:`F (L + R)`. The file opens in ParaView, with names and units.
+# moment is at the vertex, :math:`F (L + R)`. The file for ParaView has names and units.
 
 table = state.resultants().to_dataframe()
 largest = table.loc[table.M.abs().idxmax()]

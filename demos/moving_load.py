@@ -1,10 +1,11 @@
 r"""A load that crosses a bridge
 ============================
 
-A lorry that creeps over a bridge bends it as a handbook says. One that hurries bends it more: the
-bridge swings while it is crossed, and sags most when the lorry is past its middle. Krylov found how
-much in 1905 [1]_, for a force that runs along a beam; at a speed that no lorry has, it is 1.7 times
-the static sag. Here the force stands on a wheel that slides along the bending beam.
+A force crosses a bridge on a sliding wheel, and the deflection is compared with Krylov's series.
+
+A slow load bends the bridge as in statics. A fast load bends it more, since the bridge vibrates,
+and the deflection is largest when the load has passed the middle. Krylov [1]_ computed it in 1905
+for a constant force. At a speed that no lorry reaches it is 1.7 times the static one.
 """
 
 import matplotlib.pyplot as plt
@@ -13,8 +14,8 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamCable, MeshBeam, RigidBody, Scene, StVenantKirchhoff
 
 # %%
-# The girder is of concrete, pinned at one end and on a roller at the other. The wheel slides on it,
-# and up and down on a carriage, which runs along at a given speed and carries nothing.
+# The girder is of concrete, on a pin and a roller. The wheel slides on it, and vertically on a
+# carriage. The carriage moves at a given speed and carries no load.
 
 span, height, width, load = 20.0, 0.6, 0.4, 5e4                    # m, N
 concrete = StVenantKirchhoff(E=3e10, nu=0.2, density=2500)
@@ -37,8 +38,8 @@ def cross(speed, steps=60):
 
 
 # %%
-# **The check**: Krylov's series for a beam that bends little. Its parameter is the speed over that
-# at which the load needs as long for the span as the lowest mode for half a swing.
+# **Check**: Krylov's series for small deflections. Its parameter is the speed over the critical
+# speed, at which the load crosses the span in half a period of the lowest mode.
 
 EI, mass = 3e10 * width * height**3 / 12, 2500 * width * height
 critical = np.pi / span * np.sqrt(EI / mass)                       # m/s
@@ -64,7 +65,7 @@ for r, motion, sag in zip(ratios, motions, sags):
     assert np.isclose(sag.max(), expected.max(), rtol=0.01)
 
 # %%
-# A bridge that is crossed at 0.6 of that speed sags most, when the load is near its end.
+# At 0.6 of the critical speed the deflection is largest, when the load is near the end.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
 for r, motion, sag in list(zip(ratios, motions, sags))[1::2]:

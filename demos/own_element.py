@@ -1,10 +1,12 @@
-r"""Your own element
-================
+r"""A user-defined element
+======================
 
-The elements of this package are polynomials along the beam and across its section, and a new one is
-a list of what its nodes know. Here is one with second derivatives at its nodes, so that axis and
-sections are of degree five along the beam: a class of four lines. Where its strain has to be
-sampled so that it does not lock, the default formulation finds by counting.
+A new element with second derivatives at its nodes, in a class of four lines, and its order of
+convergence.
+
+Elements are polynomials along the beam and across its section. A new element is a list of the
+degrees of freedom of its nodes. In this one, axis and sections have degree five along the beam. The
+default formulation finds by counting where to sample the strain so that it does not lock.
 """
 
 import matplotlib.pyplot as plt
@@ -16,9 +18,9 @@ from skfem_ancf.elements import ElementBeam
 from skfem_ancf.elements.base import SectionFunctions
 
 # %%
-# The section is 1 and one polynomial whose derivative is 1: :math:`r + Y r_Y`. The coordinates
-# beside r and r_X are named, and each is said by its place across the section and its derivatives
-# along and across; the last list has what a weld holds.
+# The section has one polynomial with derivative 1, so the position is :math:`r + Y r_Y`. The
+# degrees of freedom besides r and r_X are given by a name, the point of the section, and the
+# numbers of derivatives along and across. The last list has those that a clamp fixes.
 
 
 class Quintic(ElementBeam):
@@ -33,8 +35,8 @@ own = Quintic()
 print(own)
 
 # %%
-# A slender cantilever under its own weight, whose tip hangs at 0.9 of its length; L/h = 10 000. Its
-# Poisson ratio is zero, for sections of order 1 know no other.
+# A slender cantilever under its own weight, L/h = 10 000, whose tip moves by 0.9 of the length.
+# Poisson's ratio is zero, because sections of order 1 have no Poisson strain.
 
 length, height, weight, EI = 1.0, 1e-4, 1.0, 0.02179
 soft = StVenantKirchhoff(E=12 * EI / height**4, nu=0.0, density=weight / (9.81 * height**2))

@@ -1,10 +1,12 @@
-r"""Your own material law
-=====================
+r"""A user-defined material
+=======================
 
-Cast iron, wood and many plastics are softer in tension and compression the more they are strained.
-A law is a class with an energy and a stress, in as many lines as its formula takes. It works in
-every element, in statics and motion; its derivatives are found for you. Here is one that saturates,
-bent further than Hooke's law would believe.
+A strip of a user-defined material, whose stress saturates with the strain, is bent by an end
+moment.
+
+Cast iron, wood and many plastics become softer as they are strained. A material is a class with an
+energy and a stress. It works with all elements, in statics and motion; its derivatives are found
+numerically. Here it bends the strip further than Hooke's law.
 """
 
 import matplotlib.pyplot as plt
@@ -17,9 +19,9 @@ from skfem_ancf.materials import Material
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# The law: along each direction of the axes of the beam the stress is :math:`E e_0 \tanh(\varepsilon
-# / e_0)`, which tends to :math:`E e_0`. Energy and stress of the Green-Lagrange strain, whose
-# components xx, yy and 2 xy come first in an array of any shape.
+# The stress along each axis of the beam is :math:`E e_0 \tanh(\varepsilon / e_0)`, which tends to
+# :math:`E e_0`. Energy and stress are functions of the Green-Lagrange strain, an array whose first
+# axis has the components xx, yy and 2 xy.
 
 limit = 0.01
 
@@ -39,7 +41,7 @@ class Saturating(Material):
 
 
 # %%
-# A strip is bent by an end moment: the handbook says to which curvature only for Hooke's law.
+# A strip is bent by an end moment. Handbooks have its curvature for Hooke's law only.
 
 length, height, width = 0.5, 0.01, 0.02
 plastic = Saturating(E=2e9, nu=0.0)
@@ -61,8 +63,8 @@ states = states[1:]
 curvatures = [state.resultants((length / 2, 0)).curvature for state in states]
 
 # %%
-# **The check**: with sections that stay plane, force and moment are integrals of the stretch of the
-# axis and the curvature, which have to give no force and the moment.
+# **Check**: plane sections. Force and moment are integrals over the section, of the stretch of the
+# axis and the curvature. The force must be zero, and the moment the given one.
 
 
 def section(axis, curvature, part):
@@ -80,7 +82,7 @@ for moment, found in zip(moments, curvatures):
     assert np.isclose(found, expected, rtol=2e-3)
 
 # %%
-# At the largest moment both laws; and the stress across the section, which Hooke's law exceeds.
+# Both materials at the largest moment, and their stress across the section.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 4.2), width_ratios=(1.6, 1),
                                   layout="constrained")

@@ -1,9 +1,11 @@
 """A soft pendulum
 ===============
 
-A strip of soft rubber, hinged at one end, is let go from the horizontal. It does not swing as a rod
-does: it lags behind its hinge, and cracks like a whip where it turns round. No energy is lost in
-the computation, so all that the picture shows is mechanics.
+A strip of soft rubber, hinged at one end, swings from the horizontal, with its energy and angular
+momentum checked.
+
+It does not swing like a rigid rod: its tip lags behind, and moves fast like a whip where it turns
+back. The time integration conserves energy.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +15,7 @@ from scipy.integrate import cumulative_simpson
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# A metre of rubber, 15 mm thick.
+# A rubber strip, 1 m long and 15 mm thick.
 
 length, height, width, g = 1.0, 0.015, 0.05, 9.81
 rubber = StVenantKirchhoff(E=3e6, nu=0.45, density=1100)
@@ -23,7 +25,7 @@ scene = Scene(beam).pin("left").gravity((0, -g))
 history = scene.integrate(t_end=1.1, dt=4e-3)
 
 # %%
-# **Energy.** The scheme conserves it, whatever the step; to what Newton's method leaves.
+# **Energy.** The scheme conserves it for any step, up to the tolerance of Newton's method.
 
 total = history.total_energy
 swing = history.kinetic_energy.max()
@@ -31,9 +33,9 @@ print(f"energy: changes by {np.ptp(total) / swing:.1e} of the largest kinetic en
 assert np.ptp(total) < 1e-9 * swing
 
 # %%
-# **Angular momentum.** About the hinge it changes by the moment of the weight alone. Where the
-# centre of mass is follows from the momentum: two integrals over time, of what is independent of
-# how the strip bends.
+# **Angular momentum.** Only the moment of the weight about the hinge changes it. The centre of mass
+# follows from the momentum. So two integrals over time give the angular momentum, however the strip
+# bends.
 
 t = history.t
 mass_x = beam.total_mass * length / 2 + cumulative_simpson(history.momentum[:, 0], x=t, initial=0)
@@ -44,7 +46,7 @@ print(f"angular momentum: off by {error:.1e} of its largest value")
 assert error < 1e-3
 
 # %%
-# A rigid rod would reach the bottom after a quarter of its period, with the speed sqrt(3 g L).
+# A rigid rod reaches the bottom after a quarter of its period, with the tip speed sqrt(3 g L).
 
 tip, speed = history.position((length, 0)), np.hypot(*history.velocity((length, 0)).T)
 below = t[np.argmax(tip[:, 0] < 0)]
@@ -53,7 +55,7 @@ print(f"tip below the hinge after {below:.3f} s (rod: {0.4834 * np.sqrt(length):
 assert speed.max() > 1.1 * np.sqrt(3 * g * length)
 
 # %%
-# The motion, every 0.1 s, and the path of the tip; then a film of it.
+# The motion every 0.1 s, the path of the tip, and a film.
 
 fig, ax = plt.subplots(figsize=(7, 5.6), layout="constrained")
 history.plot("eps_xx", times=np.arange(0, 1.1, 0.1), ax=ax, undeformed=False,

@@ -1,10 +1,12 @@
-r"""Laying a pipe on the sea bed
-============================
+r"""Laying a pipe on the seabed
+===========================
 
-A ship lays a pipe. From its stern the pipe hangs in the water down to the sea bed, and lies there.
-Two numbers matter on board: the pull on the pipe, and how far it is bent where it sags. A catenary
-gives both, but it knows no bending stiffness: it is most bent where it lands, and straight beside.
-Here the pipe is a beam, and the bed an obstacle: where it lands comes out of the contact.
+The shape and the bending moment of a pipe between a ship and the seabed, compared with the
+elastica.
+
+The pull on the pipe and its largest curvature limit the operation. A catenary gives both, but
+without bending stiffness: its curvature is largest at the touchdown point and zero beyond it. Here
+the pipe is a beam and the bed an obstacle. The touchdown point results from the contact.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +16,8 @@ from scipy.integrate import solve_bvp
 from skfem_ancf import Beam, ElementBeamCable, Line, MeshBeam, Scene, Section
 
 # %%
-# A flooded pipe of steel, given by its stiffnesses and its weight in water. It lies straight on the
-# bed at first, then its right end is lifted to the ship, which pulls with its propellers.
+# A flooded steel pipe, given by its stiffnesses and its weight in water. It starts straight on the
+# bed. Then its right end is lifted to the ship, which pulls with its propellers.
 
 depth, length, diameter = 50.0, 250.0, 0.2                    # m
 EA, EI, weight, thrust = 1.2e9, 5.6e6, 400.0, 4e4             # N, N m2, N/m in water, N
@@ -30,8 +32,8 @@ state = scene.solve_static()
 print(state)
 
 # %%
-# **The check**: the elastica under its weight, from the point of landing, where it is level and not
-# bent, to the ship, where it is not bent either. The length between them is an unknown.
+# **Check**: the elastica under its weight, from the touchdown point, with zero slope and curvature,
+# to the ship, with zero curvature. The length between them is an unknown.
 
 
 def along(s, y, length):
@@ -65,7 +67,7 @@ bed = state.contact().total + state.reactions("left").force     # with the pin a
 assert np.allclose(bed, [-thrust, weight * length - exact.y[4, -1]], rtol=1e-4)
 
 # %%
-# The moment along the pipe, and what the catenary would have. On the bed there is none.
+# The moment along the pipe, and that of the catenary. On the bed it is zero.
 
 landing = length - exact.p[0]
 fig, (top, below) = plt.subplots(2, 1, figsize=(8, 6), layout="constrained")

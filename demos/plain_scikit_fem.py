@@ -1,10 +1,12 @@
 """A first beam in plain scikit-fem
 ================================
 
-The same kind of beam as in the demo of the ruler, for those who know scikit-fem: the mesh is a
-``Mesh``, the element an ``Element``, so that stock ``Basis``, ``asm``, ``get_dofs`` and
-``condense`` do the rest. Here the weak forms and Newton's method are written out, term by term as
-in a textbook on nonlinear elasticity. The answer has to be that of a ``Scene``, to round-off.
+A cantilever is solved with plain scikit-fem, by weak forms and Newton's method, and compared with a
+``Scene``.
+
+For users of scikit-fem: the mesh is a ``Mesh`` and the element an ``Element``, so ``Basis``,
+``asm``, ``get_dofs`` and ``condense`` work as usual. The weak forms are written out as in a
+textbook on nonlinear elasticity. The result equals that of a ``Scene`` to round-off.
 """
 
 import matplotlib.pyplot as plt
@@ -16,7 +18,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhof
                         reference_coordinates)
 
 # %%
-# A soft cantilever under its own weight. The unknown is the position r of the material points; its
+# A soft cantilever under its own weight. The unknown is the position r of the material points. Its
 # gradient is the deformation gradient F.
 
 E, nu, density, gravity = 2e8, 0.3, 7800.0, 9.81
@@ -55,8 +57,9 @@ def weight(v, w):
 
 
 # %%
-# A welded face holds the position of all its points: r, and every r_Y across the section. The slope
-# along the axis r_X is a strain there, and free. ``newton`` takes the weight in six steps.
+# A clamp fixes the position of all points of the section: r, and all r_Y across the section. The
+# slope r_X along the axis is a strain there, so it is free. ``newton`` applies the weight in six
+# steps.
 
 clamped = basis.get_dofs("left").all(["r^1", "r^2", *(f"r_Y{k}^{i}" for k in range(3)
                                                       for i in (1, 2))])
@@ -79,7 +82,7 @@ def newton(internal_force, tangent, steps=6, iterations=30):
 
 # %%
 # ``forms.of(beam)`` has the forms of the default formulation, which does not lock, for the same
-# loop. The tip of an inextensible line goes down by 0.90313 m: the textbook's forms are stiffer.
+# loop. The tip of an inextensible line moves down by 0.90313 m: the textbook forms are stiffer.
 
 steel = StVenantKirchhoff(E=E, nu=nu, density=density)
 for formulation in ("continuum", "assumed"):

@@ -1,10 +1,13 @@
-r"""Poisson locking, seen across the section
-========================================
+r"""Poisson locking across the section
+==================================
 
-Bend a rubber: the side that is pulled gets thinner, the side that is pressed gets thicker. An
-element whose section can only be stretched as a whole cannot do that. It then bends as if it were
-stiffer, by :math:`1/(1 - \nu^2)`, on any mesh: that is Poisson locking. Elements of order 2 and
-more have a strain across the section that varies, and follow.
+The deflection and the strain across the section of beams of orders 1 to 4 in bending, which show
+Poisson locking.
+
+In bending, the stretched side of a beam becomes thinner and the compressed side thicker. A section
+of order 1 can only be stretched as a whole. So the beam is too stiff, by the factor
+:math:`1/(1 - \nu^2)` on any mesh: Poisson locking. The strain across sections of order 2 and more
+varies, and does not lock.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +16,7 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# A short, soft beam is bent by a small end moment. Poisson's ratio is that of many plastics.
+# A short beam is bent by a small end moment. Poisson's ratio is that of many plastics.
 
 length, height, width = 1.0, 0.1, 0.1
 plastic = StVenantKirchhoff(E=2e9, nu=0.4)
@@ -32,8 +35,8 @@ def bend(order, formulation="continuum"):
 states = {order: bend(order) for order in (1, 2, 3, 4)}
 
 # %%
-# The formulation "continuum" takes the strain at each point as it is, as the first elements of the
-# kind did. Order 1 is off by just the factor of the textbook, the others are not.
+# The formulation "continuum" integrates the strain at each point, as in the first ANCF elements.
+# Order 1 has exactly the factor of theory, higher orders have the right deflection.
 
 ratios = {order: state.displacement((length, 0))[1] / tip for order, state in states.items()}
 for order, ratio in ratios.items():
@@ -42,8 +45,8 @@ assert np.isclose(ratios[1], 1 - plastic.nu**2, rtol=5e-3)
 assert all(np.isclose(ratios[order], 1, rtol=5e-3) for order in (2, 3, 4))
 
 # %%
-# The strain of the elements across a section in the middle, against Poisson's ratio times that
-# along the beam. Order 1 has none at all.
+# The strain of the elements across a section, against Poisson's ratio times the axial strain. Order
+# 1 has none.
 
 y = height * np.linspace(-0.5, 0.5, 41)
 points = np.array([np.full_like(y, length / 2), y])
@@ -70,8 +73,8 @@ for order in (1, 2):
     ax.set(xlabel="x (m)", ylabel="y (m)")
 
 # %%
-# The default formulation gives elements of order 1 the right bending stiffness, by leaving the
-# coupling to the mean of the section. It cannot give them the strain: take order 2 or more.
+# The default formulation gives order 1 the right bending stiffness: it applies Poisson coupling to
+# the mean of the section only. It cannot give the strain: for this use order 2 or more.
 
 mended = bend(1, "assumed").displacement((length, 0))[1] / tip
 print(f"order 1, default formulation: {mended:.4f}")

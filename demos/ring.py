@@ -1,10 +1,12 @@
 r"""A ring between two plates
 =========================
 
-Squeeze a thin ring between two plates. At first it touches each of them at a point, and gives way
-as the handbook says. Then it gets flat there: the bending at the touching point is gone, and from
-now on it lies on the plate along a growing piece, pressed at the ends of it alone. A quarter of the
-ring is enough, for symmetry.
+A thin ring is compressed between two plates, and its force-displacement curve is compared with the
+elastica.
+
+At first the ring touches each plate at a point and follows the handbook formula. Then it becomes
+flat there. From then on it lies on the plate along a growing length, with contact forces only at
+both ends of it. By symmetry a quarter of the ring is enough.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +17,7 @@ from skfem_ancf import Beam, ElementBeamANCFCubic, Line, MeshBeam, Scene, StVena
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# A ring of spring steel, 100 mm across. Sections in the planes of symmetry stay in them.
+# A ring of spring steel, 100 mm in diameter. Sections in the planes of symmetry stay in them.
 
 radius, height, width = 0.05, 0.5e-3, 0.01
 steel = StVenantKirchhoff(E=2.1e11, nu=0.3)
@@ -35,9 +37,9 @@ def squeeze(way):
 
 
 # %%
-# **The elastica**: the angle of the axis obeys :math:`EI\, \theta'' = F/2 \cos\theta`, where F is
-# the force of a plate. As long as the ring bends away from it where it touches, the unknown is F;
-# then the length of the free part too, at whose end the curvature is zero.
+# **The elastica**: the angle of the axis satisfies :math:`EI\, \theta'' = F/2 \cos\theta`, with the
+# force F of a plate. As long as the ring touches at a point, F is the unknown. Then the free length
+# is an unknown, too, with zero curvature at its end.
 
 
 def elastica(way):
@@ -61,8 +63,8 @@ def elastica(way):
 
 
 # %%
-# The force of the plate, and that of the elastica. The first is linear theory, :math:`F = 2\, w\,
-# EI / 0.1488\, R^3` for two plates that come together by 2 w.
+# The force of the plate, and that of the elastica. The first point is compared with linear theory,
+# :math:`F = 2\, w\, EI / 0.1488\, R^3` for plates that approach by 2 w.
 
 ways = radius * np.array([0.05, 0.15, 0.3, 0.4, 0.5])
 states = [squeeze(way) for way in ways]

@@ -1,11 +1,12 @@
 r"""Bent to a circle: the strain across the section
 ===============================================
 
-An end moment :math:`2 \pi EI / L` bends a straight beam to a full circle. That is a usual test of
-beams. Here it is a test of what happens across the section: the fibres outside are pulled and get
-thinner, those inside get thicker, and on top of that the bent fibres press the section together.
-All of it is compared with the exact solution of the plane body, for beams twenty times and a
-million times as long as high.
+A beam is bent to a circle by an end moment, and the strain across its section is compared with the
+exact plane solution.
+
+The moment :math:`2 \pi EI / L` is a usual test of beams. Here the test is the strain across the
+section: outer fibres become thinner, inner ones thicker, and all are compressed by the bending. The
+beams are twenty to a million times as long as high.
 """
 
 import time
@@ -21,11 +22,10 @@ material = StVenantKirchhoff(E=1e9, nu=0.3)
 curvature = 2 * np.pi / length
 
 # %%
-# **The exact solution.** In pure bending all sections do the same. The fibre Y is bent to a circle
-# of radius r(Y): its stretch is :math:`\kappa r` along the beam and r' across it. Equilibrium of
-# the first Piola-Kirchhoff stress across the section, :math:`P_{yy}' = \kappa P_{xx}`, with free
-# faces, is a boundary value problem for r and :math:`P_{yy}`. Its unknown here is :math:`(r -
-# 1/\kappa)/h`.
+# **The exact solution.** In pure bending all sections are the same. The fibre Y becomes a circle of
+# radius r(Y), with stretch :math:`\kappa r` along the beam and r' across it. Equilibrium of the
+# first Piola-Kirchhoff stress, :math:`P_{yy}' = \kappa P_{xx}`, with free faces is a boundary value
+# problem for r and :math:`P_{yy}`. Its unknown here is :math:`(r - 1/\kappa)/h`.
 
 
 def exact(height):
@@ -56,8 +56,8 @@ def exact(height):
     return -height * y, (slope(*v)**2 - 1) / 2, moment
 
 # %%
-# **The beam**: the moment comes in four quarters, each starting from the last. Points across the
-# middle section are compared with the exact strain, over the largest one.
+# **The beam**: the moment increases in four steps. Points across the middle section are compared
+# with the exact strain, relative to the largest one.
 
 
 def bend(height):
@@ -81,7 +81,7 @@ def bend(height):
 states, Y, strain, eps_yy = [bend(height) for height in (1e-6, 1e-4, 1e-2, 0.05)][-1]
 
 # %%
-# The strain across the section of the thick one: with the rule :math:`-\nu \varepsilon_{xx}` alone
+# The strain across the section of the thick beam. With the rule :math:`-\nu \varepsilon_{xx}` alone
 # it would be a straight line.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 4.6), width_ratios=(1.7, 1),

@@ -1,9 +1,10 @@
 r"""A machine on a rubber block on a leaf spring
 ============================================
 
-A machine stands on a block of rubber that is glued to a steel leaf. How far does it sink, and at
-which frequencies does it heave and rock? The leaf is a beam and the machine a rigid body; the
-rubber is as high as it is wide, no beam: it is a mesh of scikit-fem with forms of its own.
+The static deflection and the natural frequencies of a machine on a rubber block on a leaf spring.
+
+The leaf is a beam and the machine a rigid body. The rubber is as high as it is wide, so it is no
+beam: it is a plane mesh of scikit-fem with user-defined forms.
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +24,7 @@ leaf = Beam(MeshBeam.init_line(np.linspace(0, span, 17), thick), ElementBeamANCF
             StVenantKirchhoff(E=2.06e11, nu=0.3, density=7850), width, name="leaf")
 
 # %%
-# The rubber: 60 mm long, 80 mm high, a compressible neo-Hookean law in plane strain,
+# The rubber: 60 mm long, 80 mm high, a compressible neo-Hookean material in plane strain,
 # :math:`P = \mu (F - F^{-T}) + \lambda \ln J\, F^{-T}`, and the derivative of P along u.
 
 E, nu, rho, long, high = 1e6, 0.45, 1100.0, 0.06, 0.08
@@ -55,7 +56,7 @@ block = Domain(Basis(mesh, ElementVector(ElementQuad2())), residual, tangent,
                BilinearForm(lambda u, v, w: rho * width * dot(u, v)), name="rubber")
 
 # %%
-# All three in one scene: the rubber is welded to the top of the leaf and to the machine.
+# All three in one scene: the rubber is joined to the top of the leaf and to the machine.
 
 machine = RigidBody(mass=20.0, inertia=0.15, position=(span / 2, thick / 2 + high + 0.06),
                     name="machine",
@@ -72,8 +73,8 @@ print(f"{state.verdict}; the machine sinks by {1e3 * sunk:.2f} mm, of which the 
 print("frequencies:", *(f"{f:.2f} Hz" for f in modes.frequencies / (2 * np.pi)))
 
 # %%
-# **The check**: two springs one behind the other. That of the leaf is 48 E I / L^3, that of the
-# rubber between rigid plates is found by scikit-fem alone.
+# **Check**: two springs in series. The stiffness of the leaf is 48 E I / L^3. That of the rubber
+# between rigid plates is computed with scikit-fem alone.
 
 basis = block.basis
 top, bottom = basis.get_dofs("top"), basis.get_dofs("bottom")

@@ -1,10 +1,12 @@
-r"""A shallow arch: snap-through, and what is stable
-================================================
+r"""A shallow arch: snap-through and stability
+==========================================
 
-Push a bent ruler sideways and it snaps through to the other side. Load control jumps there, blind
-for what lies between. Following the equilibrium path shows it: two load maxima, unstable states
-between them, and a second, lopsided path that an arch of some height takes before it reaches its
-own maximum. For a shallow sine arch under a sine load all of it is known in closed form.
+The equilibrium path of a shallow arch, with its bifurcation and its limit load, compared with the
+closed form for a sine load.
+
+Load control jumps at the limit load and does not see the states beyond. Continuation follows the
+path: two limit points with unstable states between them, and an unsymmetric branch that starts
+before the first limit point.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +16,8 @@ from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirc
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# A plastic strip of span 1 m and 20 mm thick, whose axis is half a sine wave of rise 31 mm, hinged
-# at both ends, with a load per length q sin(pi x / span) downwards.
+# A plastic strip with a span of 1 m and a thickness of 20 mm. Its axis is half a sine wave with a
+# rise of 31 mm, hinged at both ends. The load per length is q sin(pi x / span), downwards.
 
 span, height, width, rise = 1.0, 20e-3, 0.05, 31e-3
 plastic = StVenantKirchhoff(E=2e9, nu=0.3)
@@ -27,10 +29,10 @@ mesh = MeshBeam.init_curve(lambda x: np.array([x, rise * np.sin(wave * x)]),
 beam = Beam(mesh, ElementBeamANCFCubic(2), plastic, width)
 
 # %%
-# **Closed form** (Fung and Kaplan [1]_): when the wave has the amplitude b in place of the rise a,
-# the axis carries the thrust :math:`N = \pi^2 EA (a^2 - b^2) / 4 l^2` and the arch the load
-# :math:`q = \pi^4 EI (a - b) / l^4 + \pi^2 N b / l^2`. At the thrust :math:`4 \pi^2 EI / l^2` it
-# can buckle to a full wave.
+# **Closed form** (Fung and Kaplan [1]_): if the amplitude is b instead of the rise a, the thrust is
+# :math:`N = \pi^2 EA (a^2 - b^2) / 4 l^2` and the load
+# :math:`q = \pi^4 EI (a - b) / l^4 + \pi^2 N b / l^2`. At the thrust :math:`4 \pi^2 EI / l^2` the
+# arch can buckle to a full wave.
 
 
 def load_of(b):
@@ -43,7 +45,7 @@ limit = load_of(np.sqrt((rise**2 - 4 * EI / EA) / 3))
 lopsided = load_of(np.sqrt(rise**2 - 16 * EI / EA)) / limit
 
 # %%
-# The path, with loads relative to that limit.
+# The path, with loads relative to this limit load.
 
 scene = Scene(beam).pin("left").pin("right")
 scene.line_load(lambda x: (0 * x[0], -limit * np.sin(wave * x[0])))
@@ -52,8 +54,8 @@ for point in path.critical_points:
     print(point)
 
 # %%
-# The first point where stability is lost is a bifurcation; the maximum comes later. Both are within
-# two per cent of the closed form, which takes slopes as small.
+# The first loss of stability is a bifurcation; the limit point comes later. Both are within 2 % of
+# the closed form, which assumes small slopes.
 
 first = path.critical_points[0]
 print(f"bifurcation: closed form {lopsided:.4f}; limit point: closed form 1")
@@ -62,8 +64,8 @@ assert np.isclose(path.limit_points()[0], 1, rtol=0.02)
 assert path.stable[0] and path.stable[-1] and not all(path.stable)
 
 # %%
-# The lopsided path leaves there, and comes back to the first one further down: on the way the arch
-# is at no load stable. A load that is kept snaps it through.
+# The unsymmetric branch starts there and returns to the first path at a lower load. All its states
+# are unstable under dead load, so the arch snaps through.
 
 branch = scene.continuation(branch=first, ds=1e-3, max_load=1.5, steps=40)
 assert not any(branch.stable[1:10])

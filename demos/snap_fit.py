@@ -1,9 +1,11 @@
 r"""A snap-fit, pressed in and pulled out
 =====================================
 
-A tapered arm of plastic rides up on a pin and comes back. How much force does that take with
-friction, and how much without? :meth:`skfem_ancf.Scene.run` goes through named steps without
-inertia: each equilibrium is found from the one before, and friction remembers the way.
+The force to press a snap-fit in and to pull it out, with and without friction.
+
+A tapered plastic arm rides over a pin and comes back. :meth:`skfem_ancf.Scene.run` computes named
+steps without inertia. Each equilibrium starts from the one before, and friction depends on the
+path.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +14,8 @@ import numpy as np
 from skfem_ancf import Beam, Circle, ElementBeamANCF, MeshBeam, Scene, Steps, StVenantKirchhoff
 
 # %%
-# An arm 20 mm long, 2 mm high at its root and 1 mm at its end, 5 mm wide; a pin of radius 1.5 mm
-# that overlaps it by 0.5 mm. Millimetres, newtons and megapascals.
+# The arm is 20 mm long and 5 mm wide, 2 mm high at its root and 1 mm at its end. The pin has a
+# radius of 1.5 mm and overlaps the arm by 0.5 mm. Units are millimetres, newtons and megapascals.
 
 length, radius, overlap, width = 20.0, 1.5, 0.5, 5.0
 plastic = StVenantKirchhoff(E=2000.0, nu=0.35, density=1e-9)
@@ -39,8 +41,8 @@ smooth, rough = run(0.0), run(0.2)
 print(smooth, rough, sep="\n")
 
 # %%
-# **Check**: on its way the pin acts at the angle of the face without friction, and is turned from
-# there by the angle of friction: forwards on the way in, backwards on the way out.
+# **Check**: without friction the force is normal to the face. With friction it is turned from there
+# by the angle of friction: forwards on the way in, backwards on the way out.
 
 for step, sign in (("insert", 1), ("pull", -1)):
     at = smooth.during(step)
@@ -53,7 +55,7 @@ for step, sign in (("insert", 1), ("pull", -1)):
     assert np.allclose(np.tan(found - slope), sign * 0.2, atol=0.01)
 
 # %%
-# The force over the stroke, and the arm on its way.
+# The force against the stroke, and the arm on its way.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 4.2), width_ratios=(1, 1.5),
                                   layout="constrained")

@@ -1,9 +1,11 @@
 r"""A soft finger under pressure
 ============================
 
-A finger of silicone is pumped up from one side: pressure acts on its lower face, bends it, and
-turns with it. Such a load has no fixed direction, and bends farther than a weight would: the finger
-curls. How far is compared with the differential equation of an elastic line under such a load.
+A silicone finger bends under pressure, and its shape is compared with the elastica under a follower
+load.
+
+The pressure acts on its lower face and turns with it. So it bends the finger further than a dead
+load: the finger curls.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +16,7 @@ from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene
 from skfem_ancf.visuals.matplotlib import plot_state
 
 # %%
-# A finger 100 mm long and 6 mm thick, wide enough for plane strain, of a neo-Hookean law.
+# A finger 100 mm long and 6 mm thick, of neo-Hookean material in plane strain.
 
 length, height, width = 0.1, 6e-3, 0.03
 silicone = NeoHookean(E=1e6, nu=0.45, plane="strain")
@@ -29,8 +31,9 @@ def pumped(pressure, start=None):
 
 
 # %%
-# **The elastic line**, with angle, moment, normal and shear force, and the place of its points: the
-# load p b stays normal to it, on the lower face, which gets longer. Lengths in L, forces in EI/L^2.
+# **The elastica**, with angle, moment, normal and shear force, and position. The load p b stays
+# normal to it, and acts on the lower face, which becomes longer. Lengths are in L, forces in
+# EI/L^2.
 
 
 def line(full):

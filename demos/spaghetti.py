@@ -1,10 +1,12 @@
 """Flying spaghetti
 ================
 
-A soft rod lies on nothing. For two and a half seconds one of its ends is pushed and twisted; then
-it flies, tumbling and folding. Free flight is a hard test of a computation: nothing holds the rod,
-so momentum, angular momentum and energy have to stay what they were when the load ended. The
-numbers are those with which Simo and Vu-Quoc [1]_ made the rod famous.
+A free soft rod is accelerated by a force and a moment, then flies, with constant momentum, angular
+momentum and energy.
+
+The load acts on one end for two and a half seconds. Then the rod tumbles and folds without any
+support. In free flight all three quantities must stay constant. The numbers are those of Simo and
+Vu-Quoc [1]_.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +15,7 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section
 
 # %%
-# The paper gives stiffnesses and inertias, no material: a section by its numbers.
+# The paper gives stiffnesses and inertias, no material. So the section is given by its numbers.
 
 EA, GA, EI, rhoA, rhoI = 1e4, 1e4, 500.0, 1.0, 10.0
 rod = Section.numbers(EA=EA, EI=EI, GA=GA, rhoA=rhoA, rhoI=rhoI)
@@ -25,8 +27,8 @@ mesh = MeshBeam.init_line(np.linspace(0, length, 11), height, origin=start,
 beam = Beam(mesh, ElementBeamANCFCubic(2), section=rod)
 
 # %%
-# A force of 8 to the right and a moment of 80, both on the lower end, until t = 2.5. The step of
-# the load is said, so that a time step ends there.
+# A force of 8 to the right and a moment of 80 act on the lower end until t = 2.5. As a breakpoint,
+# this is the end of a time step.
 
 push, moment, release = 8.0, 80.0, 2.5
 
@@ -40,8 +42,8 @@ scene.moment("left", moment, amplitude=pulse)
 history = scene.integrate(t_end=13.0, dt=0.05, breakpoints=[release])
 
 # %%
-# **What has to be.** The momentum is the impulse of the force, 20 to the right and none upwards.
-# From the release on nothing changes any more.
+# **Conservation.** The momentum is the impulse of the force, 20 to the right. It is constant after
+# the release, as are angular momentum and energy.
 
 free = history.t > release + 1e-9
 momentum, angular = history.momentum[free], history.angular_momentum[free]
@@ -54,7 +56,7 @@ assert np.allclose(momentum, [push * release, 0], rtol=0, atol=1e-7)
 assert np.ptp(angular) < 1e-6 and np.ptp(energy) < 1e-6
 
 # %%
-# The rod every second, coloured by the strain along it, and where its middle flies.
+# The rod every second, coloured by its axial strain, and the path of its middle.
 
 fig, ax = plt.subplots(figsize=(9.5, 4.6), layout="constrained")
 history.plot("eps_xx", times=np.arange(14), ax=ax, thickness=1, undeformed=False,

@@ -1,9 +1,12 @@
 """A meander spring, pulled until it is straight
 =============================================
 
-Flat springs that are cut from sheet follow a wave. Pulled a little, such a spring is as soft as the
-bending of its arms allows; pulled far, the arms lie along the force and it gets stiff. The wave is
-the stress-free state of the beam here: a curve given as a function.
+A flat meander spring is pulled until it is straight, and its initial stiffness is compared with
+Castigliano's theorem.
+
+Such springs are cut from sheet. At small forces the bending of the arms makes the spring soft. At
+large forces the arms align with the force, and the spring becomes stiff. The wave is the reference
+configuration of the beam, a curve given by a function.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +16,7 @@ from scipy.integrate import quad
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene
 
 # %%
-# Three periods of y = 16 mm sin(x / 10 mm), in rubber 1 mm thick and 10 mm wide.
+# Three periods of y = 16 mm sin(x / 10 mm), of rubber, 1 mm thick and 10 mm wide.
 
 unit, amplitude, periods = 0.01, 1.6, 3
 height, width = 0.1 * unit, unit
@@ -36,8 +39,8 @@ def pull(force, start=None):
 
 
 # %%
-# **The check**: for small forces Castigliano's theorem gives the travel of the end as an integral
-# over the wave, of M^2 / EI with the lever y and of N^2 / EA.
+# **Check**: for small forces Castigliano's theorem gives the displacement of the end as an integral
+# along the wave, of M^2 / EI with the lever y and of N^2 / EA.
 
 EI, EA = rubber.E * width * height**3 / 12, rubber.E * width * height
 
@@ -54,7 +57,7 @@ print(f"stiffness at rest {found:.4f} N/m, Castigliano {stiffness:.4f} N/m")
 assert np.isclose(found, stiffness, rtol=0.01)
 
 # %%
-# Larger and larger forces, each solution the start of the next.
+# Increasing forces. Each solution starts from the one before.
 
 forces = np.array([0.125, 0.5, 2, 8]) * stiffness * end[0]
 states = [pull(forces[0])]

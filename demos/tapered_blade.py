@@ -1,9 +1,10 @@
 """A tapered blade and its section forces
 ======================================
 
-The blade of a small wind turbine gets thinner and narrower towards its tip. Wind presses on it, its
-own weight acts along it. The diagrams of normal force, shear force and bending moment, from which
-one designs, come with the solution: from equilibrium of the bent blade, not from derivatives of
+The deflection and the section forces of a tapered wind turbine blade under wind and weight.
+
+The blade becomes thinner and narrower towards its tip. The diagrams of normal force, shear force
+and bending moment follow from equilibrium of the deformed blade, not from derivatives of
 displacements.
 """
 
@@ -14,7 +15,8 @@ from scipy.integrate import quad
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# Four metres of glass fibre laminate, standing up. Thickness and width are functions of the place.
+# A vertical blade of glass fibre laminate, 4 m long. Thickness and width are functions of the
+# position.
 
 length, g = 4.0, 9.81
 laminate = StVenantKirchhoff(E=2.5e10, nu=0.25, density=1900)
@@ -42,8 +44,8 @@ print(f"deflection of the tip {1e3 * state.displacement((0, length))[0]:.1f} mm;
       f"fields from equilibrium: {state.recovered == {0: ''}}")
 
 # %%
-# **The check by hand**: force and moment at the root from the loads, where the blade stood; the
-# deflection from the integral of M m / EI, with a bit of shear on top.
+# **Check**: force and moment at the root from the loads on the undeformed blade, and the deflection
+# from the integral of M m / EI. Shear adds a little.
 
 N, Q, M = (getattr(state.resultants((0, 0)), name) for name in "NQM")
 shear, lever = tip_wind * length / 3, 0.75 * length

@@ -1,9 +1,11 @@
 r"""A thermostat that snaps
 =======================
 
-A shallow strip of two metals, pinned at both ends, snaps through when it is hot enough, and snaps
-back when it has cooled, but not at the same temperature: an iron switches on later than off. Two
-cycles of heat show between which temperatures.
+A shallow bimetal strip snaps through when it is heated and back when it is cooled, at temperatures
+compared with arch theory.
+
+The strip is pinned at both ends. It snaps back at a lower temperature: the thermostat switches off
+at one temperature and on at another. Two cycles of heating and cooling show both temperatures.
 """
 
 import matplotlib.pyplot as plt
@@ -13,8 +15,9 @@ from skfem_ancf import (Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, St
                         StVenantKirchhoff)
 
 # %%
-# A strip 30 mm long and 0.2 mm high that rises by 0.25 mm as a sine. Its layers want to be longer
-# by 9e-6 for each kelvin, and by as much shorter. Millimetres, newtons, kelvin.
+# A strip 30 mm long and 0.2 mm high with a rise of 0.25 mm, a sine. Without bond, one layer would
+# become longer by 9e-6 per kelvin, the other shorter by as much. Units are millimetres, newtons and
+# kelvin.
 
 span, height, rise, alpha, modulus = 30.0, 0.2, 0.25, 9e-6, 1.4e5
 below, above = (StVenantKirchhoff(E=modulus, nu=0.3, thermal_expansion=x) for x in (alpha, -alpha))
@@ -55,7 +58,7 @@ print(f"the arch snaps at {there:.2f} K, and back at {back:.2f} K")
 assert np.allclose(switched, (there, back, there, back), atol=0.3)
 
 # %%
-# Both cycles take the same way, and the strip before and after it has snapped.
+# Both cycles follow the same path. On the right, the strip before and after it snaps.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 4.2), layout="constrained")
 history.plot_curve(heat(history.sensors.t), ("middle", 1), ax=left, marker=".",

@@ -1,10 +1,11 @@
 r"""A tuning fork
 =============
 
-Strike a tuning fork and hold it by its stem: it sings for a minute, although a hand damps
-everything that it can feel. The prongs swing against each other, so that the stem has next to
-nothing to carry. The natural modes show which one that is, and how still the foot of the stem stays
-in it.
+The natural modes of a tuning fork, compared with a two-dimensional solution, and the force at its
+foot in each mode.
+
+A tuning fork sounds for a minute although a hand holds it. In that mode the prongs move against
+each other, and the stem carries almost no force.
 """
 
 import matplotlib.pyplot as plt
@@ -17,7 +18,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# Two prongs, joined by half a circle, from one bar of steel; the curve is given by its arc length.
+# Two prongs and half a circle, from one steel bar. The curve is a function of its arc length.
 
 height, bend, prong, stem = 4e-3, 10e-3, 73e-3, 35e-3
 steel = StVenantKirchhoff(E=2.06e11, nu=0.29, density=7850)
@@ -41,8 +42,8 @@ mesh = MeshBeam.init_curve(curve, nodes, height, tangent)
 fork = Beam(mesh, ElementBeamANCFCubic(2), steel, height, name="fork")
 
 # %%
-# **The check**: the fork without a stem, flying freely, against the plane body in stock scikit-fem:
-# plane stress, quadratic quads. Three rigid motions come first.
+# **Check**: the fork without stem and support, against a plane body in stock scikit-fem, in plane
+# stress. The first three modes are rigid motions.
 
 quad = fork.mesh.to_meshquad(8, 6)
 basis = Basis(quad, ElementVector(ElementQuad2()))
@@ -62,7 +63,7 @@ print("free fork:", free.round(2), "Hz; plane body:", plane.round(2), "Hz")
 assert np.allclose(free, plane, rtol=3e-3)
 
 # %%
-# With its stem, whose foot is held.
+# With its stem, whose foot is clamped.
 
 foot = (0, -bend - stem)
 axis = MeshBeam.init_line(np.linspace(0, stem, 7), height, origin=foot, angle=np.pi / 2)
@@ -72,7 +73,7 @@ modes = scene.modes(3)
 frequencies = modes.frequencies / (2 * np.pi)
 
 # %%
-# Of each mode the force in the foot, while an end of a prong moves by 1 mm.
+# The force at the foot in each mode, for 1 mm at the end of a prong.
 
 fig, axes = plt.subplots(1, 3, figsize=(9.6, 4.8), sharey=True, layout="constrained")
 end, felt = curve(arc + prong), []
@@ -84,15 +85,14 @@ for k, (frequency, ax) in enumerate(zip(frequencies, axes)):
     ax.set(xlabel="x (m)", ylabel="y (m)" if k == 0 else "")
 
 # %%
-# The mode that sings is the second one: in it the foot carries a quarter or less of what it does in
-# the others. Its frequency is that of the free fork.
+# The second mode sounds, at the frequency of the free fork: its force at the foot is the smallest.
 
 singing = int(np.argmin(felt))
 assert felt[singing] < 0.3 * min(f for k, f in enumerate(felt) if k != singing)
 assert np.isclose(frequencies[singing], free[0], rtol=0.01)
 
 # %%
-# The motion from that shape, let go: one period.
+# The motion from this shape, for one period.
 
 start = modes.mode(singing, 2e-3 / unit)
 history = scene.integrate(1 / frequencies[singing], 1 / 32 / frequencies[singing], start=start)

@@ -1,10 +1,11 @@
 r"""A sweep with uncertainty
 ========================
 
-A snap hook of plastic is bent in use. Its modulus depends on the batch, its thickness on the mould,
-the force on the hand. How far does the tip go, and how often farther than it may? A hundred
-samples, spread evenly by SciPy's quasi-Monte Carlo, answer in seconds; a formula for small
-deflections says where they would lie if the hook were not bent far.
+The scatter of the deflection of a plastic snap hook with uncertain modulus, thickness and force, by
+a sweep.
+
+How often is the deflection larger than allowed? A hundred samples, by SciPy's quasi-Monte Carlo,
+take seconds. The result is compared with that of the formula for small deflections.
 """
 
 import matplotlib.pyplot as plt
@@ -34,16 +35,16 @@ def deflection(scene):
 
 
 # %%
-# Sobol points in the unit cube, made normal deviates, made samples; a sweep over them. In a script
-# of one's own, ``workers=8`` computes in eight processes, ``client=`` on a cluster.
+# Sobol points in the unit cube become normal deviates, then samples. A sweep solves them all. In a
+# script, ``workers=8`` uses eight processes, ``client=`` a cluster.
 
 deviates = norm.ppf(qmc.Sobol(len(names), seed=0).random_base2(7))
 samples = median * np.exp(deviation * deviates)
 tips = sweep(hook, dict(zip(names, samples.T)), deflection)["value"]
 
 # %%
-# **The check**: small deflections are :math:`4 F L^3 / E b t^3`, a product of powers, so that their
-# logarithm is normal, with the deviation that follows. A hundredth of the force has to show this.
+# **Check**: small deflections are :math:`4 F L^3 / E b t^3`, a product of powers. So their
+# logarithm is normal, with a known deviation. A hundredth of the force must reproduce this.
 
 formula = 4 * median[2] * length**3 / (median[0] * width * median[1]**3)
 sigma = np.hypot(np.hypot(deviation[0], 3 * deviation[1]), deviation[2])
@@ -55,7 +56,8 @@ assert np.isclose(np.exp(small.mean()), formula, rtol=0.01)
 assert np.isclose(small.std(), sigma, rtol=0.05)
 
 # %%
-# Bent far, the hook gets stiffer: it goes less far, and scatters less. And what matters most?
+# At large deflections the hook becomes stiffer: median and scatter are smaller. The rank
+# correlations show which input matters most.
 
 large = np.log(tips)
 print(f"large: median {1e3 * np.exp(large.mean()):.2f} mm, deviation {large.std():.4f}")

@@ -47,7 +47,9 @@ def test_a_demo_has_the_form_of_a_gallery(demo):
     tree = ast.parse(text)
     title, line, blank, *prose = ast.get_docstring(tree).splitlines()
     assert line == "=" * len(line) and len(title) <= len(line) and not blank
-    assert not title.endswith(".") and " ".join(prose).count(".") >= 2
+    first, *more = "\n".join(prose).split("\n\n")  # the first one is under the thumbnail
+    assert not title.endswith(".") and len(first.split()) <= 25 and more
+    assert re.fullmatch(r"[^.?!]+\.", re.sub(r"\d\.\d", "", " ".join(first.split()))), first
     assert 40 <= text.count("\n") <= 100 and text.count("\n# %%\n") >= 2
     assert any(isinstance(node, ast.Assert) for node in ast.walk(tree))
 

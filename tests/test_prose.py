@@ -84,6 +84,15 @@ def test_docstrings_and_errors_have_no_dialect():
     assert not found, "\n".join(found)
 
 
+def test_demos_have_no_dialect():
+    found = [f"{demo.stem}: {words}" for demo in sorted((ROOT / "demos").glob("*.py"))
+             for text in (ast.get_docstring(ast.parse(demo.read_text(encoding="utf-8"))),
+                          *re.findall(r"^# %%\n((?:#.*\n)*)", demo.read_text(encoding="utf-8"),
+                                      re.MULTILINE))
+             for words in dialect(text.replace("\n# ", "\n"))]
+    assert not found, "\n".join(found)
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_sentences_of_a_page_are_short(page):
     found = sentences(page.read_text(encoding="utf-8"))
