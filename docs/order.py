@@ -8,7 +8,7 @@ ORDER = [
     "tapered_blade", "catenary", "spring", "leaf_spring", "measured_clip", "rubber_block",
     "bimetal", "thermostat", "snap_fit", "bow", "soft_finger", "compliant_gripper", "live_view",
     "frame",
-    "cylinder", "pipe_laying", "capstan", "ring",
+    "cylinder", "pipe_laying", "capstan", "wiper_blade", "ring",
     "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",
     "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "bridge_train",
     "hanging_bridge", "tuning_fork", "damping",

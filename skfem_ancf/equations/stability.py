@@ -16,6 +16,8 @@ logger = logging.getLogger(__name__)
 
 #: Stiffness that holds what supports leave free, over that of the loads.
 HELD = 1e-6
+#: Difference of motions of nodes that are one, over the largest.
+SAME = 0.2
 #: Forces that are zero, over those that a strain of one would cause.
 NOTHING = 1e-20
 #: Largest difference of a tangent from its transpose, relative, that is round-off.
@@ -170,6 +172,38 @@ def is_held(system: Any, u: Array, multipliers: Array) -> bool:
         return system.solver.inertia() == Inertia(0, False)
     except NO_FACTORS:
         return False
+
+
+def motion_in_words(system: Any, u: Array, v: Array) -> str:
+    """Which member moves most along the direction v of the coordinates, and how, in words.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    u, v
+        Displacement, and a direction, shape (N,) both.
+    """
+    def nodes(member, s):
+        return np.reshape(v[s], (-1, member.nd))[:, :2]
+
+    member, s = max(zip(system.members, system.slices), key=lambda of: np.abs(nodes(*of)).max())
+    moves, name = nodes(member, s), getattr(member, "name", None)
+    who = "the scene" if name is None and len(system.members) > 1 else (
+        "the beam" if name is None else str(name))
+    largest = moves[np.argmax(np.hypot(*moves.T))]
+    d = largest / np.hypot(*largest)
+    d = np.round(d if d[np.argmax(np.abs(d))] > 0 else -d, 3) + 0.0
+    if np.abs(moves - moves.mean(axis=0)).max() < SAME * np.abs(moves).max():
+        return f"{who} along ({d[0]:.3g}, {d[1]:.3g})"
+    x = np.reshape(u[s] + member.q0_local, (-1, member.nd))[:, :2]
+    tangents = np.gradient(x, axis=0) if len(x) > 1 else x
+    tangents /= np.maximum(np.hypot(*tangents.T), 1e-300)[:, None]
+    along = np.sum(moves * tangents, axis=1)
+    if np.abs(along - along.mean()).max() < SAME * np.abs(along).max():
+        return f"{who} along its axis"
+    at = x[np.argmax(np.hypot(*moves.T))]
+    return f"{who} at ({at[0]:.4g}, {at[1]:.4g}) along ({d[0]:.3g}, {d[1]:.3g})"
 
 
 def weak_at_rest(system: Any) -> str:

@@ -104,8 +104,7 @@ def solve_static(system: System, u: Array | None, memory: Array | None,
         raise Interrupted(str(error), _state(system, error.state)) from None
     except ConvergenceError as error:
         if system.constraints.missing_supports:
-            raise SupportError(f"{system.constraints.missing_supports}. No stable equilibrium was "
-                               "found in which the loads hold what is free") from error
+            raise SupportError(str(error)) from error
         state, message = _state(system, error.state), str(error)
         if state.checks.findings:
             message += (f". At the load level {state.load:.6g} already "

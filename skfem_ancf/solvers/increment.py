@@ -17,14 +17,14 @@ from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
                         Target, Unknowns, equilibrium, workspace_for_iterations)
 from .outcome import Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed, Unstable
-from .touching import found_touching
+from .touching import SOON, found_touching
 
 logger = logging.getLogger(__name__)
 
 #: Corrections of the pressure of obstacles in a load step, at most.
 AUGMENTED = 50
-#: Relative error of an equilibrium that is only a start, and iterations to it, at most.
-NEAR, SOON = 1e-2, 15
+#: Relative error of an equilibrium that is only a start.
+NEAR = 1e-2
 
 
 class Route(NamedTuple):
@@ -57,7 +57,8 @@ class Route(NamedTuple):
 class Options(NamedTuple):
     """Of the iteration of a load step: the method "mixed" or "newton", iterations at most.
 
-    ``watched``: it is given up where the mixed iteration does not seem to converge.
+    ``watched``: it is given up where the mixed iteration does not seem to converge. ``close``: the
+    start is close to the equilibrium.
     """
 
     route: Route
@@ -65,6 +66,7 @@ class Options(NamedTuple):
     tol: float
     most: int
     watched: bool = False
+    close: bool = False
 
 
 class Increment:
@@ -123,15 +125,16 @@ class Increment:
         if not contacts.obstacles:
             return self._from_start(options)
 
-        def solve(begin, rough):
-            chosen = options
+        def solve(begin, rough, most=None):
+            chosen = options._replace(most=min(options.most, most or options.most))
             if rough:
                 chosen = options._replace(tol=max(options.tol, NEAR), most=min(options.most, SOON))
             return self._from_start(chosen) if begin is None else self.iterate(begin, chosen)
 
         before = self.start.u, options.route.acting(self.start.load)[1]
         return found_touching(contacts, before, self.time, solve,
-                              lambda u: self.system.strain_energy(u, self.time), StepFailed)
+                              lambda u: self.system.strain_energy(u, self.time), StepFailed,
+                              options.close)
 
     def _from_start(self, options):
         """From the last equilibrium; where a law is left behind, by way of its first moduli.

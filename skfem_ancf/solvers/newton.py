@@ -29,6 +29,8 @@ MAX_ITERATIONS = 10000
 #: Iterations of load steps before the next strategy has its turn, and steps that are cut at the
 #: begin before.
 FEW, CUT = 60, 3
+#: Equilibria found that nothing holds, after which without friction no further one is looked for.
+UNHELD = 2
 #: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, the others one iteration.
 METHODS = ("mixed", "newton", "auto")
 _NAMES = {"mixed": "the mixed iteration", "newton": "Newton's method"}
@@ -131,6 +133,8 @@ class Search:
         more work than the loads: that of a slack rope.
     attempts : list of Attempt
         What has been tried.
+    loose : str
+        What nothing holds at an equilibrium that was found, in words.
     """
 
     def __init__(self, system: System, u: Array | None, memory: Array | None, steps: Steps,
@@ -138,12 +142,12 @@ class Search:
         self.system, self.rules, self.stable, self.progress = system, steps, stable, progress
         self.held_by_loads = bool(system.constraints.missing_supports)
         self.attempts: list[Attempt] = []
-        self.soft = False
+        self.soft, self.loose = False, ""
         self.furthest: StaticResult | None = None
         self.other: StaticResult | None = None
         self._folded: StaticResult | None = None
         self._failure: Exception | None = None
-        self._spent, self._unstable = 0, False
+        self._spent, self._unheld, self._unstable = 0, 0, False
         contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
         memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
@@ -170,6 +174,8 @@ class Search:
                 self._note(strategy.name, str(failure))
                 self._unstable = self._unstable or isinstance(failure, Unstable)
                 self._failure = failure
+                if self._unheld == UNHELD and not self.rubs:
+                    break
                 continue
             if result:
                 self._note(strategy.name)
@@ -212,7 +218,9 @@ class Search:
                 f"{load:.6g}, and steps below {self.rules.min_step:g} are not tried. ")
         if self.rules.method == "auto":
             text += f"Tried: {_listed(self.attempts)}. "
-        if isinstance(failure, Unstable):
+        if self.held_by_loads:
+            text = f"{self._missing()}. Tried: {_listed(self.attempts)}"
+        elif isinstance(failure, Unstable):
             text += ("No stable one was found either from there: stable=False takes the unstable "
                      "one, scene.continuation() follows the path")
         else:
@@ -220,6 +228,16 @@ class Search:
                      "elements or a larger max_iterations may help")
         result.message, result.attempts = text, tuple(self.attempts)
         return ConvergenceError(text, result)
+
+    def _missing(self):
+        """What would hold a scene that neither supports nor loads do, in words."""
+        text = self.system.constraints.missing_supports
+        text += ". No stable equilibrium was found in which the loads hold what is free"
+        if self.loose:
+            text += f": at the one found nothing holds {self.loose}"
+        if self.touches and not self.rubs:
+            text += ". Obstacles without friction hold nothing along their surface: friction= does"
+        return text
 
     # what strategies ask
 
@@ -233,6 +251,11 @@ class Search:
         """True if springs push the scene out of its place before any load."""
         force = self.system.internal_force(self.route.u, 0.0, 0.0)
         return self.route.proportional and bool(np.any(force * self.system.constraints.mask))
+
+    @property
+    def touches(self) -> bool:
+        """True if there are obstacles."""
+        return bool(self.system.forces.contacts.obstacles)
 
     @property
     def rubs(self) -> bool:
@@ -249,6 +272,13 @@ class Search:
         """True if supports have displacements, so that loads can be applied before these."""
         moves = self.system.constraints.moves or self.system.constraints.drives
         return self.route.proportional and moves
+
+    def at_rest(self) -> StaticResult:
+        """The displacement to start from, if it is an equilibrium; raises StepFailed."""
+        result = self._beginning(self.route)
+        step = Increment(self.system, result, 1.0, self._options(self.route, "mixed")._replace(
+            most=0))
+        return step.reached(step.iterate())
 
     def load_steps(self, method: str, route: Route | None = None,
                    start: StaticResult | None = None, **changes: Any) -> StaticResult:
@@ -274,11 +304,12 @@ class Search:
             self._spent += step.record.iterations
         return step.reached(found)
 
-    def descent(self, method: str, eased: bool = False,
-                route: Route | None = None) -> StaticResult:
+    def descent(self, method: str, eased: bool = False, route: Route | None = None,
+                most: int = descent.DESCENT) -> StaticResult:
         """The equilibrium that corrections of bounded size lead down to under the full load.
 
         ``eased``: first without friction; bodies stick from where they have come to rest.
+        ``most``: iterations at most.
         """
         route, system = route or self.route, self.system
         if (not (system.symmetric or self.held_by_loads or self.rubs)
@@ -287,7 +318,9 @@ class Search:
         result = self._beginning(route)
         options, contacts = self._options(route, method), system.forces.contacts
         step, down = Increment(system, result, 1.0, options), descent.Descent(system)
-        far = options._replace(most=min(descent.DESCENT, 7 * self.rules.max_iterations))
+        far = options._replace(most=min(most, 7 * self.rules.max_iterations))
+
+        contacts.put_back(self._memory)
 
         def iterate(begin: Any) -> Equilibrium:
             return step.iterate(begin, far, down)
@@ -311,7 +344,7 @@ class Search:
 
     def _options(self, route, method, watched=False):
         watched = (watched and method == "mixed" and self.rules.method == "auto"
-                   and not self.system.forces.contacts.obstacles)
+                   and not self.touches)
         return Options(route, method, self.rules.tol, self.rules.max_iterations, watched)
 
     def _wanted(self, route):
@@ -321,7 +354,9 @@ class Search:
     def _require_good(self, result):
         """Raise StepFailed unless what is free is held, and no axis turns back in an element."""
         if self.held_by_loads and not stability.is_held(self.system, result.u, result.multipliers):
-            raise StepFailed("the loads do not hold what the supports leave free")
+            self.loose, self._unheld = self._loose(result.u), self._unheld + 1
+            raise StepFailed("the loads do not hold what the supports leave free" + (
+                f": nothing holds {self.loose}" if self.loose else ""))
         if self.rules.method == "auto" and self.system.folded(result.u):
             again = self._folded is not None and np.allclose(
                 result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
@@ -329,10 +364,18 @@ class Search:
             if not again:  # where two come to it the mesh is too coarse, which a warning says
                 raise StepFailed("the axis turns back within an element")
 
+    def _loose(self, u):
+        """What is not held at an equilibrium, in words, by the factors that have told so."""
+        try:
+            directions = descent.Descent(self.system).directions(1)
+        except NO_FACTORS:
+            return ""
+        return stability.motion_in_words(self.system, u, directions[0][0]) if directions else ""
+
     def _elsewhere(self, route, found):
         """True if a strategy but the first comes to where the load does not drive the scene."""
         if (not (self.attempts and self.stable and route.proportional) or self.held_by_loads
-                or self.system.forces.contacts.obstacles):
+                or self.touches):
             return False
         return not descent.heads_on(self.system, self._beginning(route), found.u, 1.0)
 
@@ -345,7 +388,7 @@ class Search:
                         memory=memory)
         loads, times = ((x, x) for x in step.options.route.acting(1.0))
         again = Increment(self.system, start, 1.0, step.options._replace(
-            route=Route(found.u, None, loads, times)))
+            route=Route(found.u, None, loads, times), close=True))
         again.record = step.record
         return again.solve(self.stable)
 
@@ -362,7 +405,7 @@ class Search:
         if size < self.rules.first_step:  # a strategy has tried what the step was cut from
             result.rejected, cuts = 1, int(self._unstable)
         options = self._options(route, rules.method, watched=rules.few)
-        few = FEW * (3 if self.system.forces.contacts.obstacles else 1)  # contact takes its time
+        patience = 3 if self.touches else 1  # contact takes its time
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
             while result.load < 1.0:
                 load = min(1.0, result.load + size)
@@ -377,7 +420,7 @@ class Search:
                     cuts += isinstance(failure, Unstable)
                     logger.info("load %.6g failed (%s), step cut", load, failure)
                     size, found = 0.25 * (load - result.load), None
-                    many = rules.few and spent + step.record.iterations >= few
+                    many = rules.few and spent + step.record.iterations >= FEW * patience
                     if stable and (cuts > descent.CUTS or size < rules.min_step or many):
                         found = step.rescue(failure)
                     none = rules.few and not result.steps and result.rejected > CUT
@@ -398,9 +441,9 @@ class Search:
                     self.furthest = result  # what an error has
                 cuts = 0
                 logger.info("load %.6g converged in %d iterations", load, step.record.iterations)
-                if step.record.iterations <= max(8, rules.max_iterations // 3):
+                if step.record.iterations <= patience * max(8, rules.max_iterations // 3):
                     size *= 2.0
-                if rules.few and spent >= few and result.load < 1.0 and not result.doubt:
+                if rules.few and spent >= FEW * patience and result.load < 1.0 and not result.doubt:
                     raise StepFailed(f"the full load was not reached in {spent} iterations")
         return result
 

@@ -23,6 +23,8 @@ logger = logging.getLogger(__name__)
 #: much, and what is left of one that has failed.
 FEW, LARGER, CUT = 0.7, 1.5, 0.25
 FOLLOWED, JUMPED = "followed", "jumped"
+#: Iterations of corrections of bounded size in an increment, at most.
+BOUNDED = 20
 #: Jumps one after the other, each of the smallest increment.
 JUMPS = 3
 #: Largest displacement of a node in an increment that is not the smallest: in the first relative to
@@ -54,10 +56,17 @@ def first(system: System, t: float, u: Array | None, memory: Array | None, rules
     """The equilibrium at a time, from a displacement (N,) that need be none, or from rest.
 
     From a displacement what is missing to equilibrium, as the force of a support that is no longer
-    there, is reduced to nothing. ``memory`` is what is left behind there at obstacles.
+    there, is reduced to nothing. ``memory`` is what is left behind there at obstacles. What only
+    loads and obstacles hold need not be held before these act.
     """
     with system.stopped_at(t):
-        result = Search(system, u, memory, rules, stable, False).find()
+        search = Search(system, u, memory, rules, stable, False)
+        if search.held_by_loads:
+            try:
+                return Instant(t, search.at_rest(), "at rest")
+            except StepFailed:
+                logger.debug("t = %.6g: something acts", t)
+        result = search.find()
     return Instant(t, result, result.attempts[-1].strategy)
 
 
@@ -65,8 +74,9 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
            stable: bool) -> Iterator[Instant]:
     """Equilibria from the one given on, one after the other.
 
-    Each is looked for from the one before, by the mixed iteration and by Newton's method. An
-    increment that fails is cut, and one that moves the scene far: several equilibria may be near.
+    Each is looked for from the one before, by the mixed iteration, then by Newton's method or,
+    where obstacles or only loads hold the scene, by corrections of bounded size. An increment that
+    fails is cut, and one that moves the scene far: several equilibria may be near.
     Where the smallest fails, because the equilibrium gives way there, the strategies of
     :func:`~skfem_ancf.solvers.newton.solve_static` lead from the last one to another, as under
     loads that stay.
@@ -123,25 +133,35 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     far = FAR * system.size
     if last.rate is not None:
         far = max(NEAR * system.size, FASTER * last.rate * (t - last.t))
+
+    def by_iteration(method):
+        options = Options(route, method, rules.tol, rules.max_iterations, method == "mixed",
+                          close=True)
+        step = Increment(system, start, 1.0, options)
+        with np.errstate(all="ignore"):  # what overflows is seen in the residual
+            return step.reached(step.solve(stable))
+
     with system.stopped_at(t), system.forces.contacts.lent():
-        for method in ("mixed", "newton"):
-            options = Options(route, method, rules.tol, rules.max_iterations, method == "mixed")
-            step = Increment(system, start, 1.0, options)
+        search = Search(system, last.result.u, last.result.memory, rules, stable, False)
+        bounded = search.touches or search.held_by_loads
+        for method in ("mixed", "descent" if bounded else "newton"):
             try:
-                with np.errstate(all="ignore"):  # what overflows is seen in the residual
-                    found = step.solve(stable)
+                result = (search.descent("mixed", most=BOUNDED) if method == "descent" else
+                          by_iteration(method))
             except StepFailed as failure:
                 failed = failure
                 continue
-            moved = largest_displacement(system, found.u - last.result.u)
+            moved = largest_displacement(system, result.u - last.result.u)
             if moved > far and not smallest:
                 failed = StepFailed(f"a node moves by {moved:.3g}")
-                break
+                continue
+            if method == "descent":
+                result.rubbed += last.result.rubbed
             way = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
-            return Instant(t, step.reached(found), way, moved / (t - last.t))
+            return Instant(t, result, way, moved / (t - last.t))
         if not smallest:
             raise failed
         logger.info("t = %.6g: %s, going on to another equilibrium", t, failed)
-        result = Search(system, last.result.u, last.result.memory, rules, stable, False).find()
+        result = search.find()
         result.rubbed += last.result.rubbed
     return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")

@@ -54,13 +54,17 @@ SOFT = Strategy("Newton's method", lambda search: (
 NEWTON = Strategy("Newton's method", lambda search: (
     search.at_once and not search.soft and search.one_step("newton")))
 LOADS_FIRST = Strategy("loads before supports", _loads_first)
+# where points come and go at obstacles corrections of bounded size are fewer than load steps
+TOUCHING = Strategy("descent", lambda search: (
+    search.at_once and search.touches and search.stable and search.descent("mixed")))
 # where springs push at rest, steps of the load do not lead there
 FEW_MIXED = Strategy("smaller load steps", lambda search: (
     not search.pushed_at_rest and _few_steps(search, "mixed")))
 FEW_NEWTON = Strategy("smaller load steps of Newton's method",
                       lambda search: _few_steps(search, "newton"))
 # down to a minimum of the potential by corrections of bounded size
-DESCENT = Strategy("descent", lambda search: search.stable and search.descent("mixed"))
+DESCENT = Strategy("descent", lambda search: (
+    search.stable and not (search.at_once and search.touches) and search.descent("mixed")))
 NEWTON_DESCENT = Strategy("descent by Newton's method",
                           lambda search: search.stable and search.descent("newton"))
 WITHOUT_FRICTION = Strategy("descent without friction at first", lambda search: (
@@ -70,9 +74,9 @@ NEWTON_STEPS = Strategy("load steps of Newton's method as small as may be",
                         lambda search: search.load_steps("newton"))
 
 #: Of scenes that supports hold.
-STRATEGIES = (MIXED, SOFT, FEW_MIXED, NEWTON, LOADS_FIRST, DESCENT, NEWTON_DESCENT,
+STRATEGIES = (MIXED, SOFT, TOUCHING, FEW_MIXED, NEWTON, LOADS_FIRST, DESCENT, NEWTON_DESCENT,
               WITHOUT_FRICTION, FEW_NEWTON, MIXED_STEPS, NEWTON_STEPS)
 
 #: Of scenes that only loads or obstacles hold, whose tangent at rest is singular.
-HELD_BY_LOADS = (LOADS_FIRST, DESCENT, NEWTON_DESCENT, WITHOUT_FRICTION, NEWTON, FEW_MIXED,
-                 FEW_NEWTON)
+HELD_BY_LOADS = (LOADS_FIRST, TOUCHING, DESCENT, NEWTON_DESCENT, WITHOUT_FRICTION, NEWTON,
+                 FEW_MIXED, FEW_NEWTON)

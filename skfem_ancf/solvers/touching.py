@@ -39,6 +39,8 @@ LEAST = 1e-3
 LEFT = 0.5
 #: By how much obstacles are made harder at once.
 RUNG = 30.0
+#: Iterations of an equilibrium that is close to the last one, at most: at once, and from a start.
+AT_ONCE, SOON = 8, 15
 #: Times that they are found too soft in a load step at most, and that what is done at once is less.
 TIMES, HALVED = 4, 2
 
@@ -99,21 +101,48 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
 
 def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
-                   failed: type[Exception]) -> Any:
+                   failed: type[Exception], close: bool = False) -> Any:
     """An equilibrium in contact at the time t, from a displacement and its time.
 
     The obstacles have the memory of the begin of the load step; at its end that of its end, if
     they had to be harder. ``solve`` is a function of what has been found, or None for the begin,
-    and of whether a start is wanted only; it raises ``failed``.
+    of whether a start is wanted only, and of iterations at most; it raises ``failed``. ``close``:
+    the start is close to what is looked for: few iterations tell.
     """
-    flags, before = lies_near(contacts, *start), contacts.tables.memory.copy()
+    before = contacts.tables.memory.copy()
     climb = _Climb(contacts, start, t, solve, energy, failed)
-    if flags is not None:
+    ways = [_at_once, _soon] if close else [_let_go, _from_soft, _directly]
+    flags = lies_near(contacts, *start)
+    for way in ways:
+        if way is _let_go and flags is None:
+            continue
         try:
-            return climb.up(_let_go(climb, flags))
+            return climb.up(way(climb, flags))
         except failed:
+            if way is ways[-1]:
+                raise
             contacts.tables.memory[:] = before
-    return climb.up(_directly(climb))
+
+
+def _at_once(climb, _):
+    """What is found in few iterations."""
+    return climb.solve(None, False, AT_ONCE)
+
+
+def _soon(climb, flags):
+    """As :func:`_from_soft`, in few iterations."""
+    return _from_soft(climb, flags, SOON)
+
+
+def _from_soft(climb, _, most=None):
+    """What is found from the equilibrium on soft obstacles without friction.
+
+    There points come and go one after the other no longer: the correction that presses one out of
+    the obstacle does not throw off those beside it.
+    """
+    with climb.contacts.eased(soft=True):
+        found = climb.solve(None, True)
+    return climb.solve(found, False, most)
 
 
 def _let_go(climb, flags):
@@ -128,11 +157,13 @@ def _let_go(climb, flags):
     return climb.solve(found, True)
 
 
-def _directly(climb):
-    """What is found without more ado; where that fails, from obstacles that are eased."""
+def _directly(climb, _):
+    """What is found without more ado; where that fails, from obstacles without friction."""
     try:
         return climb.solve(None, False)
     except climb.failed:
+        if not climb.contacts.anchored:
+            raise
         with climb.contacts.eased():
             found = climb.solve(None, True)
         return climb.solve(found, False)

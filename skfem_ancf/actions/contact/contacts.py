@@ -166,8 +166,8 @@ class Contacts:
             self.put_back(before)
 
     @contextmanager
-    def eased(self) -> Iterator[None]:
-        """For the time of an evaluation there is no friction or, if there is none, less stiffness.
+    def eased(self, soft: bool = False) -> Iterator[None]:
+        """For the time of an evaluation there is no friction, and if ``soft`` less stiffness.
 
         Iterations converge there that do not with the whole, to a place that is close to theirs.
         """
@@ -177,7 +177,7 @@ class Contacts:
         try:
             memory[ANCHORED] = 0.0
             for x in numbers:
-                x[STIFFNESS] *= 1.0 if sticks else EASED
+                x[STIFFNESS] *= EASED if soft else 1.0
             yield
         finally:
             memory[ANCHORED] = sticks

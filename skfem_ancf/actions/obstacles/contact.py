@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import binary_closing
 
 from ...core.errors import InputError, require_index
 from ...core.types import Array
@@ -22,7 +23,9 @@ class Contact:
     force
         What obstacles do to each of them, shape (2, n); their sum is ``total``.
     pressure
-        The force normal to the obstacle by the area of the stress-free surface, shape (n,).
+        The force normal to the obstacle by the area of the stress-free surface that touches, shape
+        (n,). It is balanced at the nodes and linear between them: the forces of single points
+        ripple along an element, which the equilibrium of its degrees of freedom does not see.
     gap
         Distance from the obstacle, negative by the penetration, shape (n,).
     nearest
@@ -63,9 +66,40 @@ def contact_of(state: Any, obstacle: Any = None) -> Contact:
     found, nearest = [], np.inf
     t = state.load if state.t is None else state.t
     v = None if state.t is None else np.array(state.v)
-    for k, *values in contacts.pushes(np.array(state.u), v, t):
+    pushes = contacts.pushes(np.array(state.u), v, t)
+    for (_, group), (k, *values) in zip(contacts.groups, pushes):
         if which is None or k == which:
             nearest = min(nearest, float(values[3].min()))
+            values[2] = _balanced(group, values[2])
             found.append([x[..., values[2] > 0.0] for x in values])
     places, force, pressure, gap = (np.concatenate(x, axis=-1) for x in zip(*found))
     return Contact(places, force, pressure, gap, nearest)
+
+
+def _balanced(group, pressure):
+    """The pressure (n,) whose nodal forces are those of the points; zero where they are free.
+
+    The force on a node by the area of its shape function, as of a lumped mass, where the surface
+    touches: free points between two that touch count, if these are less than an element apart. The
+    places of both nodes have the functions number 0 and half; each side of the beam is by itself.
+    """
+    n, m, half = group.elements, group.points, len(group.weights) // 2
+    side = np.tile(np.arange(m) // (m // 2), n)
+    side[-2 * m:] = 2 + np.repeat((0, 1), m)  # the ends of the beam, each as a whole
+    ends = np.array([group.first, group.first + 2 * half])
+    ends[1, -2 * m:] = ends[0, -2 * m:]
+    nodes = np.unique(ends * 4 + side, return_inverse=True)[1].reshape(2, -1)
+    touching = pressure > 0.0
+    closed = touching.copy()
+    for k in (0, 1):
+        along = np.pad(touching[:-2 * m].reshape(-1, 2, m // 2)[:, k].ravel(), m)
+        filled = binary_closing(along, np.ones(m // 2 + 1))[m:-m]
+        closed[:-2 * m].reshape(-1, 2, m // 2)[:, k] = filled.reshape(-1, m // 2)
+    shares = group.weights[[0, half]] * group.areas
+    force, area = (np.bincount(nodes.ravel(), (shares * factor).ravel())
+                   for factor in (pressure, closed))
+    mean = (force / np.where(area > 0.0, area, 1.0))[nodes]
+    x = group.starts[:2].reshape(2, 2 * n, m // 2)
+    way = np.cumsum(np.hypot(*np.diff(x, axis=2, prepend=x[..., :1])), axis=1)
+    xi = (way / np.maximum(way[:, -1:], 1e-300)).ravel()
+    return np.where(touching, (1.0 - xi) * mean[0] + xi * mean[1], 0.0)
