@@ -9,6 +9,8 @@ twentieth of a millimetre. A smoothing spline through them is the axis of the be
 written to a file for ParaView and to tables.
 """
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -22,13 +24,15 @@ s = np.linspace(-L - np.pi / 2 * R, L + np.pi / 2 * R, 160)
 angle, leg = np.clip(s / R, -np.pi / 2, np.pi / 2), np.maximum(np.abs(s) - np.pi / 2 * R, 0.0)
 points = np.column_stack([R * np.cos(angle) - leg, R * np.sin(angle)])
 points += noise * np.random.default_rng(4).standard_normal(points.shape) / np.sqrt(2)
-np.savetxt("clip.csv", points, delimiter=",", header="x, y", comments="")
+out = Path("out")
+out.mkdir(exist_ok=True)
+np.savetxt(out / "clip.csv", points, delimiter=",", header="x, y", comments="")
 
 # %%
 # The root mean square distance of the axis from the points is their error. A curve through all
 # points would have kinks of ten degrees.
 
-mesh = MeshBeam.from_points("clip.csv", height=1.0, elements=48, noise=noise)
+mesh = MeshBeam.from_points(out / "clip.csv", height=1.0, elements=48, noise=noise)
 steel = StVenantKirchhoff(E=2.1e5, nu=0.3)  # in MPa
 clip = Beam(mesh, ElementBeamANCFCubic(2), steel, width=5.0, name="clip")
 lower, upper = mesh.p[:, 0], mesh.p[:, -1]
@@ -64,7 +68,7 @@ largest = table.loc[table.M.abs().idxmax()]
 print(largest[["x", "y", "N", "M"]].round(2).to_string())
 data = state.to_xarray(["displacement", "S_xx"])
 print(f"S_xx up to {float(data.S_xx.max()):.0f} {data.S_xx.units}")
-state.save("clip.vtu")
+state.save(out / "clip.vtu")
 assert np.isclose(abs(largest.M), 10.0 * (L + R), rtol=0.02)
 assert np.isclose(abs(largest.M) / (5.0 / 6), float(data.S_xx.max()), rtol=0.1)
 
