@@ -1,9 +1,12 @@
 r"""How evenly a wiper blade presses
 ================================
 
-The blade of a wiper is a strip of spring steel that is bent when nobody touches it. Pressed on the
-glass in its middle it lies flat, and its shape decides how hard it presses where. Which shape
-presses evenly, and what does one do that is bent more in the middle and less at its tips?
+A curved wiper blade is pressed flat on the glass, and its contact pressure is compared with that of
+beam theory.
+
+The blade is a strip of spring steel that is bent before it touches the glass. Held in its middle it
+lies flat, and its shape decides where it presses and how hard. Which shape presses evenly?
+What does a blade do that is bent more in the middle and less at its tips?
 """
 
 import matplotlib.pyplot as plt
