@@ -1,12 +1,12 @@
 r"""How evenly a wiper blade presses
 ================================
 
-A curved wiper blade is pressed flat on the glass, and its contact pressure is compared with that of
-beam theory.
+The contact pressure along two wiper blades with different curvatures, compared with the pressure
+that they are made for.
 
-The blade is a strip of spring steel that is bent before it touches the glass. Held in its middle it
-lies flat, and its shape decides where it presses and how hard. Which shape presses evenly?
-What does a blade do that is bent more in the middle and less at its tips?
+A wiper blade is a strip of spring steel that is curved in its reference configuration. Pressed on
+the glass by a force in its middle it lies flat, and its initial curvature determines the pressure.
+One blade presses evenly. The other is curved more in the middle and less at its tips.
 """
 
 import matplotlib.pyplot as plt
@@ -15,9 +15,10 @@ import numpy as np
 from skfem_ancf import Beam, ElementBeamCable, Line, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
-# A force per length :math:`p = F / L` along a half that is held in the middle bends it by the
-# moment :math:`p (L / 2 - s)^2 / 2`. A blade of that curvature over :math:`E I` lies flat under it.
-# One that presses less to its tips, :math:`p = (2 F / L) (1 - 2 s / L)`, has a cubic moment.
+# A force per length :math:`p = F / L` bends one half, clamped in the middle, by the moment
+# :math:`p (L / 2 - s)^2 / 2`. A blade whose initial curvature is this moment over :math:`E I` lies
+# flat under it. A blade that presses less at its tips, :math:`p = (2 F / L) (1 - 2 s / L)`, has a
+# cubic moment.
 
 length, height, width, force, E = 0.6, 1e-3, 8e-3, 10.0, 2e11
 EI, half = E * width * height**3 / 12, length / 2
@@ -44,8 +45,8 @@ def pressed(curvature):
 
 
 # %%
-# **The check**: the pressure of both is that which they were made for, to 1 % but at both
-# tips and at the kink in the middle, where a node has the mean of what is beside it.
+# **Check**: both have the pressure that they are made for, to 1 %. Excluded are the tips, and the
+# kink of the pressure in the middle, where the node has the mean of both sides.
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.8, 3.8), layout="constrained")
 for name, curvature, wanted in (
