@@ -429,7 +429,7 @@ def test_refined_tapers_have_the_heights_of_their_functions():
     ([0.1, 0.2], InputError, "height has 2 entries for 3"),
     ([0.1, 0.2, "x"], InputError, "height of line 2"), ([0.1, -0.2, 0.1], InputError, "line 1"),
     (lambda s: s - 0.5, MeshError, "-0.5 at 0: end the mesh"),
-    ([0.1, 0.1, lambda s: 0.1 + (s > 0.5)], MeshError, "line 2: .*no smooth function"),
+    ([0.1, 0.1, lambda s: 0.1 + (s > 0.5)], MeshError, "line 2: .*not smooth"),
     (lambda s: 1 / 0, CallbackError, "ZeroDivisionError")])
 def test_heights_that_cannot_be(height, error, message):
     with pytest.raises(error, match=message):

@@ -251,7 +251,7 @@ def test_round_trip(mesh, tmp_path):
 
 def test_load_of_another_mesh(tmp_path):
     MeshQuad().save_npz(tmp_path / "quad.npz")
-    with pytest.raises(MeshError, match=r"quad.npz' holds no beam: \['height', 'lengths'"):
+    with pytest.raises(MeshError, match=r"quad.npz' contains no beam: \['height', 'lengths'"):
         MeshBeam.load(tmp_path / "quad.npz")
 
 
@@ -307,10 +307,10 @@ def circle(s):
      "radius of curvature 1 is below half the height 1.005; use a smaller height"),
     (lambda s: np.array([s, 5 * s ** 2]), np.linspace(-1, 1, 5), 0.25,
      "folds near s = (0|-0.03125): "),
-    (lambda s: np.array([s ** 3, 0 * s]), [-1, 0, 1], 0.1, "stands still at s = 0"),
-    (lambda s: np.array([s ** 3, 0 * s]), [-1, 1], 0.1, "stands still at s = 0"),
-    (lambda s: 0 * np.array([s, s]), [0, 1], 0.1, "stands still"),
-    (lambda s: np.array([s ** 2, 0 * s]), [-1, -0.3, 1], 0.1, "stands still|folds"),
+    (lambda s: np.array([s ** 3, 0 * s]), [-1, 0, 1], 0.1, "is zero at s = 0"),
+    (lambda s: np.array([s ** 3, 0 * s]), [-1, 1], 0.1, "is zero at s = 0"),
+    (lambda s: 0 * np.array([s, s]), [0, 1], 0.1, "is zero"),
+    (lambda s: np.array([s ** 2, 0 * s]), [-1, -0.3, 1], 0.1, "is zero|folds"),
     (lambda s: np.array([s, s > 0.5]) * 1.0, [0, 0.4, 1], 0.1,
      "r jumps, or its derivative does not fit, between s = 0.4 and 1"),
     (lambda s: s, [0, 1], 0.1, r"r\(s\) must have shape \(2, 2\), got \(2,\)"),

@@ -177,7 +177,7 @@ class Few(Formulation):
         "I", width=0.06, web=0.01, flange=0.03)), "does not fit in a height of 0.05"),
     (lambda: Beam(taper(), ElementBeamANCF(1), STEEL, section=I).kernel, "order 2 or more"),
     (lambda: Beam(taper(), ElementBeamANCF(2), STEEL, section=I,
-                  formulation="strain-split").kernel, "mean of the strain over a section"),
+                  formulation="strain-split").kernel, "mean strain of the section"),
 ])
 def test_errors_teach(make, words):
     with pytest.raises(InputError, match=words):

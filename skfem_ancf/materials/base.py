@@ -1,4 +1,4 @@
-"""The interface of a material law: energy, stress and moduli from the Green-Lagrange strain."""
+"""Interface of constitutive laws: energy, stress and moduli from the Green-Lagrange strain."""
 
 from __future__ import annotations
 
@@ -22,39 +22,39 @@ PLANES = ("stress", "strain")
 class Material(Immutable):
     """An isotropic hyperelastic material in plane stress or plane strain.
 
-    A material does not change; :meth:`replace` returns a changed copy.
-
-    A user-defined law is a subclass that defines :meth:`energy` and :meth:`stress`, and
-    :meth:`moduli` if the complex step of ``stress`` is not good enough; in plane stress also
-    :meth:`thickness_stretch` if Cauchy stress is asked for. Scenes with it run in NumPy; a
-    :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial` is compiled. A subclass of a law of
-    the package that overrides ``stress`` alone has the energy of that stress, integrated from zero
-    along the strain, and its moduli. Strains and stresses are in the beam's frame (first index
-    along the axis, second across the section):
+    A material is immutable; :meth:`replace` returns a changed copy. Strains and stresses are in the
+    beam's frame (first index along the axis, second across the section):
 
     * strain: Green-Lagrange, ``(eps_xx, eps_yy, 2 eps_xy)``, shape (3, ...),
     * stress: second Piola-Kirchhoff, ``(S_xx, S_yy, S_xy)``, shape (3, ...).
+
+    A user-defined law is a subclass that defines :meth:`energy` and :meth:`stress`, and
+    :meth:`moduli` where the complex step of ``stress`` does not work; in plane stress also
+    :meth:`thickness_stretch` if Cauchy stress is needed. It runs in NumPy; a
+    :class:`~skfem_ancf.materials.pointwise.PointwiseMaterial` is compiled. A subclass of a law of
+    the package that overrides ``stress`` alone gets the energy by integration of the stress along
+    the strain from zero, and the moduli by the complex step.
 
     Parameters
     ----------
     E
         Young's modulus (force per area), positive: a number, or a function of material coordinates
-        (x, y), of the parameter of the axis and the distance from it. The energy is proportional
-        to it.
+        (x, y), the parameter of the axis and the distance from it. The energy is proportional to
+        it.
     nu
-        Poisson ratio, in (-1, 1/2), or 1/2 itself in plane stress.
+        Poisson ratio, in (-1, 1/2), or 1/2 in plane stress.
     density
-        Mass per volume, positive: a number or a function of (x, y) too;
-        None if neither mass nor gravity is asked for.
+        Mass per volume, positive: a number or a function of (x, y);
+        None if neither mass nor gravity is needed.
     plane
         "stress" or "strain".
     shear_correction
-        "auto": ``10 (1 + nu) / (12 + 11 nu)`` where the section cannot carry the shear parabola
-        (order 1, 2 and Patel-Shabana), else 1; of profiles and layers what
-        :func:`skfem_ancf.sections.shear.shear_factor` says. "paper": that number at every order. Or
-        a positive number.
+        "auto": ``10 (1 + nu) / (12 + 11 nu)`` where the section cannot represent the shear parabola
+        (order 1, 2 and Patel-Shabana), else 1; for profiles and layers
+        :func:`skfem_ancf.sections.shear.shear_factor`. "paper": that number at every order. Or a
+        positive number.
     thermal_expansion
-        Strain for a degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.
+        Strain per degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.
 
     Raises
     ------
@@ -86,10 +86,7 @@ class Material(Immutable):
         return callable(self.E) or callable(self.density)
 
     def reference(self) -> tuple[Material, Callable[..., Any] | None]:
-        """This material with the modulus 1, and the modulus as a function (x, y).
-
-        Of a modulus that is a number itself and None.
-        """
+        """The material with E = 1, and the function E(x, y); ``(self, None)`` for a number E."""
         return (self.replace(E=1.0), self.E) if callable(self.E) else (self, None)
 
     @property
@@ -99,16 +96,16 @@ class Material(Immutable):
 
     @property
     def axial_modulus(self) -> float:
-        """Stress over strain along a fibre: E, or E / (1 - nu^2) in plane strain."""
+        """Uniaxial modulus: E, or E / (1 - nu^2) in plane strain."""
         return self.E / (1.0 if self.plane == "stress" else 1.0 - self.nu**2)
 
     @property
     def lateral_ratio(self) -> float:
-        """Strain across a fibre over that along it, negative: nu, or nu / (1 - nu)."""
+        """Ratio of lateral contraction to axial strain: nu, or nu / (1 - nu) in plane strain."""
         return self.nu / (1.0 if self.plane == "stress" else 1.0 - self.nu)
 
     def shear_factor(self, element: HasShear) -> float:
-        """The factor k_s on the shear modulus for sections of an element."""
+        """Factor k_s on the shear modulus for sections of an element."""
         require_like("element", element, "beam element", "carries_shear_parabola")
         if isinstance(self.shear_correction, float):
             return self.shear_correction
@@ -121,7 +118,7 @@ class Material(Immutable):
         return rectangle
 
     def replace(self, **changes: Any) -> Material:
-        """A copy with some arguments of its constructor changed, as ``replace(E=2e8)``.
+        """A copy with changed constructor arguments, as ``replace(E=2e8)``.
 
         Raises
         ------
@@ -138,7 +135,7 @@ class Material(Immutable):
                                        "thermal_expansion"))
 
     def law(self, k_s: float = 1.0) -> Law:
-        """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
+        """The law with corrected shear, as a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
         self._require_number()
         if not self._fits("stress", "energy"):
@@ -151,11 +148,11 @@ class Material(Immutable):
 
     def _require_number(self):
         if callable(self.E):
-            raise InputError(f"the modulus E of {self!r} is a function of material coordinates: "
-                             "only a Beam knows where it is asked. Use replace(E=number)")
+            raise InputError(f"the modulus E of {self!r} is a function of material coordinates, "
+                             "which need a Beam. Use replace(E=number)")
 
     def _fits(self, name, other="stress"):
-        """False if ``other`` was overridden in a subclass of the class that defines a method."""
+        """False if a subclass of the class that defines ``name`` overrides ``other``."""
         def depth(name):
             return next(k for k, cls in enumerate(type(self).__mro__) if name in vars(cls))
 
@@ -170,14 +167,15 @@ class Material(Immutable):
 
     @property
     def lame(self) -> float:
-        """Lame's first parameter, which grows without bound as nu goes to 1/2."""
+        """Lame's first parameter, unbounded as nu goes to 1/2."""
         return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
 
     def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
-        """:meth:`law` as a sum: the law of the shear modulus, and what Lame's parameter multiplies.
+        """:meth:`law` as a sum of a part with the shear modulus and a part with Lame's parameter.
 
-        The formulation "assumed" integrates the second with fewer points, to keep sections from
-        locking. The first must be positive in every strain. None if the law has no such parts.
+        The formulation "assumed" integrates the second with fewer points, against volumetric
+        locking. The first part must be positive definite at every strain. None if there is no such
+        split.
         """
         return None
 
@@ -225,13 +223,13 @@ class Material(Immutable):
 
 
 def _number_or_function(name, value):
-    """A positive number, or a function of material coordinates, which beams ask."""
+    """Check a positive number, or a function of material coordinates."""
     return value if callable(value) and not isinstance(value, type) else require_positive(
         name, value)
 
 
 def hooke(E: float, nu: float, plane: str) -> Array:
-    """Moduli (3, 3) of Hooke's law, for (eps_xx, eps_yy, 2 eps_xy); plane "stress" or "strain"."""
+    """Hooke's moduli (3, 3) for (eps_xx, eps_yy, 2 eps_xy); plane "stress" or "strain"."""
     if plane == "stress":
         a, b = E / (1.0 - nu**2), E * nu / (1.0 - nu**2)
     else:
@@ -241,7 +239,7 @@ def hooke(E: float, nu: float, plane: str) -> Array:
 
 
 class ShearCorrected:
-    """A law whose shear strain enters multiplied by sqrt(k_s), so that k_s G is its modulus."""
+    """A law with the shear strain multiplied by sqrt(k_s), so that its shear modulus is k_s G."""
 
     def __init__(self, law: Law, k_s: float) -> None:
         self.base = law
@@ -262,7 +260,7 @@ class ShearCorrected:
 
 
 def _require_derivatives(law, material):
-    """Raise InputError unless the stress of a law of the user's is that of its energy."""
+    """Raise InputError unless the stress of a user-defined law is the derivative of its energy."""
     E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
     try:
         stress, *stresses = (np.asarray(law.stress(E + s * d)) for s in (0.0, -1.0, 1.0))
@@ -285,10 +283,10 @@ def _require_derivatives(law, material):
 
 
 class OverriddenLaw:
-    """The law of a subclass that overrides ``stress``.
+    """The law of a subclass that overrides ``stress`` alone.
 
-    The energy is ``int_0^1 strain . stress(x strain) dx`` by eight Gauss points, the moduli are the
-    complex step of the stress, where they are those of the class it was derived from.
+    Its energy is ``int_0^1 strain . stress(x strain) dx`` by eight Gauss points. Its moduli are the
+    complex step of the stress, unless the subclass overrides ``moduli``.
     """
 
     def __init__(self, material: Material) -> None:
@@ -310,11 +308,11 @@ class LinearLaw:
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
-        """The components of the strain on which the stress depends."""
+        """Components of the strain that cause stress."""
         return tuple(k for k, column in enumerate(self.D.T) if np.any(column))
 
     def compliance(self, rows: tuple[int, ...]) -> Array:
-        """Changes (n, n) of some components of the strain with the stress of these alone."""
+        """Inverse (n, n) of the moduli of some components."""
         return np.linalg.inv(self.D[np.ix_(rows, rows)])
 
     def energy(self, strain: Array) -> Array:

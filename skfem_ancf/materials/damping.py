@@ -1,4 +1,4 @@
-"""Damping: of the material, and of a whole scene."""
+"""Damping of materials and of a whole scene."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..core.immutable import Immutable
 
 
 class KelvinVoigt(Immutable):
-    """A material with a stress in proportion to the rate of its strain: a dashpot beside a spring.
+    """Viscoelastic material with a stress proportional to the strain rate.
 
-    ``S = S(eps) + time C : d eps / dt`` with the Green-Lagrange strain and the moduli C that the
-    law has without strain. A body that spins as a rigid one has no strain rate and loses nothing.
-    A free vibration of the angular frequency omega decays with the damping ratio
-    ``time omega / 2``. The stabilisation of an element, which is no strain, stays elastic.
+    ``S = S(eps) + time C : d eps / dt`` with the Green-Lagrange strain and the moduli C at zero
+    strain. Rigid rotation causes no strain rate and no loss. A free vibration of angular frequency
+    omega decays with the damping ratio ``time omega / 2``. The stabilisation of an element stays
+    elastic.
 
     Parameters
     ----------
@@ -48,16 +48,16 @@ class KelvinVoigt(Immutable):
 
 
 class Damping(Immutable):
-    """The damping of a whole scene, of :meth:`skfem_ancf.Scene.damping`.
+    """Damping of a scene, see :meth:`skfem_ancf.Scene.damping`.
 
     Parameters
     ----------
     mass
-        Rate by which velocities decay: a force ``mass M v``.
+        Mass-proportional rate: the force ``mass M v``.
     stiffness
-        A retardation time that is added to that of every beam.
+        Retardation time, added to that of every beam.
     modal
-        Damping ratios of the lowest modes that are no rigid motions, shape (k,).
+        Damping ratios of the lowest flexible modes, shape (k,).
     """
 
     def __init__(self, mass: float = 0.0, stiffness: float = 0.0,
@@ -77,5 +77,5 @@ class Damping(Immutable):
         return f"<Damping {self.mass:g} M, time {self.stiffness:g}, {len(self.modal)} modes>"
 
 
-#: That of a scene without any.
+#: Default of a scene.
 UNDAMPED = Damping()

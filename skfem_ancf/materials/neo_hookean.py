@@ -12,7 +12,7 @@ from .pointwise import PointwiseMaterial
 
 @primitive("skfem_ancf.core.loops")
 def log1p(x):
-    """ln (1 + x), not a number where there is none."""
+    """ln (1 + x); NaN for x < -1."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.log1p(x)
 
@@ -25,12 +25,12 @@ def everywhere(condition):
 
 @source
 def log_thickness(G, lame, log_det):
-    """x = ln C_33 of plane stress, ``G (C_33 - 1) + lambda ln J = 0``, by Newton's method."""
+    """x = ln C_33 from ``G (C_33 - 1) + lambda ln J = 0`` (plane stress) by Newton's method."""
     x = 0.0 * log_det
     for _ in range(60):
         change = np.expm1(x)
         dx = ((G * change + 0.5 * lame * (log_det + x)) / (G * (change + 1.0) + 0.5 * lame))
-        dx = np.maximum(dx, -1.0)  # convex: from above it comes down by itself
+        dx = np.maximum(dx, -1.0)  # convex: converges monotonically from above
         x = x - dx
         if everywhere(np.abs(dx) <= 1e-14 * (1e-14 + np.abs(x))):
             break
@@ -39,7 +39,7 @@ def log_thickness(G, lame, log_det):
 
 @source
 def log_determinant(xx, yy, xy):
-    """ln det C, which keeps the digits of small strains."""
+    """ln det C, accurate for small strains."""
     return log1p(2.0 * (xx + yy) + 4.0 * xx * yy - xy * xy)
 
 
@@ -73,9 +73,9 @@ class NeoHookean(PointwiseMaterial):
     """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2.
 
     For small strains it agrees with Hooke's law of the same ``E`` and ``nu``. Unlike
-    St. Venant-Kirchhoff it resists compression to zero volume. In plane stress the stretch out
-    of the plane follows from S_33 = 0. Parameters and errors are those of
-    :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` stays below 1/2.
+    St. Venant-Kirchhoff it resists compression to zero volume. In plane stress S_33 = 0 determines
+    the stretch out of the plane. Parameters and errors are those of
+    :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` is below 1/2.
 
     References
     ----------

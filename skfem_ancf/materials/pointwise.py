@@ -1,4 +1,4 @@
-"""Laws given at one point: compiled where that pays."""
+"""Laws given at one point, which can be compiled."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class PointwiseMaterial(Material):
     volume, the second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) and its derivatives (D_11, D_12,
     D_13, D_22, D_23, D_33).
 
-    In NumPy the strains are arrays, which may be complex. In compiled code they are numbers, and
-    Numba compiles the function. What both understand are expressions of NumPy, ``np.where`` in
-    place of ``if``. It may be marked by ``numba.njit``. Parameters are those of
+    In NumPy the strains are arrays, which may be complex; in code compiled by Numba they are
+    numbers. Use NumPy expressions that work for both, with ``np.where`` instead of ``if``. The
+    method may be decorated with ``numba.njit``. Parameters are those of
     :class:`~skfem_ancf.materials.base.Material`. A subclass that overrides ``energy``, ``stress``
     or ``moduli`` runs in NumPy.
 
@@ -47,12 +47,12 @@ class PointwiseMaterial(Material):
 
     @property
     def constants(self) -> Array:
-        """Numbers that ``point`` takes, shape (k,)."""
+        """Constants that ``point`` takes, shape (k,)."""
         raise NotImplementedError(f"{type(self).__name__} has a method point and no constants")
 
     @property
     def is_pointwise(self) -> bool:
-        """True if ``point`` is the energy, the stress and the moduli."""
+        """True if ``point`` defines the energy, the stress and the moduli."""
         return self.point is not None and all(
             getattr(type(self), name) is getattr(PointwiseMaterial, name)
             for name in ("energy", "stress", "moduli"))
@@ -68,20 +68,7 @@ class PointwiseMaterial(Material):
         return found.reshape((3, 3) + found.shape[1:])
 
     def evaluated(self, strain: Array, number: int) -> Array:
-        """The energy, the stress or the moduli, row by row.
-
-        Parameters
-        ----------
-        strain
-            Shape (3, ...).
-        number
-            1, 3 or 9.
-
-        Returns
-        -------
-        ndarray
-            Shape (number, ...).
-        """
+        """Energy, stress or moduli at strains (3, ...), shape (number, ...), number = 1, 3 or 9."""
         strain = np.asarray(strain)
         strain = strain.astype(np.result_type(strain, float), copy=False)
         energy, stress, moduli = getattr(self.point, "py_func", self.point)(self.constants, *strain)

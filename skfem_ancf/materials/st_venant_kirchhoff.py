@@ -12,7 +12,7 @@ from .base import LinearLaw, Material, hooke
 
 
 class StVenantKirchhoff(Material):
-    """S = D eps: the law of the paper. Energy per volume 1/2 eps : D : eps.
+    """S = D eps with the energy 1/2 eps : D : eps per volume.
 
     Parameters and errors are those of :class:`~skfem_ancf.materials.base.Material`.
 
@@ -38,7 +38,7 @@ class StVenantKirchhoff(Material):
         cls = type(self)
         if any(getattr(cls, name) is not getattr(StVenantKirchhoff, name)
                for name in ("energy", "stress", "moduli")):
-            return super().law(k_s)  # a subclass with a law of its own
+            return super().law(k_s)  # a subclass with another law
         D = self.D
         D[2, 2] *= require_positive("k_s", k_s)
         return LinearLaw(D)

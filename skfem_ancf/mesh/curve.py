@@ -15,25 +15,25 @@ from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 
-#: Where differences are taken of a function, in steps.
+#: Stencil of differences, in steps.
 STENCIL = np.arange(-3, 4)
-#: Where curvatures are taken of an element, and beside a node for kinks, in parts of elements.
+#: Relative coordinates in an element for curvatures, and beside a node for kinks.
 FINE, ASIDE = np.arange(32) / 32.0, np.array([-1e-3, 1e-3, -2.5e-4, 2.5e-4])
-#: Where a derivative is tried, in parts of the curve.
+#: Relative parameters at which the complex step is compared with differences.
 TRIED = np.linspace(0.0137, 0.991, 24)
-#: Angle of a kink of a curve that is refused; one of a fine polygon is smaller.
+#: Smallest angle of a kink that is refused; fine polygons have smaller ones.
 KINK = 1e-2
 
 
 def _components(value, s):
-    """Two components at parameters s; one may be a constant."""
+    """Two components at parameters s; a number is broadcast."""
     if isinstance(value, (tuple, list)) and len(value) == 2:
         return [np.broadcast_to(v, s.shape) if np.ndim(v) == 0 else v for v in value]
     return value
 
 
 def _on_curve(what, function, s):
-    """A function of parameters s (n,) that returns (2, n), asked."""
+    """Evaluate a function of parameters s (n,), and check that it returns (2, n)."""
     try:
         return ask_array(what, (2, len(s)), lambda s: _components(function(s), s), s)
     except CallbackError as error:
@@ -57,12 +57,12 @@ class Curve:
         return _on_curve("the derivative of r", self.derivative, s)
 
     def _moving(self, s):
-        """The derivative at parameters s, of a curve that has a tangent there."""
+        """The derivative at parameters s, checked to be nonzero."""
         d = self.rate(s)
         size = np.hypot(*d)
         if len(s) and size.min() <= 1e-12 * size.max():
-            raise MeshError(f"the curve stands still at s = {s[np.argmin(size)]:.9g}: it has no "
-                            "tangent there")
+            raise MeshError("the curve has no tangent: its derivative is zero at s = "
+                            f"{s[np.argmin(size)]:.9g}")
         return d
 
     def nodes(self, s: Array) -> tuple[Array, Array]:
@@ -82,11 +82,11 @@ class Curve:
         return np.hypot(*d) @ w * (b - a)
 
     def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Positions, unit tangents, lengths and turning for nodes at parameters (n,).
+        """Geometry of the elements between nodes at parameters ``s`` (n,).
 
-        And the curvature of each sixteenth of the elements, (16 n - 16,). Raises MeshError if the
-        curve stands still, its derivative is not that of r between two nodes, or its direction
-        jumps at a node.
+        Returns positions, unit tangents, lengths, turning, and the curvature of each sixteenth of
+        the elements, (16 n - 16,). Raises MeshError where the derivative is zero, does not fit r,
+        or has a jump in direction at a node.
         """
         a, step = s[:-1], np.diff(s)
         beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
@@ -101,8 +101,8 @@ class Curve:
         if not gap[k] <= 0.02:
             raise MeshError(
                 f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
-                f"{s[k + 1]:.9g}: the derivative adds up to a point {gap[k] * lengths[k]:.6g} from "
-                "r")
+                f"{s[k + 1]:.9g}: the integral of the derivative misses r by "
+                f"{gap[k] * lengths[k]:.6g}")
         if len(s) > 2:
             _require_no_kink(s[1:-1], p[:, 1:-1], p_beside)
         v = np.hypot(*d_fine)
@@ -121,7 +121,7 @@ def _moved(function, A, shift, s):
 
 
 def _complex_step(r, s):
-    """The derivative of a function of parameters that takes complex ones."""
+    """The derivative by the complex step."""
     return np.imag(np.asarray(_components(r(s + 1e-30j), s))) / 1e-30
 
 
@@ -133,7 +133,7 @@ def _differences(r, s0, s1, s):
 
 
 def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[Array], Array]:
-    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
+    """Derivative of ``r`` on [s0, s1] by the complex step, or else by sixth-order differences."""
     differences, complex_step = partial(_differences, r, s0, s1), partial(_complex_step, r)
     try:
         probe = s0 + (s1 - s0) * TRIED
@@ -143,29 +143,29 @@ def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[
         if exact.shape == near.shape and (
                 np.abs(exact - near) <= 1e-6 * (size + size.max())).all():
             return complex_step
-    except Exception:  # r is the user's: whatever it raises, it has no complex step
+    except Exception:  # r is user-defined and may raise anything
         logger.debug("the curve has no complex step; differences are used", exc_info=True)
     return differences
 
 
 def _each(function, *parameters):
-    """What a function of parameters (n,) returns at those of arrays (...), (2, ...) each."""
+    """Values (2, ...) of a function of parameters (n,) at arrays of parameters (...)."""
     return [np.asarray(function(s.ravel())).reshape(2, *s.shape) for s in parameters]
 
 
 def _angles(a, b):
-    """The angles from vectors to others, both (2, ...)."""
+    """Angles from vectors a to vectors b, both (2, ...)."""
     return np.arctan2(a[0] * b[1] - a[1] * b[0], np.sum(a * b, axis=0))
 
 
 def _turning(d, near, weights, step):
-    """The turning of a curve by its derivative at parameters (n,), and about them (7, n)."""
+    """Turning of a curve from its derivative at parameters (n,) and at their stencils (7, n)."""
     x, y = np.einsum("is,jis->js", weights, near / np.hypot(*near)) / step
     return np.array([-y, x]) / np.hypot(*d)
 
 
 def _stencil(s, s0, s1):
-    """For differences on [s0, s1] places and weights of values, both (7, n), and their distance."""
+    """Points and weights (7, n) for differences on [s0, s1], and their spacing."""
     d = 1e-3 * (s1 - s0)
     c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
     x = (s - c) / d
@@ -178,16 +178,16 @@ def _stencil(s, s0, s1):
 
 
 def _gauss_points(a, step):
-    """Parameters (n, 12) of pieces that begin at a, and weights."""
+    """Parameters (n, 12) of Gauss points in intervals that begin at a, and weights."""
     x, w = gauss(12)
     return a[:, None] + step[:, None] * x, w
 
 
 def _require_no_kink(s, p, beside):
-    """Raise MeshError if the direction of a curve jumps at a node inside."""
+    """Raise MeshError if the direction of a curve jumps at an interior node."""
     chords = (beside - p[:, None]) * np.sign(ASIDE)[:, None]
     wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
-    # far from the origin chords that short have the direction of round-off
+    # far from the origin the direction of such short chords is round-off
     chord = np.hypot(*chords[:, 2:]).min(axis=0)
     seen = chord * KINK > 32.0 * np.finfo(float).eps * np.abs(p).max()
     kink = np.where(seen & (np.abs(narrow) > 0.7 * np.abs(wide)), np.abs(narrow), 0.0)
@@ -200,7 +200,7 @@ def _require_no_kink(s, p, beside):
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
-    """Raise MeshError where the radius of curvature of the curve is below h/2.
+    """Raise MeshError where the radius of curvature is below h/2.
 
     ``bent`` is the curvature of sixteenths of the elements, ``s`` are the parameters of the nodes.
     """

@@ -1,4 +1,4 @@
-"""Lines of a drawing in DXF as a mesh of meshio."""
+"""Read lines of a DXF drawing as a meshio mesh."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from ..core.errors import FileError, MeshError, MissingExtra
 
-#: What is no straight line, and would be missing.
+#: Entities that are not straight lines, which are refused.
 CURVES = ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
 
 
 def mesh_of_dxf(path: Path) -> Any:
-    """The lines of the model space, and points, as sets with the names of their layers.
+    """The lines and points of the model space, as cell sets named after their layers.
 
-    Polylines are taken apart. Texts, dimensions and hatches are left out.
+    Polylines are split into lines. Text, dimensions and hatches are ignored.
 
     Raises
     ------

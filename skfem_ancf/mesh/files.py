@@ -1,4 +1,4 @@
-"""Meshes of beams in files."""
+"""Files of beam meshes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from skfem.generic_utils import OrientedBoundary
 from ..core import archive
 from ..core.errors import FileError, MeshError
 
-#: Formats of several files, of which one names the others: these are written where they stay.
+#: Formats of several files that refer to each other: written in place.
 IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
-#: Arrays, numbers and texts of a mesh that it may be without.
+#: Optional attributes of a mesh.
 OPTIONAL = ("s", "p_XY", "heights")
-#: Those that it always has.
+#: Required attributes of a mesh.
 NEEDED = ("doflocs", "t", "height", "p_X", "p_Y", "lengths", "sections")
 
 
 def save_npz(mesh: Any, path: Path) -> None:
-    """Save all of a mesh but the functions ``curve`` and ``taper``."""
+    """Save a mesh without the functions ``curve`` and ``taper``."""
     content = {name: getattr(mesh, name) for name in (*NEEDED, *OPTIONAL, "kind")
                if getattr(mesh, name) is not None}
     for name, facets in (mesh.boundaries or {}).items():
@@ -34,7 +34,7 @@ def save_npz(mesh: Any, path: Path) -> None:
 
 
 def load_npz(cls: Any, path: Path, kinds: dict[str, Any]) -> Any:
-    """A mesh that :func:`save_npz` saved, of a class or of that of its kind."""
+    """Load a mesh saved by :func:`save_npz`, of class ``cls`` or of the kind in the file."""
     try:
         data = archive.read(path)
         missing = sorted(set(NEEDED) - data.keys())
@@ -54,20 +54,20 @@ def load_npz(cls: Any, path: Path, kinds: dict[str, Any]) -> Any:
     except OSError as error:
         raise FileError(f"cannot read {str(path)!r}: {error}") from error
     except MeshError as error:
-        raise MeshError(f"{str(path)!r} holds no beam: {error}") from error
+        raise MeshError(f"{str(path)!r} contains no beam: {error}") from error
     except Exception as error:  # whatever is in the file
-        raise MeshError(f"{str(path)!r} holds no beam, or is damaged: {type(error).__name__}: "
+        raise MeshError(f"{str(path)!r} contains no beam, or is damaged: {type(error).__name__}: "
                         f"{error}") from error
 
 
 def save_quads(mesh: Any, path: Path, *args: Any, **kwargs: Any) -> None:
-    """Write the quads of the body in a format of meshio."""
+    """Write the quads of a mesh in a format of meshio."""
     import meshio
 
     try:
         if not path.suffix:
-            raise FileError(f"the file name {str(path)!r} does not say the format: end it with "
-                            ".npz, .vtu or what else meshio writes")
+            raise FileError(f"the file name {str(path)!r} has no suffix: end it with .npz, "
+                            ".vtu or another format of meshio")
         if path.suffix in IN_PARTS:
             mesh.to_meshquad().save(path, *args, **kwargs)
             return

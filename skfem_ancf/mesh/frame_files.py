@@ -1,4 +1,4 @@
-"""Frames from meshes of meshio: each cell a line, with the names of its sets."""
+"""Frames from meshio meshes: each line cell is a line, cell sets name groups."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from ..core.errors import (FileError, InputError, MeshError, require_finite, req
 from .dxf import mesh_of_dxf
 from .frame_graph import FrameGraph
 
-#: Kinds of cells of meshio that are lines: the ends first, then what is between them in order.
+#: Line cells of meshio: the ends first, then interior points in order.
 LINE = re.compile("line([0-9]*)")
 
 
 def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
                     tol: float | None = None) -> FrameGraph:
-    """The lines of a mesh of meshio, each cell one, with its names.
+    """The graph of the line cells of a mesh.
 
     Parameters
     ----------
     mesh
-        A ``meshio.Mesh``, or a file that meshio reads, or of DXF. Cells "line" are straight,
-        "line3", "line4", ... are polynomials through their points, "vertex" gives names to nodes.
+        A ``meshio.Mesh``, or a file of meshio or DXF. Cells "line" are straight, "line3", "line4",
+        ... are polynomials through their points, "vertex" cells name nodes.
     groups
-        Names of the sets of lines that are beams. By default those in ``named``, and those that
+        Names of the sets of lines that become beams; by default those in ``named``, and those that
         share no line with another set.
     named
-        Names that are asked for elsewhere.
+        Names that other arguments of the caller refer to.
     tol
         As for :class:`FrameGraph`.
     """
@@ -82,7 +82,7 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
 
 
 def _mesh_of(mesh):
-    """A mesh of meshio, or the one that is in a file."""
+    """A meshio mesh, or the one in a file."""
     import meshio
 
     if isinstance(mesh, (str, Path)):
@@ -91,7 +91,7 @@ def _mesh_of(mesh):
             return mesh_of_dxf(path)
         try:
             mesh = meshio.read(path)
-        except (Exception, SystemExit) as error:  # meshio ends the process where it knows no format
+        except (Exception, SystemExit) as error:  # meshio exits on an unknown format
             raise FileError(f"{path} cannot be read as a mesh: {error}") from None
         if path.suffix.lower() == ".inp":
             _require_sets_of_abaqus(path)
@@ -101,9 +101,9 @@ def _mesh_of(mesh):
 
 
 def _require_sets_of_abaqus(path):
-    """Raise MeshError for element sets of a file of Abaqus that meshio 5 takes for others.
+    """Raise MeshError for element sets of an Abaqus file that meshio 5 misreads.
 
-    It counts the names at ``*ELEMENT`` as if each block had one of its own.
+    It matches names at ``*ELEMENT`` to blocks as if each block had a name.
     """
     blocks, sets, keyword = [], [], ""
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -128,7 +128,7 @@ def _require_sets_of_abaqus(path):
 
 
 def _ends_first(points, cell):
-    """The points of a line, its ends first: of three points those farthest apart."""
+    """Reorder the points of a three-point line: ends first, which are farthest apart."""
     if len(cell) != 3:
         return cell
     a, b, c = points[cell]
@@ -142,7 +142,7 @@ def _ends_first(points, cell):
 
 
 def _names(mesh, blocks, used, wanted):
-    """Lines and nodes by name, and by name a point that is no end of a line."""
+    """Lines and nodes by name, and by name a point that is not an end of a line."""
     sets = {name: parts for name, parts in mesh.cell_sets.items()
             if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
     groups, found = {}, dict[str, list[Any]]()
@@ -175,7 +175,7 @@ def _names(mesh, blocks, used, wanted):
 
 
 def _entries(name, part, n):
-    """Numbers of a set of a mesh, (k,)."""
+    """Check the numbers of a set of a mesh, (k,)."""
     try:
         out = np.ravel(np.asarray(part))
     except ValueError:  # of sets
@@ -187,9 +187,9 @@ def _entries(name, part, n):
 
 
 def _numbered(mesh, wanted):
-    """Cell sets that a file has as numbers: physical groups, or what meshio writes of names.
+    """Cell sets stored as numbers: Gmsh physical groups, or names in meshio cell data.
 
-    Into formats without names it writes data called "a-b", which are 0 in the set a, 1 in b.
+    For formats without names meshio writes data called "a-b", with 0 for set a and 1 for set b.
     """
     sets = {}
     names = {int(number): name for name, (number, _) in mesh.field_data.items()}
@@ -208,7 +208,7 @@ def _numbered(mesh, wanted):
 
 
 def _polynomial(points, s):
-    """The polynomial through two ends, at s = 0 and 1, and points (2, n - 2) evenly between."""
+    """Polynomial through ends at s = 0 and 1 and equidistant points (2, n - 2) between."""
     n = points.shape[1]
     t, k = (n - 1) * np.asarray(s)[..., None], np.arange(n)
     weights = [np.prod((t - k[k != i]) / (i - k[k != i]), axis=-1) for i in k]

@@ -1,4 +1,4 @@
-"""Lines between points of the plane: what a frame is made of."""
+"""The graph of a frame: lines between points of the plane."""
 
 from __future__ import annotations
 
@@ -21,46 +21,45 @@ from .mesh_beam import MeshBeam
 from .numbering import default_tags
 from .places import is_point, points_of_rows, satisfying
 
-#: How far from a node a point may be that names it, relative to the size of the graph.
+#: Tolerance for a point that selects a node, relative to the size of the graph.
 NEAR = 1e-9
-#: How far apart points may be that are one node, if nothing else is given: relative to the size of
-#: the graph, and to the longest line. Pairs apart by up to :data:`CLOSE` times that are warned of.
+#: Default tolerance for merging points, relative to the size of the graph and to the longest line.
+#: Pairs within :data:`CLOSE` times the tolerance cause a warning.
 MERGED, OF_LONGEST, CLOSE = 1e-5, 1e-3, 10.0
 PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a function of the "
           "points x that returns truth values, or a list of these")
 
 
 class FrameGraph:
-    """Points, lines between them, and names for both: the graph of a frame.
+    """The graph of a frame: points, lines between them, and names for both.
 
     Parameters
     ----------
     points, lines
-        Pairs (x, y), and pairs of numbers of points: lists, or arrays of shapes (n, 2) and (m, 2).
+        Points (x, y) and pairs of point numbers: lists, or arrays of shapes (n, 2) and (m, 2).
     groups, nodes
         Numbers of lines and of points by name.
     curves
-        By the number of a line a function of parameters s (k,), from 0 to 1, that returns points
+        For the number of a line a function of parameters s (k,) in [0, 1] that returns points
         (2, k) of its axis.
     tol
-        How far apart points may be that are one node; by default 1e-5 of the size of the graph, and
-        1e-3 of its longest line at most.
+        Points closer than this are merged into one node; by default 1e-5 of the extent of the
+        graph, at most 1e-3 of its longest line.
     beams
-        Names of the groups that are beams, which share no line; all of them by default.
+        Names of the groups that are beams, without common lines; all of them by default.
     lost
-        By name points that a mesh has in it and the graph has not.
+        By name, points of a mesh that are not in the graph.
 
     Attributes
     ----------
     points, lines
-        Shapes (2, n) and (2, m). Points that are one node have the same place, and lines join the
-        first of them.
+        Shapes (2, n) and (2, m). Merged points have the same position; lines refer to the first.
     given
-        Lines as they were given, shape (2, m).
+        Lines as given, shape (2, m).
     kept
-        Numbers of the lines that have a length, shape (k,): they join different nodes.
+        Numbers of the lines that join different nodes, shape (k,).
     same
-        The node that each point is, the first of the points there, shape (n,).
+        Node of each point, the first of the merged points, shape (n,).
     """
 
     def __init__(self, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
@@ -95,7 +94,7 @@ class FrameGraph:
                                 f"{self.tol:.3g}, within which points are one node")
 
     def _require_points(self):
-        """Lines join points that there are, and different ones."""
+        """Check that lines join existing, different points."""
         n, (a, b) = self.points.shape[1], self.lines
         bad = np.flatnonzero((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n))
         if len(bad):
@@ -110,7 +109,7 @@ class FrameGraph:
                             "line: remove it, or join it to another point")
 
     def _require_lines(self):
-        """No line is there twice."""
+        """Check for duplicate lines."""
         key = np.sort(self.lines[:, self.kept], axis=0)
         _, first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)
         first = first[np.ravel(which)]
@@ -121,7 +120,7 @@ class FrameGraph:
                                 "them a curve")
 
     def _merge(self, tol):
-        """Points that are not farther apart than a tolerance are one node."""
+        """Merge points within a tolerance into one node."""
         n, places = self.points.shape[1], self.points
         length = np.hypot(*(places[:, self.lines[1]] - places[:, self.lines[0]]))
         self.tol = require_not_negative("tol", tol, False) if tol is not None else float(min(
@@ -152,14 +151,14 @@ class FrameGraph:
                  f"tol = {self.tol:.3g}: give a larger tol= if they should be one")
 
     def _near_pairs(self, distance):
-        """Pairs of points (k, 2) that are near each other, and how far they are apart, (k,)."""
+        """Pairs of points (k, 2) within a distance, and their distances, (k,)."""
         tree = scipy.spatial.cKDTree(self.points.T)
         pairs = tree.query_pairs(distance, output_type="ndarray").reshape(-1, 2)
         pairs = pairs[np.lexsort(pairs.T[::-1])]
         return pairs, np.hypot(*(self.points[:, pairs[:, 0]] - self.points[:, pairs[:, 1]]))
 
     def _curves_to_nodes(self, places):
-        """Curves end at the nodes that their ends became."""
+        """Move the ends of curves to merged nodes."""
         for k, curve in self.curves.items():
             if k not in self.kept:
                 raise MeshError(f"the ends of line {k}, which has a curve, are not farther apart "
@@ -177,20 +176,21 @@ class FrameGraph:
     def nodes_at(self, place: Any) -> Array:
         """Numbers of the nodes at a place, shape (k,), k >= 1.
 
-        A place is the name of nodes, or of lines for their ends, the number of a node, a point as a
-        tuple (x, y), a function of the points x (2, n) that returns n truth values, an array of
+        A place is the name of nodes, or of lines for their ends, the number of a node, a point
+        (x, y) as a tuple, a function of points x (2, n) that returns n truth values, an array of
         numbers, an array of points (k, 2), or a list of these.
         """
         return np.unique(self.same[self.points_at(place)])
 
     def points_at(self, place: Any) -> Array:
-        """As :meth:`nodes_at`, of each node all points that are given there, or one."""
+        """As :meth:`nodes_at`, with all given points that were merged into each node."""
         require_unmasked("place", place)
         n, place = self.points.shape[1], points_of_rows(place)
         if isinstance(place, str):
             if place in self.lost:
-                raise MeshError(f"{place!r} holds the point {self.lost[place]} of the mesh, which "
-                                "is no end of a line: a frame is held and loaded at ends of lines")
+                raise MeshError(f"{place!r} contains the point {self.lost[place]} of the mesh, "
+                                "which is not an end of a line: a frame is supported and loaded at "
+                                "ends of lines")
             if place in self.nodes:
                 return self.nodes[place]
             if place in self.groups:
@@ -231,9 +231,9 @@ class FrameGraph:
                                          self.lines.shape[1] - 1)])
 
     def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
-        """A mesh with a chain of elements for each of some lines (k,), in their order.
+        """A mesh with one chain of elements for each of the lines (k,), in their order.
 
-        ``elements`` (m,) says how many each of all lines is divided into; ``height`` is that of
+        ``elements`` (m,) is the number of elements of every line; ``height`` is that of
         :func:`~.members.heights_of_chains`.
         """
         n = elements[lines]
@@ -273,14 +273,14 @@ class FrameGraph:
 
 
 def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
-    """A dict that was given, or an empty one for None."""
+    """A dict, or an empty one for None."""
     if given is not None and not isinstance(given, Mapping):
         raise InputError(f"{name} must be a dict, got {shown(given)}")
     return given or {}
 
 
 def _pairs(what, values):
-    """Pairs, each a row, as an array (2, n)."""
+    """Pairs in rows, as an array (2, n)."""
     found = require_finite(what, list(values) if _is_iterable(values) else values)
     if found.ndim != 2 or found.shape[1] != 2 or not len(found):
         hint = "; give its transpose" if found.ndim == 2 and len(found) == 2 else ""
@@ -301,7 +301,7 @@ def _numbers(what, values):
 
 
 def _named(kind, what, given, n):
-    """Numbers by name."""
+    """Check numbers by name."""
     out = {}
     for name, numbers in mapping_of(f"{kind}s of {what}", given).items():
         if require_label(f"a {kind} of {what}", name) is None:
@@ -322,7 +322,7 @@ def _at(x):
 
 
 def _warn_of(pairs, apart, what):
-    """Warn of pairs (k, 2) of points that are near each other."""
+    """Warn of pairs (k, 2) of points close to each other."""
     if len(pairs):
         (i, j), d = pairs[0], apart[0]
         more = "" if len(pairs) == 1 else f", {len(pairs) - 1} other pair(s) likewise"
@@ -330,7 +330,7 @@ def _warn_of(pairs, apart, what):
 
 
 def _moved(curve, shift, s):
-    """A curve whose ends are moved, and what is between them in proportion."""
+    """A curve with shifted ends; the shift is interpolated linearly."""
     x, y = curve(s)
     (ax, bx), (ay, by) = shift
     return x + (1.0 - s) * ax + s * bx, y + (1.0 - s) * ay + s * by

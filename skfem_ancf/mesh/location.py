@@ -1,4 +1,4 @@
-"""Points of the body in the reference cells of its elements, many at once."""
+"""Point location: reference coordinates of points of the body, vectorised."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from ..core.errors import MeshError
 from ..core.types import Array
 from .reference_cell import hermite_basis
 
-#: Corrections of Newton's method that are small enough, and how many there are at most.
+#: Tolerance and largest number of Newton iterations.
 CLOSE, ITERATIONS = 1e-7, 30
 
-#: Samples of each element in the tree of the finder, steps to neighbours from the nearest sample,
-#: and candidates for a point that is in none of these elements.
+#: Samples of each element in the search tree, steps to neighbours from the nearest sample, and
+#: further candidates for a point that is in none of these elements.
 SAMPLES, WALK, CANDIDATES = 4, 3, 6
 
 
 def _taylor(m):
-    """From Hermite coefficients, of m derivatives a node, to those of powers of xi."""
+    """Matrix from Hermite coefficients, with m derivatives per node, to powers of xi."""
     return np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d) for d in range(2 * m)])
 
 
 def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
-    """A polynomial with coefficients (n, ...), the lowest first, and its derivative."""
+    """A polynomial with coefficients (n, ...), lowest first, and its derivative."""
     return (polyval(xi, coefficients, tensor=False),
             polyval(xi, polyder(coefficients), tensor=False))
 
 
 class Inverse:
-    """The map from the body to the reference cell, by polynomials of xi.
+    """The map from the body to the reference cell.
 
-    ``axis`` from ``start`` and ``director``, of the largest height, are Hermite coefficients;
-    ``heights`` coefficients (4, ne) of heights over the largest, None where it is constant.
+    ``axis`` relative to ``start`` and ``director``, times the largest height, are Hermite
+    coefficients; ``heights`` are coefficients (4, ne) of the relative height, None if constant.
     """
 
     def __init__(self, start: Array, axis: Array, director: Array, height: float,
@@ -45,15 +45,14 @@ class Inverse:
         self.start = start
         self.axis, self.director = (_taylor(c.shape[1] // 2) @ c for c in (axis, director))
         n, m = self.axis.shape[1], self.director.shape[1]
-        #: Minus the cross product of both. Where the section is that holds a point does not depend
-        #: on how high it is.
+        #: Minus the cross product of both; the axial coordinate does not depend on the height.
         self.beside = np.zeros((n + m - 1, axis.shape[2]))
         for k in range(n):
             self.beside[k:k + m] -= _cross(self.axis[:, k, None], self.director)
         self.largest, self.heights = height, heights
 
     def height(self, e: Any, xi: Array) -> Any:
-        """The height at places xi (n, ...) of elements e (n,)."""
+        """Height at axial coordinates xi (n, ...) of elements e (n,)."""
         if self.heights is None:
             return self.largest
         return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
@@ -61,11 +60,11 @@ class Inverse:
     def __call__(self, x: Array, e: Any) -> Array:
         """Reference points of points of elements e, both (2, n, npoints); NaN where there is none.
 
-        They are found by Newton's method from the middle of the elements.
+        Newton's method, from the middle of the elements.
         """
         axis, director, beside = (c[..., e, None] for c in (self.axis, self.director, self.beside))
         gap = x - self.start[:, e, None]
-        # from the axis to the point x director: zero at the section that holds the point
+        # (point - axis) x director vanishes at the section through the point
         beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
         beside[:director.shape[1]] += _cross(gap[:, None], director)
         X = np.full(x.shape, 0.5)
@@ -89,7 +88,7 @@ def _cross(a, b):
 
 
 class Finder:
-    """Finds the elements of one :class:`~skfem_ancf.MeshBeam` that hold points, many at once."""
+    """Finds the elements of a :class:`~skfem_ancf.MeshBeam` that contain points, vectorised."""
 
     def __init__(self, mesh: Any) -> None:
         self.mesh, self.mapping = mesh, mesh.mapping()
@@ -97,23 +96,23 @@ class Finder:
         self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
         self.allowed = 1e-6 if mesh.is_straight else 1e-3
-        #: Distances from axes that differ by less are the same.
+        #: Tolerance of equal distances from axes.
         self.equal = 1e-8 * mesh.height
 
     @cached_property
     def _beside(self):
-        """The element before each in its chain, and the one after it, (2, nelements); or -1."""
+        """The previous and the next element in the chain, (2, nelements); -1 at its ends."""
         left, right = self.mesh.t
         joined, e = right[:-1] == left[1:], np.arange(self.mesh.nelements)
         return np.array([np.append(-1, np.where(joined, e[:-1], -1)),
                          np.append(np.where(joined, e[1:], -1), -1)])
 
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
-        """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
+        """Elements (n,), reference points (2, n) and distances outside of them for points (2, n).
 
-        The third is zero for points of the body, relative to the element, and infinite far away. Of
-        several chains that hold a point it is the one whose axis is nearest; the fourth says of
-        each point whether several are. With a number ``chain`` it is this chain of elements.
+        Distances are relative to the element: zero in the body, infinite far away. Of several
+        chains that contain a point the one with the nearest axis is taken; the fourth result is
+        true where there are several. ``chain`` restricts the search to the chain of this number.
         """
         noise = 1e-9 + 8 * np.finfo(float).eps * (
             self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
@@ -134,18 +133,18 @@ class Finder:
         return e, X, outside, tied
 
     def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
-        """As :meth:`find`, of points that are all in the body, or in a chain; else a MeshError."""
+        """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
         e, X, outside, tied = self.find(x, chain)
         if np.any(outside > self.allowed):
             raise self._refusal(x, outside, chain)
         return e, X, tied
 
     def from_axis(self, e: Array, X: Array) -> Array:
-        """How far reference points (2, n) of elements (n,) are from the axis, shape (n,)."""
+        """Distance of reference points (2, n) of elements (n,) from the axis, shape (n,)."""
         return np.abs(X[1] - 0.5) * np.ravel(self.inverse.height(e, X[0][:, None]))
 
     def chains_at(self, x: Array) -> list[tuple[float, int]]:
-        """Chains of elements that hold a point (2, 1), and how far their axes are from it."""
+        """Chains that contain a point (2, 1), and the distances of their axes from it."""
         found = []
         for chain in range(int(self.mesh.chains[-1]) + 1):
             e, X, outside, _ = self.find(x, chain)
@@ -154,7 +153,7 @@ class Finder:
         return found
 
     def _nearest_axis(self, x, noise, e, X, outside, tied):
-        """Of all elements that hold points those with the nearest axis, put into e, X, ..."""
+        """Among all elements that contain points choose those with the nearest axis, in place."""
         k, some = self._around(x)
         Y = self.inverse(x[:, k, None], some)[..., 0]
         held = self._outside(Y, noise) == 0.0
@@ -171,7 +170,7 @@ class Finder:
         np.logical_or.at(tied, k, chains[some] != chains[e[k]])
 
     def _around(self, x):
-        """Pairs of points and elements that may hold them: numbers (m,) of both."""
+        """Pairs of points and elements that may contain them: numbers (m,) of both."""
         points, elements = [], []
         for some, tree, radius in self._circles:
             near = tree.query_ball_point(x.T, radius, return_sorted=False)
@@ -182,7 +181,7 @@ class Finder:
 
     @cached_property
     def _circles(self):
-        """Elements of about one size with a tree of their middles, and circles that hold them."""
+        """Groups of elements of similar size: a tree of their centres and bounding circles."""
         middle = self.mapping.F(np.array([[0.5], [0.5]])).reshape(2, -1)
         radius = 0.51 * (self.mesh.lengths + self.mesh.height)
         level = np.floor(np.log2(radius)).astype(int)
@@ -218,12 +217,12 @@ class Finder:
 
     @cached_property
     def _far(self):
-        """Points farther from all samples than this are in no element."""
+        """Points farther from all samples than this are outside all elements."""
         return 0.75 * self.mesh.height + float(np.max(self.mesh.lengths))
 
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
-        """What holds the body, and more: least and largest x, least and largest y."""
+        """A bounding box of the body: least and largest x, least and largest y."""
         (x0, y0), (x1, y1) = (f(self._samples, axis=1).tolist() for f in (np.min, np.max))
         return x0 - self._far, x1 + self._far, y0 - self._far, y1 + self._far
 
@@ -238,13 +237,13 @@ class Finder:
 
     @cached_property
     def _line(self):
-        """Direction of the axis and places of its nodes along it, where it is one straight line."""
+        """Direction of a straight axis and positions of its nodes along it; None if curved."""
         mesh, d = self.mesh, self.mesh.p_X[:, 0]
         one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
         return (d, d @ mesh.p) if one else None
 
     def _near(self, x, noise):
-        """In the element that is nearest, and the neighbour where the point is beyond a node."""
+        """The nearest element, or its neighbour where the point is beyond the common node."""
         if self._line is None:
             distance, near = self._tree.query(x.T)
             e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
@@ -280,7 +279,7 @@ class Finder:
 
     @cached_property
     def extent(self) -> str:
-        """Where the body is, in words."""
+        """Extent of the body as text."""
         X = np.array(np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])).reshape(2, -1)
         x = self.mapping.F(X).reshape(2, -1)
         low, high = x.min(axis=1), x.max(axis=1)
@@ -293,6 +292,6 @@ class Finder:
         return MeshError(
             f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
             f"{'the body' if chain is None else 'the line that was named'}"
-            f"{more if len(outside) > 1 else ''}: points are named by their place in the "
+            f"{more if len(outside) > 1 else ''}: points are given by their position in the "
             f"reference configuration of height {mesh.height:.6g}, whose axis runs from "
             f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")

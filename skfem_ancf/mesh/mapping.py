@@ -15,10 +15,10 @@ from .nodal import nodal_derivatives, turned
 from .reference_cell import SECTIONS, hermite_basis
 from .taper import powers
 
-#: Powers of xi in relative heights that are round-off.
+#: Round-off in coefficients of relative heights.
 NOTHING = 2e-14
 
-#: Points of both faces where a body is looked at for folds.
+#: Points of both faces at which folds are detected.
 _FACES = np.array([np.tile(np.linspace(0.0, 1.0, 9), 2), np.repeat([0.0, 1.0], 9)])
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
@@ -28,25 +28,24 @@ _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right
 
 
 def cross(a: Array, b: Array) -> Array:
-    """The out-of-plane component of a x b of vectors (2, ...)."""
+    """The out-of-plane component of a x b for vectors (2, ...)."""
     return a[0] * b[1] - a[1] * b[0]
 
 
 class MappingBeam(Mapping):
-    """Reference cell to body: a cubic axis and sections that turn linearly between the nodes.
+    """The map from the reference cell to the body: cubic axis, linearly interpolated directors.
 
     ``X(xi, eta) = sum_i H_i(xi) x_i + h (eta - 1/2) ((1 - xi) n_1 + xi n_2)`` with the cubic
     Hermite functions H_i, nodal positions and tangents x_i and section directors n_1, n_2.
-    Every ANCF element of order 1 or more contains this map, so the reference configuration, and
-    any rigid motion of it, is represented exactly. On a mesh with ``sections="cubic"``, for
-    elements whose sections are cubic too, the directors are interpolated by H_i as well; with
-    "quintic" and the names beyond, for elements of that degree, both are interpolated by Hermite
-    functions of that degree (:func:`.nodal.nodal_derivatives`). The height h of a tapered beam is
-    cubic in xi.
+    Every ANCF element of order 1 or more contains this map, so it represents the reference
+    configuration and its rigid motions exactly. On a mesh with ``sections="cubic"``, for elements
+    with cubic sections, the directors are interpolated by H_i as well; from "quintic" on both are
+    interpolated by Hermite functions of that degree (:func:`.nodal.nodal_derivatives`). The height
+    of a tapered beam is cubic in xi.
 
-    Methods take reference points ``X`` = (xi, eta), of shape (2, npoints) for all elements or
-    (2, nelements, npoints), and numbers ``tind`` (nelements,) of elements, None for all. They
-    return arrays (..., nelements, npoints).
+    Methods take reference points ``X`` = (xi, eta), shape (2, npoints) for all elements or
+    (2, nelements, npoints), and elements ``tind`` (nelements,), None for all. They return arrays
+    (..., nelements, npoints).
 
     Parameters
     ----------
@@ -62,7 +61,7 @@ class MappingBeam(Mapping):
 
     @property
     def _orders(self):
-        """How many derivatives of the axis and of the director a node has, the 0th included."""
+        """Number of nodal derivatives of the axis and of the director, the 0th included."""
         n = 1 + SECTIONS.index(self.mesh.sections)
         return max(2, n), n
 
@@ -76,20 +75,20 @@ class MappingBeam(Mapping):
                 :, None, None]).transpose(1, 2, 0, 3).reshape(2, 2 * len(values), -1)
             for values in (axis[:k], directors[:n]))
         start = axis[:, 0].copy()
-        axis[:, [0, k]] -= start[:, None]  # from the first node: less round-off
+        axis[:, [0, k]] -= start[:, None]  # relative to the first node: less round-off
         return start, axis, m.height * directors
 
     def _coefficients(self, tind):
-        """Axis (2, 4, ne) and director (2, 2 or 4, ne) coefficients of the elements ``tind``."""
+        """Coefficients of axis and director of elements, (2, n, ne) each."""
         _, axis, director = self._all_coefficients
         return (axis, director) if tind is None else (axis[:, :, tind], director[:, :, tind])
 
     def _axis(self, xi, derivative=0):
-        """The functions of xi that interpolate the axis."""
+        """Interpolation functions of the axis."""
         return hermite_basis(self._orders[0], xi, derivative)
 
     def _director(self, xi, derivative=0):
-        """The functions of xi that interpolate the section director."""
+        """Interpolation functions of the section director."""
         return hermite_basis(self._orders[1], xi, derivative)
 
     @staticmethod
@@ -103,26 +102,26 @@ class MappingBeam(Mapping):
 
     @cached_property
     def heights(self) -> Array:
-        """Coefficients (4, ne) of powers of xi in the heights over the largest, if tapered."""
+        """Coefficients (4, ne) of powers of xi in the height over the largest height."""
         c = powers(self.mesh.heights) / self.mesh.height
-        c[np.abs(c) <= NOTHING] = 0.0  # of a height that is linear
+        c[np.abs(c) <= NOTHING] = 0.0  # for a linear height
         return c
 
     def _relative(self, xi, tind):
-        """The height over the largest, and its derivative, (ne, np); 1 and 0 where constant."""
+        """Height over the largest height, and its derivative, (ne, np); 1 and 0 if constant."""
         if self.mesh.heights is None:
             return 1.0, 0.0
         return with_slope((self.heights if tind is None else self.heights[:, tind])[..., None],
                            np.asarray(xi))
 
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
-        """The height of the section and its derivative by xi; numbers where it is constant."""
+        """Height of the section and its derivative by xi; numbers if it is constant."""
         g, rate = self._relative(xi, tind)
         return self.mesh.height * g, self.mesh.height * rate
 
     @cached_property
     def height_degree(self) -> int:
-        """That of the heights as polynomials of xi: 0 where they are constant."""
+        """Degree of the height in xi: 0 if it is constant."""
         if self.mesh.heights is None:
             return 0
         return int(np.max(np.nonzero(np.any(self.heights, axis=1))))
@@ -134,7 +133,7 @@ class MappingBeam(Mapping):
     # the map and its derivatives
 
     def F(self, X: Array, tind: Array | None = None) -> Array:
-        """The points of the body of reference points, (2, nelements, npoints)."""
+        """Points of the body, (2, nelements, npoints)."""
         axis, director = self._coefficients(tind)
         across = self._sum(director, (X[1] - 0.5) * self._director(X[0]))
         start = self._all_coefficients[0][:, slice(None) if tind is None else tind, None]
@@ -162,9 +161,9 @@ class MappingBeam(Mapping):
         return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / cross(J[:, 0], J[:, 1])
 
     def full_volume(self, X: Array, tind: Array | None = None) -> Array:
-        """The determinant of :meth:`DF` with directors of length 1, (nelements, npoints).
+        """Determinant of :meth:`DF` with section directors of unit length, (nelements, npoints).
 
-        Those that are interpolated between nodes are shorter; bodies weigh what their height says.
+        Directors interpolated between nodes are shorter; mass uses the given height.
         """
         if self.mesh.is_straight:
             return self.detDF(X, tind)
@@ -179,7 +178,7 @@ class MappingBeam(Mapping):
         return self._sum(director, self._director(X[0], 1)) / self.mesh.height
 
     def frame(self, X: Array, tind: Array | None = None) -> Array:
-        """The tangent ``frame[:, 0]`` of the axis and its normal, (2, 2, nelements, npoints)."""
+        """Unit tangent ``frame[:, 0]`` and normal of the axis, (2, 2, nelements, npoints)."""
         d = self._sum(self._coefficients(tind)[0], self._axis(X[0], 1))
         x, y = d / np.hypot(*d)
         return np.array([[x, -y], [y, x]])
@@ -199,29 +198,29 @@ class MappingBeam(Mapping):
 
     @cached_property
     def inverse(self) -> Inverse:
-        """The map from points of the body to those of the reference cell."""
+        """The map from points of the body to reference points."""
         start, axis, director = self._all_coefficients
         return Inverse(start, axis, director, self.mesh.height,
                        None if self.mesh.heights is None else self.heights)
 
     def invF(self, x: Array, tind: Array | None = None) -> Array:
-        """The reference points of points x, both (2, nelements, npoints); NaN where there is none.
+        """Reference points of points x, both (2, nelements, npoints), also outside the cell.
 
-        They may be outside the cell.
+        NaN where there is none.
         """
         return self.inverse(x, slice(None) if tind is None else tind)
 
     # facets
 
     def _facet_elements(self, find):
-        """One element of each facet, and the local number of the facet in it."""
+        """An element of each facet, and the local number of the facet in it."""
         m = self.mesh
         find = np.arange(m.nfacets, dtype=np.int32) if find is None else np.asarray(find)
         tind = m.f2t[0, find]
         return tind, np.argmax(m.t2f[:, tind] == find, axis=0)
 
     def facet_points(self, X: Array, find: Array | None = None) -> tuple[Array, Array]:
-        """Elements (nf,) and reference points (2, nf, np) of points of facets, (1, np)."""
+        """Elements (nf,) and reference points (2, nf, np) of points (1, np) on facets."""
         tind, local = self._facet_elements(find)
         s = np.broadcast_to(X[0], (len(tind), X.shape[-1]))
         points = np.empty((2,) + s.shape)
@@ -230,12 +229,12 @@ class MappingBeam(Mapping):
         return tind, points
 
     def G(self, X: Array, find: Array | None = None) -> Array:
-        """The points of the body of points along facets, (2, nf, np)."""
+        """Positions of points (1, np) on facets, (2, nf, np)."""
         tind, points = self.facet_points(X, find)
         return self.F(points, tind)
 
     def detDG(self, X: Array, find: Array | None = None) -> Array:
-        """The length of a facet for a unit of its parameter, (nf, np)."""
+        """Length of a facet per unit of its parameter, (nf, np)."""
         tind, points = self.facet_points(X, find)
         _, local = self._facet_elements(find)
         J = self.DF(points, tind)

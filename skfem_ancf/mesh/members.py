@@ -1,4 +1,4 @@
-"""The mesh of the lines of a frame: chains of elements, each with a parameter from 0 to 1."""
+"""The mesh of the lines of a frame: several chains of elements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .taper import heights_of
 
 
 def chain_of(s: Array) -> Array:
-    """Number of the chain of parameters (n,) that run from 2 k to 2 k + 1 along chain k."""
+    """Chain number of parameters (n,), which run from 2 k to 2 k + 1 on chain k."""
     return np.floor(0.5 * s).astype(int)
 
 
@@ -26,7 +26,7 @@ class MeshLines(MeshBeam):
 
     @property
     def parameters(self) -> Array:
-        """Parameter of each node on its own chain, from 0 to 1, shape (nvertices,)."""
+        """Parameter of each node on its local chain, from 0 to 1, shape (nvertices,)."""
         s = cast("Array", self.s)
         return s - 2.0 * chain_of(s)
 
@@ -35,9 +35,9 @@ class MeshLines(MeshBeam):
 
 
 class Heights:
-    """The height of chains, for parameters from 2 k to 2 k + 1 on chain k.
+    """Height of chains as a function of parameters, from 2 k to 2 k + 1 on chain k.
 
-    ``given`` has for each chain, or once for all, a number or a function of parameters from 0 to 1.
+    ``given`` has for each chain, or once for all, a number or a function of parameters in [0, 1].
     """
 
     def __init__(self, given: Sequence[float | Callable[[Array], Any]]) -> None:
@@ -48,12 +48,12 @@ class Heights:
 
     def __call__(self, s: Array) -> Array:
         chain, out = chain_of(s), np.empty(len(s))
-        own = s - 2.0 * chain
+        local = s - 2.0 * chain
         if len(self.given) == 1:
-            return _values(self.given[0], own)
+            return _values(self.given[0], local)
         for k in np.unique(chain).tolist():
             here = chain == k
-            out[here] = _values(self.given[k], own[here])
+            out[here] = _values(self.given[k], local[here])
         return out
 
 
@@ -63,21 +63,21 @@ def _values(height, s):
 
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
-    """As :func:`~.taper.heights_of`, of a number, a function, or a list with one for each chain.
+    """As :func:`~.taper.heights_of`, for a number, a function, or a list with one for each chain.
 
-    Functions take parameters (n,) from 0 to 1; messages name chains by their ``numbers``.
+    Functions take parameters (n,) in [0, 1]; messages identify chains by their ``numbers``.
     """
     chain = chain_of(s)
-    own = s - 2.0 * chain
+    local = s - 2.0 * chain
     if not isinstance(height, list):
-        largest, heights, _ = heights_of(height, own, t)
+        largest, heights, _ = heights_of(height, local, t)
         return largest, heights, None if heights is None else Heights([height])
     if not any(map(callable, height)) and len(set(height)) == 1:
-        return heights_of(height[0], own, t)
+        return heights_of(height[0], local, t)
     most, heights, of = 0.0, np.empty((4, t.shape[1])), chain[t[0]]
     for k, one in enumerate(height):
         try:
-            largest, some, _ = heights_of(one, own, t[:, of == k])
+            largest, some, _ = heights_of(one, local, t[:, of == k])
         except (InputError, MeshError) as error:
             line = k if numbers is None else numbers[k]
             raise type(error)(f"line {line}: {error}") from None
@@ -86,17 +86,17 @@ def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
 
 
 class Axes:
-    """The axes of chains, a Curve for parameters from 2 k to 2 k + 1 of chain k.
+    """The axes of chains, a Curve for parameters from 2 k to 2 k + 1 on chain k.
 
-    ``arcs`` has the curves of chains by number; others are straight, from ``start`` by ``way``, (2,
-    k).
+    ``arcs`` has the curves of chains by number. The others are straight, with starts ``start`` and
+    end-to-end vectors ``way``, (2, k).
     """
 
     def __init__(self, arcs: Mapping[int, Curve], start: Array, way: Array) -> None:
         self.arcs, self.start, self.way = dict(arcs), start, way
 
     def _parts(self, s):
-        """Chain and parameter there of each of some parameters, and which are on which arc."""
+        """Chains and parameters in [0, 1], and the arcs with the parameters on each."""
         chain = chain_of(s)
         return chain, s - 2 * chain, [(arc, chain == k) for k, arc in self.arcs.items()
                                       if np.any(chain == k)]
@@ -111,7 +111,7 @@ class Axes:
         return p, tangent
 
     def turning(self, s: Array) -> Array:
-        """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
+        """Derivative of the unit normal by arc length at parameters ``s``, shape (2, n)."""
         _, s, parts = self._parts(s)
         out = np.zeros((2, len(s)))
         for arc, here in parts:
@@ -119,7 +119,7 @@ class Axes:
         return out
 
     def lengths(self, a: Array, b: Array) -> Array:
-        """Arc lengths from parameters ``a`` to ``b`` of the same chains, all of shape (n,)."""
+        """Arc lengths from parameters ``a`` to ``b`` on the same chains, all of shape (n,)."""
         chain, x, parts = self._parts(a)
         y = b - 2 * chain
         out = (y - x) * np.hypot(*self.way[:, chain])

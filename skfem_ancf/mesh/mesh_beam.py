@@ -1,4 +1,4 @@
-"""Meshes of planar beams: a chain of nodes on the axis, and the height of the section."""
+"""Meshes of planar beams: nodes along the axis, and the height of the section."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from .taper import heights_of, scaled
 
 EPS = float(np.finfo(float).eps)
 
-#: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
+#: Largest number of elements of :meth:`MeshBeam.refined`.
 MAX_ELEMENTS = 2**24
 
-#: Points of a picture or a file along and across an element.
+#: Largest number of quads along and across an element in a picture or a file.
 MAX_SUBDIVISION = 1000
 
 
@@ -43,11 +43,10 @@ MAX_SUBDIVISION = 1000
 class MeshBeam(NumberedMesh):
     """The reference configuration of a planar beam, divided into elements along its axis.
 
-    A mesh does not change; its methods return other meshes.
-
-    Use :meth:`init_line`, :meth:`init_curve` or :meth:`from_points`. The nodes are numbered along
-    the axis, which keeps matrices banded; the boundaries ``left`` and ``right`` are the end
-    sections, ``top`` and ``bottom`` the surfaces at Y = +h/2 and -h/2.
+    A mesh is immutable; its methods return other meshes. Use :meth:`init_line`, :meth:`init_curve`
+    or :meth:`from_points`. The nodes are numbered along the axis, which makes matrices banded. The
+    boundaries ``left`` and ``right`` are the end sections, ``bottom`` and ``top`` the surfaces at Y
+    = -h/2 and +h/2.
 
     Attributes
     ----------
@@ -56,26 +55,27 @@ class MeshBeam(NumberedMesh):
     t
         Left and right node of each element, shape (2, nelements).
     height
-        Height h of the section; of a tapered beam the largest.
+        Height h of the section; the largest of a tapered beam.
     heights
-        Of a tapered beam the heights at xi = 0, 1/3, 2/3 and 1 of each element, shape
-        (4, nelements), between which they are cubic; else None.
+        Heights of a tapered beam at xi = 0, 1/3, 2/3 and 1 of each element, shape (4, nelements),
+        cubic in between; else None.
     taper
-        The function of the axis' parameter that :meth:`refined` takes them from, or None.
+        The height as a function of the parameter of the axis, which :meth:`refined` evaluates, or
+        None.
     p_X, p_Y
-        Derivative of the position along the axis and across the section at the nodes, shape
-        (2, nvertices): the unit tangent and the unit normal on a given curve.
+        Derivatives of the position along the axis and across the section at the nodes, shape
+        (2, nvertices): unit tangent and unit normal.
     lengths
         Length of each element along the axis, shape (nelements,).
     p_XY
         Derivative of ``p_Y`` along the axis, shape (2, nvertices), or None if it is not known.
     sections
-        "linear", "cubic", ...: how ``p_Y`` is interpolated between the nodes, see
+        Interpolation of ``p_Y`` between the nodes, "linear", "cubic", ...: see
         :meth:`with_sections`.
     s
         Parameter of each node on the curve, or None.
     curve
-        The function r(s) -> (2, n) that :meth:`refined` puts new nodes on, or None.
+        The function r(s) -> (2, n) on which :meth:`refined` places new nodes, or None.
 
     Examples
     --------
@@ -99,7 +99,7 @@ class MeshBeam(NumberedMesh):
     sections: str = "linear"
     heights: ndarray | None = None
     taper: Callable[[Array], ArrayLike] | None = None
-    #: What files call the class.
+    #: Name of the class in files.
     kind = "beam"
 
     # construction
@@ -114,18 +114,17 @@ class MeshBeam(NumberedMesh):
         x
             Increasing positions of the nodes along the axis, shape (n,), n >= 2.
         height
-            Height of the section: a number, or of a tapered beam a function of ``x`` (n,) that
+            Height of the section: a number, or for a tapered beam a function of ``x`` (n,) that
             returns heights (n,), with kinks at nodes only.
         origin
-            The point, shape (2,), from which ``x`` is measured.
+            The point, shape (2,), at x = 0.
         angle
-            Direction of the axis, in radians from the first coordinate axis, at most 2 pi in
-            size.
+            Angle of the axis from the first coordinate axis in radians, at most 2 pi in magnitude.
 
         Raises
         ------
         MeshError
-            If an element has no length, the nodes are not increasing, or a height is not positive.
+            If ``x`` does not increase, or a height is not positive.
 
         Examples
         --------
@@ -157,27 +156,27 @@ class MeshBeam(NumberedMesh):
                    dr: Callable[[Array], ArrayLike] | None = None) -> MeshBeam:
         """A beam with a curved reference configuration.
 
-        The axis of an element is the cubic through the end points with the unit tangents and the
-        arc length of the curve. :meth:`refined` puts new nodes on the curve.
+        The axis of an element is the cubic through its end points with the unit tangents and the
+        arc length of the curve. :meth:`refined` places new nodes on the curve.
 
         Parameters
         ----------
         r
-            The axis: a function of parameters, shape (n,), that returns positions (2, n).
+            The axis: a function of parameters (n,) that returns positions (2, n).
         s
-            Increasing parameters of the nodes, shape (n,), n >= 2. They need not be arc lengths.
+            Increasing parameters of the nodes, shape (n,), n >= 2; not necessarily arc lengths.
         height
             Height of the section: a number, or a function of parameters ``s`` (n,) that returns
             heights (n,), with kinks at nodes only.
         dr
-            Optional derivative of ``r``. If None it is found by the complex step where ``r`` allows
-            it, else by differences.
+            Derivative of ``r``; by default the complex step where ``r`` allows it, else
+            differences.
 
         Raises
         ------
         MeshError
-            If the curve folds (radius of curvature below h/2), has a kink at a node, stands still,
-            jumps, or an element has no length.
+            If the curve folds (radius of curvature below h/2), jumps, has a kink at a node or a
+            zero derivative, or an element has no length.
 
         Examples
         --------
@@ -214,21 +213,20 @@ class MeshBeam(NumberedMesh):
         Parameters
         ----------
         points
-            Points along the axis, shape (n, 2), at least four for a cubic; or a file of text with
-            rows x, y.
+            Points along the axis, shape (n, 2), at least four for a cubic; or a text file with rows
+            x, y.
         height
             As for :meth:`init_curve`; its parameter s is the length along the polygon of the
             points.
         elements
-            Number of elements, of equal lengths; by default one between each two points.
+            Number of elements, of equal lengths; by default one between adjacent points.
         noise
-            Root mean square distance by which the axis may miss points, as measured ones have it.
+            Root mean square distance between axis and points, for measured points.
 
         Raises
         ------
         MeshError
-            If two points that follow each other are the same, or the axis bends too sharply: at a
-            corner use two beams and a weld.
+            If adjacent points coincide, or the axis bends too sharply: at a corner weld two beams.
         FileError
             If the file cannot be read.
 
@@ -253,7 +251,6 @@ class MeshBeam(NumberedMesh):
 
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
-        """The mesh of one chain; without a curve the axis is straight."""
         height, heights, taper = heights
         tangent = np.broadcast_to(tangent, p.shape)
         return cls(p, t, default_tags(p, t), height=height, p_X=tangent, lengths=lengths, s=s,
@@ -273,9 +270,9 @@ class MeshBeam(NumberedMesh):
         if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
             raise MeshError(
                 f"a MeshBeam has two nodes per element and at least one element, t has shape "
-                f"{shape}; for quads of its body use mesh.to_meshquad()")
+                f"{shape}; for quads use mesh.to_meshquad()")
         super().__post_init__()
-        if self.height is None:  # what refinterp of a Basis asks for
+        if self.height is None:  # as Basis.refinterp makes it
             raise MeshError(
                 "height must be a number, got None: build meshes of beams with MeshBeam.init_line "
                 "or init_curve. For a picture of a Basis take quad = mesh.to_meshquad() and "
@@ -308,17 +305,17 @@ class MeshBeam(NumberedMesh):
             raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
         require_option("interpolation of the sections", self.sections, SECTIONS)
         if self.p_XY is None and self.sections != "linear":
-            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
+            raise MeshError("the mesh has no derivative p_XY of its directors: build it with "
                             "MeshBeam.init_line or MeshBeam.init_curve")
         self._mapping().check()
 
     def with_sections(self, sections: str) -> MeshBeam:
         """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
 
-        The names are those of :data:`skfem_ancf.mesh.reference_cell.SECTIONS`: "quintic", "septic",
-        "of degree 9" ... "of degree 15" for directors and axis, which is cubic for the first two.
-        A ``Beam`` chooses for itself those that hold the reference configuration of a curved beam
-        exactly; it makes no difference for straight ones.
+        The names are those of :data:`skfem_ancf.mesh.reference_cell.SECTIONS`. From "quintic" on
+        the axis is interpolated with the same degree; below it is cubic. A ``Beam`` chooses the
+        interpolation of its element, which represents a curved reference configuration exactly. For
+        straight beams all are the same.
         """
         require_option("interpolation of the sections", sections, SECTIONS)
         if sections == self.sections:
@@ -328,13 +325,13 @@ class MeshBeam(NumberedMesh):
     def replace(self, **changes: Any) -> MeshBeam:
         """The mesh with another ``height``, a number or a function, or without its ``curve``.
 
-        Positions, tangents and lengths depend on each other: for others use :meth:`init_line`,
-        :meth:`init_curve`, :meth:`refined`, :meth:`translated`, :meth:`rotated`, :meth:`scaled`.
+        Positions, tangents and lengths depend on each other: to change them use :meth:`init_line`,
+        :meth:`init_curve`, :meth:`refined`, :meth:`translated`, :meth:`rotated` or :meth:`scaled`.
 
         Raises
         ------
         NameUnknown
-            If it is another attribute.
+            For another attribute.
 
         Examples
         --------
@@ -354,7 +351,7 @@ class MeshBeam(NumberedMesh):
         return heights_of(height, self.parameters, self.t)
 
     def node_height(self, node: int) -> float:
-        """The height of the section of a node."""
+        """Height of the section at a node."""
         if self.heights is None:
             return self.height
         end = int(node in self.t[1])
@@ -362,8 +359,7 @@ class MeshBeam(NumberedMesh):
 
     @property
     def parameters(self) -> Array:
-        """Parameter of each node on the axis, shape (nvertices,): ``s``, or lengths from its start.
-        """
+        """Parameter of each node on the axis, (nvertices,): ``s``, or the length from the start."""
         if self.s is not None:
             return self.s
         out = np.zeros(self.p.shape[1])
@@ -402,14 +398,13 @@ class MeshBeam(NumberedMesh):
 
     @cached_property
     def is_uniform(self) -> bool:
-        """True if one table does for all elements: straight, of one length, height and direction.
+        """True if one table serves all elements: straight, of equal length, height and direction.
 
-        The chains that they make are of one length, too.
+        Their chains have equal lengths, too.
         """
         return self.is_straight and self.heights is None and self._are_equal()
 
     def _are_equal(self):
-        """True if straight elements are of one length and direction, as their chains are."""
         # the round-off of the nodes' positions is no difference in length
         noise = 8 * EPS * np.max(np.abs(self.p))
         return bool(np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise
@@ -418,25 +413,25 @@ class MeshBeam(NumberedMesh):
 
     @property
     def is_chain(self) -> bool:
-        """True if each element begins where the one before it ends."""
+        """True if each element begins at the end of the previous one."""
         return bool(self.t.shape[1] == self.doflocs.shape[1] - 1)
 
     @property
     def chain_lengths(self) -> Array:
-        """Length of the chain that each element is in, shape (nelements,)."""
+        """Length of the chain of each element, shape (nelements,)."""
         if self.is_chain:
             return np.full(self.t.shape[1], self.lengths.sum())
         return np.bincount(self.chains, self.lengths)[self.chains]
 
     @cached_property
     def chains(self) -> Array:
-        """Number of the chain that each element is in, shape (nelements,)."""
+        """Number of the chain of each element, shape (nelements,)."""
         return np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
 
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
-        """A function from points x, y to the elements that hold them; ``mapping`` is not used.
+        """A function from coordinates x, y to elements, with MeshError outside the body.
 
-        The function raises :class:`MeshError` for points outside the body.
+        ``mapping`` is not used.
         """
         find = Finder(self)
 
@@ -451,7 +446,7 @@ class MeshBeam(NumberedMesh):
         return self._adaptive(np.arange(self.nelements))
 
     def refined(self, times_or_ix: Any = 1) -> MeshBeam:
-        """A finer mesh: new nodes on the curve, numbered along the axis; names are kept.
+        """A finer mesh with the same named boundaries and subdomains; new nodes are on the curve.
 
         Parameters
         ----------
@@ -468,21 +463,20 @@ class MeshBeam(NumberedMesh):
 
     def graded(self, at: Any = ("left",), size: float | None = None,
                growth: float = 0.5) -> MeshBeam:
-        """A mesh that is finer near sections: for the boundary layers of supports and loads.
+        """A mesh refined near sections, to resolve boundary layers at supports and loads.
 
-        Elements are halved until those within one and a half heights of the sections are not longer
-        than ``size``, and those further off not longer than ``growth`` times their distance from
-        there.
+        Elements are halved until those within 1.5 heights of the sections are not longer than
+        ``size``, and the others not longer than ``growth`` times their distance from there.
 
         Parameters
         ----------
         at
-            Sections: "left", "right", or points (x, y) of the axis; one, or several, or an array of
+            Sections: "left", "right", or points (x, y) of the axis; one, several, or an array of
             points, shape (n, 2).
         size
-            Length of the elements at the sections; a quarter of the height by default.
+            Element length at the sections; a quarter of the height by default.
         growth
-            How fast the elements get longer, positive.
+            Ratio of element length to distance, positive.
 
         Raises
         ------
@@ -523,7 +517,7 @@ class MeshBeam(NumberedMesh):
 
     def restrict(self, elements: Any, return_mapping: bool = False, skip_boundaries: bool = False,
                  skip_subdomains: bool = False) -> Any:
-        """The mesh of some elements; a part cut off keeps the numbering along the axis.
+        """The mesh of some elements, with the numbering along the axis.
 
         Parameters
         ----------
@@ -531,7 +525,7 @@ class MeshBeam(NumberedMesh):
             Numbers of elements, shape (k,), a mask, the name of a subdomain, or a function of the
             points.
         return_mapping, skip_boundaries, skip_subdomains
-            Return the numbers of the nodes that are left, shape (n,), too; leave the names out.
+            Also return the numbers of the remaining nodes, shape (n,); drop the names.
         """
         require_unmasked("elements", elements)
         elements = np.unique(self.normalize_elements(elements))
@@ -576,16 +570,16 @@ class MeshBeam(NumberedMesh):
                        taper=None if self.taper is None else partial(scaled, self.taper, scale))
 
     def translated(self, diffs: ArrayLike) -> MeshBeam:
-        """The mesh moved by a vector, shape (2,)."""
+        """The mesh translated by a vector, shape (2,)."""
         return self._moved(np.eye(2), require_finite("the shift", diffs, (2,)))
 
     def rotated(self, angle: float, about: ArrayLike = (0.0, 0.0)) -> MeshBeam:
-        """The mesh turned about a point.
+        """The mesh rotated about a point.
 
         Parameters
         ----------
         angle, about
-            In radians, counterclockwise, at most 2 pi in size; the point, shape (2,).
+            In radians, counterclockwise, at most 2 pi in magnitude; the point, shape (2,).
         """
         angle, about = _radians(angle), require_finite("about", about, (2,))
         c, s = np.cos(angle), np.sin(angle)
@@ -593,8 +587,7 @@ class MeshBeam(NumberedMesh):
         return self._moved(Q, about - Q @ about)
 
     def scaled(self, factors: ArrayLike) -> MeshBeam:
-        """The mesh, with its height, scaled by a positive number, or several that are equal (n,).
-        """
+        """The mesh and its height scaled by a positive number, or several equal ones (n,)."""
         f = np.unique(require_finite("factors", factors))
         if len(f) != 1 or f[0] <= 0:
             raise MeshError(f"a beam is scaled by one positive factor in all directions, got "
@@ -628,7 +621,7 @@ class MeshBeam(NumberedMesh):
         Parameters
         ----------
         visuals, **kwargs
-            Name of the module of ``skfem.visuals``; those of :meth:`skfem.Mesh.draw`.
+            Name of a module of ``skfem.visuals``; arguments of :meth:`skfem.Mesh.draw`.
         """
         return self._outline().draw(visuals, **kwargs)
 
@@ -646,31 +639,30 @@ class MeshBeam(NumberedMesh):
                 f"{self.lengths.sum():.6g} ({kind})")
 
     def save_npz(self, filename: StrPath) -> None:
-        """Save all but the functions ``curve`` and ``taper``; read it with :meth:`load_npz`."""
+        """Save all but the functions ``curve`` and ``taper``, for :meth:`load_npz`."""
         path = require_path("filename", filename)
         files.save_npz(self, path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz"))
 
     @classmethod
     def load_npz(cls, filename: StrPath) -> MeshBeam:
-        """Load a mesh saved by :meth:`save_npz`; nothing in the file is executed.
+        """Load a mesh saved by :meth:`save_npz`, without executing anything in the file.
 
         Raises
         ------
         FileError, MeshError
-            If the file cannot be read, or holds no beam.
+            If the file cannot be read, or contains no beam.
         """
         kinds = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if ours(of)}
         return files.load_npz(cls, require_path("filename", filename), kinds | {cls.kind: cls})
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
-        """Save the mesh: ``.npz`` to load it again, else the quads of :meth:`to_meshquad` for a
-        viewer.
+        """Save the mesh as ``.npz``, or the quads of :meth:`to_meshquad` in a format of meshio.
 
         Parameters
         ----------
         filename, point_data, cell_data, **kwargs
-            Its suffix says the format; for a viewer as for ``skfem.MeshQuad.save``.
+            File name, whose suffix is the format; the others as for ``skfem.MeshQuad.save``.
         """
         path = require_path("filename", filename)
         if path.suffix == ".npz":
@@ -686,21 +678,21 @@ class MeshBeam(NumberedMesh):
         Parameters
         ----------
         filename, out, **kwargs
-            The file; others are not used, they are there as for ``skfem.Mesh.load``.
+            The file; the others, of ``skfem.Mesh.load``, are ignored.
         """
         path = require_path("filename", filename)
         require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":
             return cls.load_npz(path)
-        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz files keep the axis, "
+        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz files store the axis, "
                         "the tangents and the height; save the mesh as one of them")
 
 
 def reach(meshes: Sequence[MeshBeam]) -> float:
-    """What tolerances of places are relative to: how far bodies reach, or move.
+    """The size of a scene, to which tolerances of positions are relative.
 
-    The diagonal of the box round all nodes, but not less than the longest line, as one that is
-    curled may be drawn straight, and not more than all lines together.
+    It is the diagonal of the bounding box of all nodes, but at least the longest line (a curled
+    line may be straightened) and at most the total length of all lines.
 
     Examples
     --------
@@ -718,13 +710,12 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
 
 
 def _chain(n):
-    """The nodes of the elements of one chain of n nodes, (2, n - 1)."""
     nodes = np.arange(n, dtype=np.int32)
     return np.array([nodes[:-1], nodes[1:]])
 
 
 def _radians(angle):
-    """An angle as a float; raises InputError where it is likely to be in degrees."""
+    """An angle as a float; InputError if it is likely to be in degrees."""
     angle = require_finite_scalar("angle", angle)
     if abs(angle) > 2.0 * np.pi * (1 + 1e-12):
         raise InputError(f"an angle is given in radians, at most 2 pi in size, got {angle!r}: for "

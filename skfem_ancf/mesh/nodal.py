@@ -1,4 +1,4 @@
-"""Derivatives of a curved axis at its nodes, beyond those that a mesh keeps."""
+"""Higher nodal derivatives of a curved axis."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from ..core.types import Array
 
 
 def turned(d: Array) -> Array:
-    """Vectors (2, ...) turned by a right angle: normals, and their derivatives, of tangents."""
+    """Vectors (2, ...) rotated by 90 degrees."""
     return np.array([-d[1], d[0]])
 
 
 def nodal_derivatives(mesh: Any, most: int) -> list[Array]:
-    """Position of the axis at the nodes, and ``most`` derivatives by the arc length, all (2, n).
+    """Position of the axis at the nodes, and ``most`` derivatives by arc length, all (2, n).
 
-    Position, tangent and curvature are those of the mesh, the others of the polynomial of degree 8
-    that has these at the node and at its two neighbours: they have an error of order 9 in the
-    position.
+    Position, tangent and curvature are those of the mesh. Higher derivatives are those of the
+    polynomial of degree 8 through these at the node and its two neighbours, with a position error
+    of order 9.
     """
     known = [mesh.p, mesh.p_X]
     if most > 1 and mesh.p_XY is not None:
@@ -32,7 +32,7 @@ def nodal_derivatives(mesh: Any, most: int) -> list[Array]:
 
 
 def _add_higher(mesh, known, out):
-    """Put derivatives from the third on, (n, 2, nvertices), from ``known`` ones (3, ...)."""
+    """Fill in derivatives from the third on, (n, 2, nvertices), from ``known`` ones (3, ...)."""
     apart = mesh.t[0, 1:] != mesh.t[1, :-1]
     at = np.cumsum(np.bincount(mesh.t[1], mesh.lengths, mesh.p.shape[1]))
     for a, b in zip(mesh.t[0, np.append(True, apart)], mesh.t[1, np.append(apart, True)]):

@@ -1,4 +1,4 @@
-"""Facets, elements and their names on a chain of elements, numbered along the axis."""
+"""Facets, elements and their names on chains of elements, numbered along the axis."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ..core.types import Array
 from .places import satisfying
 
 
-# a view of an array, as which pickle takes it, has no orientation
+# pickle takes it for a view of an array and loses the orientation
 copyreg.pickle(OrientedBoundary, lambda f: (OrientedBoundary, (np.asarray(f), f.ori)))
 
 
 def default_tags(p: Array, t: Array) -> dict[str, Array]:
-    """The ends and the surfaces of a mesh: facets by name."""
+    """Facets of the ends and the surfaces of a mesh by name."""
     n, ne = p.shape[1], t.shape[1]
     facets = read_only(np.arange(n + 2 * ne, dtype=np.int32))
     return {"left": facets[:1], "right": facets[n - 1:n], "bottom": facets[n:n + ne],
@@ -32,9 +32,9 @@ def default_tags(p: Array, t: Array) -> dict[str, Array]:
 
 
 class NumberedMesh(Immutable, NearMisses, Mesh2D):
-    """What scikit-fem asks of the numbers of facets and elements, for meshes of beams.
+    """The numbering of facets and elements that scikit-fem needs, for meshes of beams.
 
-    Facets are the sections of the nodes, then the bottoms and the tops of the elements.
+    Facets are the sections at the nodes, then the bottoms and the tops of the elements.
     """
 
     def _freeze(self):
@@ -112,10 +112,10 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
 
     def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
                           normal: ArrayLike | None = None) -> Array:
-        """The facets (k,) for whose middle a function of points (2, n) is true.
+        """Facets (k,) whose midpoints satisfy a function of points (2, n).
 
-        With ``boundaries_only`` no sections between two elements. With the direction ``normal``
-        (2,) of the side that the facets are given it is an ``OrientedBoundary``.
+        ``boundaries_only`` excludes sections between two elements. With ``normal`` (2,), the
+        direction of the side of the facets, the result is an ``OrientedBoundary``.
         """
         middle, mapping = np.array([[0.5]]), self._mapping()
         facets = satisfying(test, mapping.G(middle)[:, :, 0])
@@ -127,7 +127,7 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
         normals = mapping.normals(points, tind, facets, self.t2f)[:, :, 0]
         return OrientedBoundary(facets, 1 * (np.asarray(normal) @ normals < 0))
 
-    # what a chain of elements cannot do
+    # methods of scikit-fem's meshes without a meaning for a chain of elements
 
     def _refuse(self, what: str) -> NoReturn:
         raise MeshError(

@@ -1,4 +1,4 @@
-"""What names a place on a beam: a boundary, a material point, a function, facets."""
+"""Places on a beam: a boundary, a material point, a function, facets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, as
 from ..core.types import Array, Place
 from .location import Finder
 
-#: How far off a section a point may be that names it, relative to an element next to it.
+#: Tolerance for a point on a section, relative to an adjacent element.
 NEAR = 1e-6
 
 KINDS = ("the name of a boundary, a material point (x, y), a function of the points "
@@ -22,7 +22,7 @@ KINDS = ("the name of a boundary, a material point (x, y), a function of the poi
 
 
 def is_point(place: object) -> bool:
-    """True for two numbers in a tuple or a list, or in an array of floats.
+    """True for two numbers in a tuple, a list or an array of floats.
 
     Examples
     --------
@@ -40,14 +40,14 @@ def is_point(place: object) -> bool:
 
 
 def points_of_rows(places: Any) -> Any:
-    """A list of points (x, y) for an array with one in each row, shape (n, 2); else what it is."""
+    """A list of points (x, y) for an array of shape (n, 2); else the argument itself."""
     if isinstance(places, np.ndarray) and places.ndim == 2 and places.shape[1] == 2:
         return [tuple(point) for point in places.tolist()]
     return places
 
 
 def is_place(place: object) -> bool:
-    """True for one place, False for a tuple of one place for each of several beams."""
+    """True for one place, False for a tuple with a place for each of several beams."""
     return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
 
 
@@ -59,7 +59,7 @@ def as_point(point: Any, mesh: Any = None) -> Array:
 
 
 def on_other_mesh(place: object) -> bool:
-    """True if a place means the same on another mesh: it holds no numbers of facets."""
+    """True if a place is independent of the mesh, without numbers of facets."""
     if isinstance(place, np.ndarray):
         return is_point(place)
     if isinstance(place, (tuple, list, set, frozenset)) and not is_point(place):
@@ -68,19 +68,19 @@ def on_other_mesh(place: object) -> bool:
 
 
 def facets_of(mesh: Any, place: Place) -> Array:
-    """Numbers of the facets that a place means, shape (n,), n >= 1.
+    """Numbers of the facets at a place, shape (n,), n >= 1.
 
-    This is the one rule for every method that takes a place:
+    All methods that take a place use this function:
 
     * a name is that of a boundary,
-    * two numbers in a tuple, a list or an array of floats are a material point (x, y): the
-      section of a node on which it lies,
-    * a function takes points x, shape (2, n), and returns n truth values: the facets with their
-      middle there,
-    * an array of integers holds numbers of facets,
-    * another tuple, list or set holds places: all of them; an array (n, 2) holds n points.
+    * two numbers in a tuple, a list or an array of floats are a material point (x, y) on the
+      section of a node,
+    * a function takes points x, shape (2, n), and returns n truth values: the facets whose
+      midpoints satisfy it,
+    * an array of integers contains numbers of facets,
+    * another tuple, list or set is a union of places; an array (n, 2) contains n points.
 
-    A scikit-fem ``OrientedBoundary`` stays one.
+    A scikit-fem ``OrientedBoundary`` is returned as it is.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def facets_of(mesh: Any, place: Place) -> Array:
     Raises
     ------
     NameUnknown, MeshError, InputError
-        If a name is not known, there is no facet at the place, or it is no place.
+        If a name is not known, there is no facet at the place, or the type is wrong.
 
     Examples
     --------
@@ -101,8 +101,8 @@ def facets_of(mesh: Any, place: Place) -> Array:
     >>> facets_of(mesh, "right").tolist(), facets_of(mesh, (1, 0)).tolist()
     ([2], [1])
     """
-    if is_masked(place):  # one that a function gave
-        raise InputError(f"a place has masked values: {shown(place)}; name what is there")
+    if is_masked(place):
+        raise InputError(f"a place must not have masked values, got {shown(place)}")
     place = points_of_rows(place)
     if isinstance(place, str):
         return _named(mesh, place)
@@ -131,7 +131,7 @@ def facets_of(mesh: Any, place: Place) -> Array:
 
 
 def node_of(mesh: Any, place: Place) -> int:
-    """The node of a place that is one section; raises MeshError of others."""
+    """The node of a place that is one section; MeshError for others."""
     facets = np.asarray(facets_of(mesh, place))
     if len(facets) != 1 or facets[0] >= mesh.p.shape[1]:
         raise MeshError(f"boundary {place!r} is not one section of the beam; sections are "
@@ -140,7 +140,7 @@ def node_of(mesh: Any, place: Place) -> int:
 
 
 def section_at(mesh: Any, point: ArrayLike) -> int:
-    """The node on whose section a material point (2,) lies; else a MeshError."""
+    """The node whose section contains a material point (2,); else MeshError."""
     x = as_point(point, mesh)
     d = x[:, None] - mesh.p
     Y = np.sum(d * mesh.p_Y, axis=0) / np.sum(mesh.p_Y**2, axis=0)
@@ -181,7 +181,7 @@ def _named(mesh: Any, name: str) -> Array:
         raise NameUnknown("boundary", name, mesh.boundaries or {})
     facets = mesh.boundaries[name]
     if not len(facets):
-        raise MeshError(f"the boundary {name!r} is empty: it holds no facet of this mesh; others "
+        raise MeshError(f"the boundary {name!r} is empty: it has no facet of this mesh; others "
                         f"are {_names(mesh)}")
     return facets
 
@@ -201,7 +201,7 @@ def _numbered(mesh: Any, facets: Array) -> Array:
 
 
 def satisfying(test: Callable[[Array], Any], x: Array, what: str = "a place") -> Array:
-    """Numbers of the points x (2, n) for which a function that names ``what`` returns True."""
+    """Numbers of the points x (2, n) that satisfy a function; ``what`` is for messages."""
     found = ask(f"the function that names {what}, of x of shape {x.shape},", test, x)
     chosen = np.asarray(found)
     if is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool:

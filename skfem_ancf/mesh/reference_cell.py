@@ -1,4 +1,4 @@
-"""The reference cell of a beam and the two interpolations along its axis."""
+"""The reference cell of a beam and the interpolations along its axis."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from skfem.refdom import RefLine, RefQuad, Refdom
 from ..core.types import Array
 
 
-#: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
+#: Interpolation of sections with 1, 2, ... nodal derivatives along X, the 0th included.
 SECTIONS = ("linear", "cubic", "quintic", "septic",
             *(f"of degree {degree}" for degree in (9, 11, 13, 15)))
 
@@ -21,10 +21,9 @@ SECTIONS = ("linear", "cubic", "quintic", "septic",
 class RefBeam(Refdom):
     """Unit square (xi, eta) with two vertices, at the middle of its left and right side.
 
-    ``xi`` runs along the axis, ``eta`` across the section; the axis is ``eta = 1/2``.
-    The facets are bottom, right, top, left, as for scikit-fem's ``RefQuad``, whose
-    quadrature is used through the attribute ``refdom``. Bottom and top share their
-    two vertices, left and right have one vertex, written twice.
+    ``xi`` runs along the axis, ``eta`` across the section; the axis is ``eta = 1/2``. The facets
+    are bottom, right, top, left as in scikit-fem's ``RefQuad``, whose quadrature is used (attribute
+    ``refdom``). Bottom and top share their two vertices; left and right have one, listed twice.
     """
 
     p = np.array([[0.0, 1.0], [0.5, 0.5]])
@@ -39,13 +38,13 @@ class RefBeam(Refdom):
 
     @classmethod
     def on_facet(cls, i: int, X: Array) -> Array:
-        """Which reference points (2, n) lie on a facet: bottom, right, top, left."""
+        """Whether reference points (2, n) are on facet i: bottom, right, top, left."""
         return (np.abs(X[1]) < 1e-4, np.abs(X[0] - 1) < 1e-4,
                 np.abs(X[1] - 1) < 1e-4, np.abs(X[0]) < 1e-4)[i]
 
 
 class ElementBeamP1(ElementH1):
-    """Linear along the axis, constant across the section: for fields such as a temperature."""
+    """Linear along the axis, constant across the section: for scalars such as a temperature."""
 
     nodal_dofs = 1
     maxdeg = 1
@@ -65,9 +64,9 @@ class ElementBeamP1(ElementH1):
 def _hermite_coefficients(m: int, derivative: int) -> Array:
     """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
 
-    Bernstein coefficients times binomials, (2 m, n + 1 - derivative): all of one sign, so that
-    nothing cancels (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein
-    form", Computer Aided Geometric Design 4, 1987).
+    Bernstein coefficients times binomials, (2 m, n + 1 - derivative): without cancellation, as all
+    have one sign (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein form",
+    Computer Aided Geometric Design 4, 1987).
     """
     n = 2 * m - 1
     left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
@@ -80,7 +79,7 @@ def _hermite_coefficients(m: int, derivative: int) -> Array:
 
 
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
-    """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
+    """Hermite functions of degree 2 m - 1 with derivatives 0 ... m-1 at 0, then at 1.
 
     Shape (2 m,) + xi.shape.
     """

@@ -1,4 +1,4 @@
-"""Finer meshes: elements halved, new nodes on the curve, names kept."""
+"""Refinement: halve elements, with new nodes on the curve and the same names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .taper import halved as halved_heights, heights_of
 
 
 def halved(mesh: Any, ix: Array) -> Any:
-    """The mesh with elements ``ix`` (k,) halved; new nodes on the curve, names kept."""
+    """The mesh with elements ``ix`` (k,) halved; new nodes are on the curve."""
     marked = np.zeros(mesh.nelements, dtype=bool)
     marked[ix] = True
     new = _midpoints(mesh, ix)
@@ -50,10 +50,10 @@ def halved(mesh: Any, ix: Array) -> Any:
 
 
 def by_element(mesh: Any, at: Array) -> Any:
-    """A curved mesh of elements apart, whose sections turn as their axis beside nodes ``at`` (k,).
+    """A curved mesh of disconnected elements with one-sided rates of turning at nodes ``at`` (k,).
 
-    Where sections are cubic along the elements, or of a higher degree, one rate of turning at a
-    node serves both sides: at a jump of the curvature it is that of neither.
+    Cubic and higher directors share one nodal derivative, which fits neither side of a jump of the
+    curvature.
     """
     mesh, n, node = mesh.with_sections("cubic"), mesh.nelements, mesh.t.T.ravel()
     fields: dict[str, Any] = {name: getattr(mesh, name)[:, node]
@@ -87,7 +87,7 @@ def _midpoints(mesh, ix):
 
 
 def _refined_names(mesh, m, first, marked, node):
-    """Boundaries of the refined mesh ``m``: sections move, surfaces pass to the children."""
+    """Boundaries of the refined mesh ``m``."""
     tags = mesh._boundaries
     if tags is None:
         return None

@@ -1,4 +1,4 @@
-"""A smooth axis through points, of an array or a file of text."""
+"""A smooth axis through points from an array or a text file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..core.errors import (FileError, MeshError, require_finite, require_finite_
                            require_integer, require_path)
 from ..core.types import Array
 
-#: Pieces of an interval between two points in which lengths are summed.
+#: Chords per interval between two points for its length.
 PIECES = 32
 
 
@@ -40,14 +40,14 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
 
 
 def _table(filename):
-    """Rows x, y of a file: separated by commas, blanks or semicolons, with or without names."""
+    """Rows x, y of a file, separated by commas, blanks or semicolons, with an optional header."""
     path = require_path("points", filename)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{path} cannot be read: {error}") from error
     lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if any(";" in line for line in lines):  # with commas for points, perhaps
+    if any(";" in line for line in lines):  # maybe with decimal commas
         lines = [line.replace(",", ".").replace(";", ",") for line in lines]
     if lines and any(letter.isalpha() and letter not in "eE" for letter in lines[0]):
         lines = lines[1:]

@@ -11,23 +11,23 @@ from ..core.errors import MeshError, ask_array, require_function, require_positi
 from ..core.quadrature import lagrange
 from ..core.types import Array
 
-#: Where the heights of an element are given, and between them, where a cubic has to fit.
+#: Axial coordinates of the heights of an element, and points between at which the fit is checked.
 PLACES, BETWEEN = np.arange(4) / 3.0, (1.0 + 2.0 * np.arange(3)) / 6.0
 
-#: Largest relative error of the cubic there.
+#: Largest relative error of the fit.
 FITS = 0.02
 
 
 def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
-    """A function of parameters (n,) times a number."""
+    """``factor`` times a function of parameters (n,)."""
     return factor * np.asarray(function(s))
 
 
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
-    """Largest height, heights (4, ne) in the elements and their function; None of a number.
+    """Largest height, heights (4, ne) in the elements, and the function; None for a number.
 
-    ``s`` are the parameters of the nodes, ``t`` the nodes of the elements. Raises MeshError if the
-    function is no cubic in an element.
+    ``s`` are the parameters of the nodes, ``t`` the nodes of the elements. Raises MeshError if a
+    cubic does not fit the function in an element.
     """
     if not callable(height):
         return require_positive("height", height), None, None
@@ -45,9 +45,9 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
     if np.max(gap) > FITS:
         e = int(np.argmax(np.max(gap, axis=0)))
         raise MeshError(
-            f"the height is no smooth function in element {e}, from {a[e]:.6g} to {b[e]:.6g}: a "
-            f"cubic polynomial misses it by {np.max(gap):.1%}. Put a node at a kink, weld two "
-            "beams where it jumps, or take more elements")
+            f"the height is not smooth in element {e}, from {a[e]:.6g} to {b[e]:.6g}: a cubic "
+            f"polynomial differs by {np.max(gap):.1%}. Put a node at a kink, weld two beams at "
+            "a jump, or use more elements")
     return float(np.max(heights)), heights, height
 
 
@@ -57,7 +57,7 @@ def powers(heights: Array) -> Array:
 
 
 def halved(heights: Array, marked: Array) -> Array:
-    """The heights (4, nelements) of elements of which those that are ``marked`` are halved."""
+    """Heights (4, nelements) after halving the ``marked`` elements."""
     left, right = (lagrange(PLACES, a + 0.5 * PLACES) @ heights[:, marked] for a in (0.0, 0.5))
     out = np.repeat(heights, 1 + marked, axis=1)
     first = np.flatnonzero(marked) + np.arange(np.sum(marked))

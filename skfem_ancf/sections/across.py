@@ -1,4 +1,4 @@
-"""The section of one beam: weights of points, stiffnesses and inertia along its axis."""
+"""The section of one beam on its mesh: integration weights, stiffnesses and inertias."""
 
 from __future__ import annotations
 
@@ -25,42 +25,42 @@ from .shear import shear_factor
 #: Points across a layer for areas and moments.
 POINTS = 4
 
-#: Points below a layer by less than this part of the height are in it.
+#: Tolerance of interfaces, relative to the height.
 EDGE = 1e-12
 
-#: Degree of the polynomial of the height that a shear factor is between the least and the largest.
+#: Degree in the height of the interpolated shear factor of a tapered section.
 HEIGHTS = 7
 
-#: What messages call the functions of a layer.
+#: Functions of a layer and their names in messages.
 NAMES = {"width": "width", "grade": "E", "density": "density"}
 
-#: Moduli and factors of the integrals that :meth:`Across.moments` finds.
+#: Moduli and factors of the integrals of :meth:`Across.moments`.
 MODULI = {"stiffness": "axial_modulus", "E": "E"}
 TIMES = {"stiffness": "grade", "E": "grade", "mass": "density", "area": ""}
 
 
 class LayerPoints:
-    """Points of a layer on a mesh; :meth:`Across.at` makes it."""
+    """Points of a layer, from :meth:`Across.at`."""
 
     def __init__(self, across: Across, layer: Layer, X: Array, tind: Array | None = None) -> None:
         self.across, self.layer, self.X, self.tind = across, layer, X, tind
 
     def moved(self, X: Array) -> LayerPoints:
-        """Other points (2, npoints) or (2, nelements, npoints) of the layer."""
+        """The same layer at other points, (2, npoints) or (2, nelements, npoints)."""
         return LayerPoints(self.across, self.layer, X, self.tind)
 
     @property
     def heights(self) -> Array:
-        """Of the sections, shape (nelements, npoints)."""
+        """Height of the section at the points, shape (nelements, npoints)."""
         return self.across.heights(self.X[0], self.tind)
 
     def asked(self, name: str) -> Array:
-        """What a function of the layer, of :data:`NAMES`, is there, (nelements, npoints)."""
+        """Values of a function of the layer named in :data:`NAMES`, (nelements, npoints)."""
         return asked(NAMES[name], getattr(self.layer, name),
                      *self.across.coordinates(self.X, self.tind))
 
     def factor(self, name: str, whole: bool = False) -> Any:
-        """A number of the layer, or what its function is there, or the mean of its sections."""
+        """A property of the layer: a number, values at the points, or means over the section."""
         value = getattr(self.layer, name)
         if callable(value):
             return self.layer.measure.values(self, name, whole)
@@ -71,44 +71,44 @@ class LayerPoints:
 
 
 class Across(Immutable):
-    """A :class:`~skfem_ancf.sections.Section` on a mesh.
+    """A :class:`~skfem_ancf.sections.Section` on the mesh of a beam.
 
-    What is returned at points has the shape (nelements, npoints), or is a number.
+    Values at points have shape (nelements, npoints), or are numbers where they are constant.
 
     Parameters
     ----------
     mesh, element
-        Those of the beam.
+        Mesh and element of the beam.
     section
         A Section.
     material
-        That of the beam; None if the section has its own.
+        Material of the beam; None if the section has materials.
 
     Other Parameters
     ----------------
     layer
-        One of :attr:`layers`, of which the points are.
+        One of :attr:`layers`.
     X
         Reference points, shape (2, npoints) or (2, nelements, npoints).
     xi
-        Places along elements, shape (npoints,) or (nelements, npoints).
+        Axial coordinates in [0, 1], shape (npoints,) or (nelements, npoints).
     tind
         Elements, shape (nelements,), or None for all.
     whole
-        The points stand for their sections.
+        Use means over the section: each point represents a whole section.
     times
-        "grade" or "density" for the integrals of these; "" for volumes.
+        "grade" or "density" weights the integral by it; "" gives areas and volumes.
 
     Attributes
     ----------
     layers
-        From the bottom to the top, a tuple of :class:`~skfem_ancf.sections.section.Layer`.
+        A tuple of :class:`~skfem_ancf.sections.section.Layer`, from bottom to top.
     plain, simple : bool
-        A rectangle of one width and one material; and that on a mesh of one height.
+        A rectangle of constant width and one material; the same on a mesh of constant height.
     constant, uniform : bool
-        It is the same all along the beam; and one table serves all elements.
+        The section is constant along the beam; one table serves all elements.
     moving : bool
-        What jumps across it does so at other parts of the height from place to place.
+        Interfaces of layers lie at different relative heights along the beam.
     """
 
     def __init__(self, mesh: MeshBeam, element: ElementBeam, section: Section,
@@ -127,7 +127,7 @@ class Across(Immutable):
             self._check()
 
     def _check(self):
-        """Ask functions all over the body, so that they fail when the beam is made."""
+        """Evaluate all functions over the body, so that errors appear when the beam is made."""
         X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
         for layer in self.layers:
             low, *_, high = self._ends(layer, X[0])
@@ -138,9 +138,9 @@ class Across(Immutable):
 
     @cached_property
     def jumps(self) -> Array:
-        """Stations, see :func:`~.jumps.jumps`, at which something of the section jumps.
+        """Elements that begin with a jump of width, E, density, slope of the height or curvature.
 
-        A width, a modulus, a density, the slope of the height, or the curvature of the axis.
+        See :func:`~.jumps.jumps`.
         """
         n, found = self.mesh.nelements, [np.zeros(0)]
         for layer in self.layers:
@@ -154,7 +154,7 @@ class Across(Immutable):
 
     @cached_property
     def bends(self) -> Array:
-        """Stations at which the curvature of the axis jumps, seen by its cubics."""
+        """Elements that begin with a jump of the axis' curvature, from its cubic interpolation."""
         mesh = self.mesh
         if mesh.is_straight:
             return np.zeros(0)
@@ -167,25 +167,22 @@ class Across(Immutable):
     # points
 
     def coordinates(self, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-        """Material coordinates x, the parameter of the axis, and y, the distance from it."""
+        """Material coordinates: x, the parameter of the axis, and y, the distance from the axis."""
         s, t = self.mesh.parameters, self.mesh.t if tind is None else self.mesh.t[:, tind]
         a, b = s[t][:, :, None]
         x = a + np.asarray(X[0]) * (b - a)
         return x, np.broadcast_to(self.mesh.mapping().offset(X, tind), x.shape)
 
     def heights(self, xi: Array, tind: Array | None = None) -> Array:
-        """Heights at places xi along elements."""
+        """Section heights at axial coordinates xi."""
         return self.mesh.mapping().height(xi, tind)[0]
 
     def _ends(self, layer, xi):
-        """Ends of the pieces of a layer at places along the elements, (npieces + 1, ...)."""
+        """Interfaces of the intervals of a layer at axial coordinates, (npieces + 1, ...)."""
         return layer.measure.ends(self.heights(xi)) if self.moving else layer.measure.highest
 
     def which(self, X: Array, tind: Array | None = None) -> Array:
-        """The number of the layer at each of points (2, ...); between two layers of the upper.
-
-        Elements only count where layers move.
-        """
+        """Layer number at points (2, ...); an interface belongs to the layer above it."""
         if self.moving:
             h = self.heights(X[0], tind)
             return sum((X[1] >= s.measure.ends(h)[-1] for s in self.layers[:-1]),
@@ -195,16 +192,16 @@ class Across(Immutable):
 
     def of_layers(self, X: Array, like: Array, of: Callable[[int], Array],
                   tind: Array | None = None, graded: bool = True) -> Array:
-        """A field that each layer has by its own law.
+        """Assemble a field that each layer defines.
 
         Parameters
         ----------
         like
-            An array of the shape of the field, (..., nelements, npoints).
+            An array of the field's shape, (..., nelements, npoints).
         of
-            Returns the field as if all were of the layer of a number.
+            Function of the layer number that returns the field of that layer at all points.
         graded
-            It is proportional to the energy.
+            Multiply by the grade, as for quantities proportional to the energy.
         """
         if len(self.layers) == 1:
             graded = graded and self.layers[0].grade is not None
@@ -219,19 +216,19 @@ class Across(Immutable):
         return out
 
     def at(self, layer: Layer, X: Array, tind: Array | None = None) -> LayerPoints:
-        """Points of a layer, as its measure takes them."""
+        """A layer at points, as its measure takes them."""
         return LayerPoints(self, layer, X, tind)
 
     def volume(self, layer: Layer, X: Array, W: Array, tind: Array | None = None,
                whole: bool = False, times: str = "", full: bool = False) -> Array:
-        """Volumes that the points of a rule of a layer stand for.
+        """Integration weights (volumes) of the points of a layer's rule.
 
         Parameters
         ----------
         W
-            Weights of the points on the reference cell, (npoints,).
+            Weights on the reference cell, (npoints,).
         full
-            Of the body whose sections have their height between nodes too, see
+            Use section directors of unit length between nodes too, see
             :meth:`~skfem_ancf.mesh.mapping.MappingBeam.full_volume`.
         """
         mapping = self.mesh.mapping()
@@ -240,23 +237,23 @@ class Across(Immutable):
 
     def breadth(self, layer: Layer, X: Array, tind: Array | None = None, whole: bool = False,
                 times: str = "") -> Any:
-        """What the weights of rules, whose sum is 1, stand for: area over height."""
+        """Area over height: the factor on the weights of a rule, whose sum is 1."""
         return layer.measure.breadth(self.at(layer, X, tind), whole, times)
 
     def width(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
-        """The width at points of a layer, that of its piece there."""
+        """Width at points of a layer."""
         return layer.measure.width(self.at(layer, X, tind))
 
     def grade(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
-        """The factor on the energy of a layer at points."""
+        """Factor on the energy density of a layer at points."""
         return self.at(layer, X, tind).factor("grade")
 
     def density(self, layer: Layer, X: Array, tind: Array | None = None) -> Any:
-        """Mass per volume of a layer at points; raises InputError if its material has none."""
+        """Mass per volume of a layer at points; InputError if its material has none."""
         return self.at(layer, X, tind).factor("density")
 
     def face(self, side: int, X: Array, tind: Array | None = None) -> Any:
-        """The width of the bottom (``side`` 0) or the top (1); raises InputError of a circle.
+        """Width of the bottom or the top face; InputError for a circle, which has none.
 
         Parameters
         ----------
@@ -272,14 +269,14 @@ class Across(Immutable):
         return layer.face[side]
 
     def outline(self, X: Array, tind: Array | None = None) -> Any:
-        """The largest width of sections at points of the axis; of a function the width there."""
+        """Largest width of the section at points of the axis; for a function that at the point."""
         widths = (s.measure.outline(self.at(s, X, tind)) for s in self.layers)
         return reduce(np.maximum, widths, 0.0 * X[0])
 
     def ends(self, xi: Array | None = None) -> Array:
-        """Where pieces of one law and width end, from the bottom to the top, (npieces + 1, ...).
+        """Ends of the intervals of one law and smooth width, bottom to top, (npieces + 1, ...).
 
-        At places xi (npoints,) along the elements, or where the section is highest.
+        They are evaluated at axial coordinates xi (npoints,), or at the largest height for None.
         """
         found = [layer.measure.highest if xi is None else self._ends(layer, xi)
                  for layer in self.layers]
@@ -288,7 +285,7 @@ class Across(Immutable):
     # rules
 
     def rules(self, n: int, inertia: bool = False) -> list[tuple[Layer, Rule]]:
-        """Each layer with its rule of n points across it.
+        """Pairs of each layer and its rule of n points across it.
 
         Parameters
         ----------
@@ -299,23 +296,24 @@ class Across(Immutable):
                         layer.measure).gauss(n)) for layer in self.layers]
 
     def points(self, layer: Layer, e: Array, xi: Array, n: int) -> tuple[Array, Array]:
-        """Places across a layer, and the area over height they stand for, (nsections, q).
+        """Points across a layer and their weights times the breadth, (nsections, q).
 
         Parameters
         ----------
         e, xi, n
-            Elements and places along them, shapes (nsections,); number of points, at least.
+            Elements and axial coordinates of the sections, shapes (nsections,); least number of
+            points.
         """
         return layer.measure.sampled(self.at(layer, np.repeat(xi[None, :, None], 2, 0), e), n)
 
     def terms(self, formulation: Any) -> list[tuple[Layer, list[Any]]]:
-        """The terms of the strain energy of each layer, by a formulation."""
+        """Pairs of each layer and the terms of its strain energy in a formulation."""
         out = []
         for layer in self.layers:
             terms = list(formulation.terms(self.element_of(layer), layer.material))
             if not terms:
-                raise InputError(f"{formulation!r} has no terms, so that nothing is stiff: "
-                                 "terms(element, material) returns a list of one Term at least")
+                raise InputError(f"{formulation!r} has no terms, so the stiffness is zero: "
+                                 "terms(element, material) must return at least one Term")
             out.append((layer, terms))
             if self.plain:
                 return out
@@ -323,32 +321,34 @@ class Across(Immutable):
             for term in terms:
                 if self.element.order and term.section_samples is not None and layer.measure.moves:
                     raise InputError(
-                        f"formulation {formulation.name!r} at order {self.element.order} takes the "
-                        "mean of the strain over a section, whose weights change along a taper "
-                        "with thicknesses that stay: take order 2 or more by the formulation "
+                        f"formulation {formulation.name!r} at order {self.element.order} uses the "
+                        "mean strain of the section, whose weights would vary along a taper "
+                        "with constant thicknesses: use order 2 or more with the formulation "
                         "'assumed' or 'continuum', or nu = 0")
                 (x, v), degree = term.section, max(layer.measure.spent, 1)
                 if len(x) > 1 and np.max(np.abs((v @ legvander(2.0 * x - 1.0, degree))
                                                 - w @ legvander(2.0 * eta - 1.0, degree))) > 1e-9:
                     raise InputError(
-                        f"formulation {formulation.name!r} has a rule across the section that is "
-                        f"not that of {layer.measure!r}: take the rules that "
+                        f"formulation {formulation.name!r} uses a rule across the section "
+                        f"that does not fit {layer.measure!r}: use the rules that "
                         "self.full_rules(element) returns")
         return out
 
     def element_of(self, layer: Layer) -> ElementBeam:
-        """The element as formulations ask for it, with the rules across a layer."""
+        """The element with the rules across a layer, as formulations take it."""
         return self.element if self.plain else self.element.measured(layer.measure, self.shear)
 
     @cached_property
     def shear(self) -> float | None:
-        """The shear factor for the element, None for that of a rectangle of one material."""
+        """Shear factor for the element; None for a rectangle of one material."""
         if self.plain or self.element.order == 0 or any(s.varies for s in self.layers):
             return None
         return self._mean_shear() if self.moving else shear_factor(self.layers, self.element.order)
 
     def _mean_shear(self):
-        """The factor by which one shear force all along shears the beam as those of sections do."""
+        """Constant factor with the shear compliance of the varying sections under a uniform shear
+        force.
+        """
         def at(height):
             layers = [replace(s, measure=m, width=s.width * m.mean) for s, m in (
                 (s, s.measure.at(height)) for s in self.layers)]
@@ -366,9 +366,9 @@ class Across(Immutable):
         return float(np.sum(soft) / np.sum(soft / chebval(z, factor)))
 
     def stabilisation(self, formulation: Any) -> Array | None:
-        """The constant element stiffness of a formulation, (1 or nelements, 2 nb, 2 nb), or None.
+        """Stabilisation matrix of a formulation, (1 or nelements, 2 nb, 2 nb), or None.
 
-        It is asked for a width of 1 and the largest height, and is proportional to the width.
+        It is computed for unit width and the largest height, and is proportional to the width.
         """
         first = self.layers[0]
         K = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
@@ -380,13 +380,13 @@ class Across(Immutable):
     # integrals over the section
 
     def moments(self, xi: Array, tind: Array | None = None, what: str = "stiffness") -> Array:
-        """Integrals over the section of a quantity times 1, Y and Y^2, (3, nelements, npoints).
+        """Integrals of a quantity times 1, Y and Y^2 over the section, (3, nelements, npoints).
 
         Parameters
         ----------
         what
-            "stiffness" for the axial modulus, which gives (EA, ES, EI), "E" for Young's, "mass" for
-            the density, "area" for 1.
+            "stiffness": the axial modulus, which gives EA, ES and EI; "E": Young's modulus; "mass":
+            the density; "area": 1.
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
         mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
@@ -403,12 +403,12 @@ class Across(Immutable):
 
     @cached_property
     def bending(self) -> Array:
-        """E I about the centroid, of the middles of the elements, (nelements,) or (1,)."""
+        """Bending stiffness E I about the centroid at mid-element, (nelements,) or (1,)."""
         tind = np.zeros(1, dtype=int) if self.uniform else None
         EA, ES, EI = self.moments(np.array([0.5]), tind, "E")[:, :, 0]
         return EI - ES**2 / EA
 
     def bending_over_mass(self) -> float:
-        """E I over the mass per length, where it is least."""
+        """Smallest ratio of E I to the mass per length."""
         mass = self.moments(np.array([0.5]), what="mass")[0]
         return float(np.min(self.bending[:, None] / mass))

@@ -1,4 +1,4 @@
-"""Nodes at which a function of material coordinates jumps along the axis, and its values beside."""
+"""Nodes at which a function of material coordinates jumps along the axis."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ import numpy as np
 
 from ..core.types import Array
 
-#: How far from its ends an element is asked for what may jump there, relative to its length.
+#: Distance from element ends at which functions are evaluated, relative to the length.
 SIDE = 1e-7
 
-#: Changes from element to element that are jumps: of a function, relative to its largest value, of
-#: the slope of the height, and of the height times the curvature of the axis.
+#: Smallest jumps: of a function relative to its largest value, of the slope of the height, and of
+#: the height times the curvature of the axis.
 JUMP, KINK, BEND = 1e-3, 0.02, 0.05
 
 
 def beside(X: Array) -> Array:
-    """Points (2, ...), those at ends of elements moved into them: what jumps is the element's."""
+    """Reference points (2, ...), with those at element ends moved slightly inside."""
     return np.array([np.clip(X[0], SIDE, 1.0 - SIDE), X[1]])
 
 
 def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float | None = None
           ) -> Array:
-    """Stations at which a function jumps between elements: the numbers of those that begin there.
+    """Numbers of the elements at whose start a function jumps.
 
-    ``ask`` gives its values (..., n, k) at reference points (2, n, k) of elements (n,). ``size`` is
-    a change that is a jump; by default a thousandth of the largest value.
+    ``ask(X, e)`` returns its values (..., n, k) at reference points (2, n, k) of elements (n,).
+    ``size`` is the smallest change that counts as a jump, by default 1e-3 of the largest value.
     """
     e = np.arange(n)
     left, right = (ask(np.array([np.full((n, len(eta)), xi), np.tile(eta, (n, 1))]), e)

@@ -1,4 +1,4 @@
-"""Rules across a section: Gauss rules of the measure b(Y) dY."""
+"""Quadrature across a section: Gauss rules of the measure b(Y) dY."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..core.immutable import Immutable
 from ..core.quadrature import gauss
 from ..core.types import Array, Rule
 
-#: Points more, where the weight is no polynomial of Y.
+#: Additional points where the width is not a polynomial of Y.
 MORE = 4
 
-#: Points across a layer for means of functions.
+#: Points across a layer for mean values.
 MEAN = 8
 
 
 class Piece(NamedTuple):
-    """Where the width, a number or a function of eta (n,), is smooth: from ``low`` to ``high``.
+    """An interval from ``low`` to ``high`` with smooth width, a number or a function of eta (n,).
 
-    At its ends the width may be a square root.
+    The width may behave like a square root at its ends.
     """
 
     low: float
@@ -31,12 +31,12 @@ class Piece(NamedTuple):
 
 
 class Measure(Immutable):
-    """What a layer has across: rules with its width in their weights, and what these stand for.
+    """Width and quadrature across a layer.
 
-    Its ends ``low`` and ``high`` are the same parts of the height all along a beam, and its width
-    but for a factor; those of one that ``moves`` are not. Rules spend the degree ``spent`` of
-    exactness on the width. Methods take points of a layer, ``at``, as :meth:`.Across.at` gives
-    them, and return numbers or arrays (nelements, npoints).
+    ``low`` and ``high`` are relative heights, constant along the beam unless ``moves`` is true; the
+    width varies along the beam by a factor only. A rule uses up the degree ``spent`` of exactness
+    on the width. Methods take a layer at points, from :meth:`.Across.at`, and return numbers or
+    arrays (nelements, npoints).
     """
 
     low: float
@@ -46,28 +46,28 @@ class Measure(Immutable):
     moves = False
 
     def gauss(self, n: int) -> Rule:
-        """Points eta (m,) and weights (m,), whose sum is 1, exact to degree 2 n - 1."""
+        """Points eta (m,) and weights (m,) of sum 1, exact to degree 2 n - 1."""
         raise NotImplementedError
 
     def of_order(self, order: int) -> Measure:
-        """The measure for an element whose strain energy is of degree 4 N across, N the order."""
+        """The measure for elements of order N, whose strain energy has degree 4 N across."""
         return self
 
     def at(self, height: float) -> Measure:
-        """The measure of one section."""
+        """The measure at one height."""
         return self
 
     @property
     def highest(self) -> Array:
-        """Ends of the pieces, from the bottom to the top, where the beam is highest, (n + 1,)."""
+        """Interval ends at the largest height, bottom to top, (n + 1,)."""
         return np.array([self.pieces[0].low, *(p.high for p in self.pieces)])
 
     def ends(self, h: Array) -> Array:
-        """Ends of the pieces at heights h (...), (npieces + 1, ...)."""
+        """Interval ends at heights h (...), (npieces + 1, ...)."""
         return np.multiply.outer(self.highest, np.ones(h.shape))
 
     def values(self, at: Any, name: str, whole: bool = False) -> Array:
-        """A function of the layer at points, or the means of their sections, ``whole``."""
+        """A function of the layer at points, or with ``whole`` its means over the sections."""
         if not whole:
             return at.asked(name)
         X, (eta, w) = at.X, self.gauss(MEAN)
@@ -77,7 +77,7 @@ class Measure(Immutable):
         return values.reshape(values.shape[0], -1, len(eta)) @ w
 
     def breadth(self, at: Any, whole: bool = False, times: str = "") -> Any:
-        """What the weights of rules are multiplied by: area over height, or integrals over it."""
+        """Factor on the weights of rules: area over height, or a weighted integral over height."""
         layer, mesh, size = at.layer, at.across.mesh, at.factor("width", whole)
         if callable(layer.width):
             size = size * layer.part
@@ -86,27 +86,24 @@ class Measure(Immutable):
         return size * at.factor(times, whole) if times else size
 
     def width(self, at: Any) -> Any:
-        """The width at points of the layer."""
+        """Width at points of the layer."""
         return self.breadth(at) / at.layer.part
 
     def outline(self, at: Any) -> Any:
-        """The largest width of sections, or where that is a function the one at points."""
+        """Largest width of the sections; for a function the width at the points."""
         layer = at.layer
         scale = layer.outer * layer.part / layer.width if layer.outer else 1.0
         return scale * self.breadth(at) / layer.part
 
     def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
-        """At least n points of sections, for fields that are the layer's own.
-
-        Places across, and what of area over height they stand for, (nsections, q).
-        """
+        """At least n points across each section and weights times the breadth, (nsections, q)."""
         eta, w = self.gauss(n)
         eta = np.repeat(eta[None], at.X.shape[1], 0)
         return eta, self.breadth(at.moved(np.array([at.X[0] + 0.0 * eta, eta]))) * w + 0.0 * eta
 
 
 class Uniform(Measure):
-    """The measure of a constant width: rules of Gauss, with ``more`` points than asked for."""
+    """Constant width: Gauss rules with ``more`` points than requested."""
 
     def __init__(self, low: float = 0.0, high: float = 1.0, more: int = 0) -> None:
         self.low, self.high, self.more = low, high, more
@@ -126,13 +123,13 @@ WHOLE = Uniform()
 
 
 class Weighted(Measure):
-    """The measure of a width that varies across: Gauss rules that have the width in their weights.
+    """Width that varies across: Gauss rules of the measure b(Y) dY.
 
     They are exact, to round-off, for polynomials of degree 2 n - 1 times the width, jumps and
-    square roots at the ends of circles included: the measure is discretised piece by piece, by
-    Gauss points of the angle t of ``Y = middle - half cos t``, and its orthogonal polynomials are
-    found by the procedure of Stieltjes (Gautschi: "Orthogonal Polynomials: Computation and
-    Approximation", Oxford University Press, 2004, section 2.2).
+    square roots at the ends of circles included. The measure is discretised interval by interval
+    with ``Y = middle - half cos t`` and Gauss points in t; its orthogonal polynomials follow from
+    the Stieltjes procedure (Gautschi: "Orthogonal Polynomials: Computation and Approximation",
+    Oxford University Press, 2004, section 2.2).
     """
 
     def __init__(self, pieces: Sequence[Piece]) -> None:
@@ -145,7 +142,7 @@ class Weighted(Measure):
         return f"<{len(self.pieces)} widths, one above the other>"
 
     def _discrete(self, n):
-        """Points and weights of the measure, enough for polynomials of degree n."""
+        """Points and weights of the discretised measure, exact for degree n."""
         t, w = gauss(n + 40)
         t, w = np.pi * t, np.pi * w
         points, weights = [], []

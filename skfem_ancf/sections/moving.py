@@ -1,4 +1,4 @@
-"""Sections whose thicknesses stay on a tapered beam: what jumps across them moves along it."""
+"""Tapered sections with constant thicknesses: their interfaces move in relative height."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LEAST, ROUND = 8, 40
 
 
 class Moving(Measure):
-    """The measure of a width whose pieces have ends ``a + b / h``: thicknesses that stay.
+    """Width with interval ends ``a + b / h``: constant thicknesses on a varying height.
 
-    Rules across have the same points all along a beam, for strains are sampled along it at fixed
-    parts of the height. Their weights change: those of Gauss times the Legendre series of the
-    width, which has all its moments up to ``degree``; single weights may be negative.
+    Formulations sample strains at constant relative heights, so the points eta are the same along
+    the beam and the weights vary: Gauss weights times the Legendre series of the width, which
+    reproduces its moments up to ``degree``. Single weights may be negative.
     """
 
     low, high, moves = 0.0, 1.0, True
@@ -54,7 +54,7 @@ class Moving(Measure):
                          for end in (found[0].low, *(p.high for p in found))])
 
     def _inside(self, at):
-        """The points, and in place of those beside the layer points at its ends."""
+        """The points, moved to the layer's ends where they are outside of it."""
         low, *_, high = self.ends(at.heights)
         return at.moved(np.array([np.broadcast_to(at.X[0], low.shape),
                                   np.clip(at.X[1], low, high)]))
@@ -101,7 +101,7 @@ class Moving(Measure):
         return eta, w * (there.asked("width") if callable(at.layer.width) else at.layer.width)
 
     def points(self, h: Array, n: int) -> tuple[Array, Array]:
-        """Places across, n in each piece of constant width, and weights with it, (..., q)."""
+        """n points in each interval of smooth width, and weights that include it, (..., q)."""
         places, weights = [], []
         for low, high, width in self.pieces_of(h[..., None]):
             t, w = gauss(n + ROUND * callable(width))
@@ -114,7 +114,7 @@ class Moving(Measure):
         return np.concatenate(places, axis=-1), np.concatenate(weights, axis=-1)
 
     def moments(self, h: Array, times: Callable[[Array], Any] | None = None) -> Array:
-        """Coefficients (degree + 1, ...) of the Legendre series of the width, times a function."""
+        """Coefficients (degree + 1, ...) of the Legendre series of the width times a function."""
         eta, w = self.points(h, self.degree // 2 + 1 + (0 if times is None else 2 * MORE))
         if times is not None:
             w = w * times(eta)
@@ -124,5 +124,5 @@ class Moving(Measure):
 
     @staticmethod
     def series(moments: Array, eta: Any) -> Array:
-        """The series at places eta (...), of what :meth:`moments` returns."""
+        """The Legendre series with coefficients ``moments`` at eta (...)."""
         return legval(2.0 * np.asarray(eta) - 1.0, moments, tensor=False)

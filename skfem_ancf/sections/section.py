@@ -1,6 +1,6 @@
-"""Sections: rectangles, bonded layers, profiles, and those given by their stiffnesses.
+"""Sections: rectangles, bonded layers, profiles, and sections given by stiffnesses.
 
-A section is a list of layers from bottom to top, each of a material and a width.
+A section is a list of layers from bottom to top, each with a material and a width.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from .moving import Moving
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of a section, all along the beam.
+    """A layer of a section.
 
     Attributes
     ----------
     material
-        Its material, of numbers.
+        Its material, with constant properties.
     width
         Area over the height of the beam: a number, or a function of material coordinates (x, y).
     measure
-        Its rules across, places eta in [0, 1].
+        Its quadrature across, with eta in [0, 1].
     face
-        Widths of its bottom and its top; None for ``width``.
+        Widths of its bottom and top face; None for ``width``.
     outer
         Its largest width; None for ``width``.
     by_height
-        The width grows with the height of a tapered beam.
+        The width is proportional to the height of a tapered beam.
     grade
-        A function of (x, y) that multiplies its energy, or None.
+        A function of (x, y) that multiplies the energy density, or None.
     density
         Mass per volume: a number, a function of (x, y), or None.
     inertia
-        The measure of its mass, if that is another.
+        The measure of its mass, if it differs from ``measure``.
     shear
-        Factor on the shear modulus under the shear stress that equilibrium asks for.
+        Factor on the shear modulus for the shear stress in equilibrium with bending.
     """
 
     material: Material
@@ -63,27 +63,27 @@ class Layer:
 
     @property
     def part(self) -> float:
-        """Of the height of the beam, that it takes."""
+        """Thickness relative to the height of the beam."""
         return self.measure.high - self.measure.low
 
     @property
     def varies(self) -> bool:
-        """True if something is a function of material coordinates."""
+        """True if a property is a function of material coordinates."""
         return callable(self.width) or callable(self.grade) or callable(self.density)
 
 
 class Section(Immutable):
-    """The section of a beam: what lies across it. It does not change.
+    """The cross-section of a beam, immutable.
 
-    Sections are made by :meth:`profile`, :meth:`layers` and :meth:`numbers`, and given to
-    ``Beam(mesh, element, section=...)``. A user-defined subclass gives :meth:`layers_on`.
+    Use :meth:`profile`, :meth:`layers` or :meth:`numbers`, and pass the result to
+    ``Beam(mesh, element, section=...)``. A user-defined subclass implements :meth:`layers_on`.
 
     Attributes
     ----------
     has_materials : bool
-        It has materials of its own: the beam is given none.
+        The section has materials; the beam then takes none.
     has_fields : bool
-        Strain and stress across it are known; not so of numbers.
+        Strain and stress across it are defined; False for :meth:`numbers`.
     """
 
     has_materials = False
@@ -91,12 +91,11 @@ class Section(Immutable):
 
     @staticmethod
     def profile(name: str, scaled: bool = False, **sizes: float) -> Section:
-        """A profile of one material, as high as the mesh.
+        """A profile of one material whose height is that of the mesh.
 
-        Rules across it are Gauss rules of its width, exact to round-off for the polynomials of the
-        element, jumps of the width and the ends of circles included: see
-        :class:`~skfem_ancf.sections.measure.Weighted`. The axis is in the middle of the height,
-        which of a T is not the centroid: its extension and bending are coupled.
+        The rules across are Gauss rules of the width, exact to round-off for the polynomials of the
+        element: see :class:`~skfem_ancf.sections.measure.Weighted`. The axis is at half the height,
+        which is not the centroid of a T: its extension and bending are coupled.
 
         Parameters
         ----------
@@ -104,21 +103,21 @@ class Section(Immutable):
             "rectangle" (width), "I" and "T" (width, web, flange; the flange of a T is at the top),
             "box" (width, wall), "tube" (wall) or "circle".
         scaled
-            Of a mesh whose height varies. False: flanges and walls keep their thickness. True:
-            sizes are those where it is largest, and flanges and the lower and upper walls of a box
-            are the same part of the height everywhere; webs and widths stay. A tube is scaled as a
+            For tapered meshes. False: flanges and walls keep their thickness. True: sizes are those
+            at the largest height, and the thickness of flanges and of the lower and upper walls of
+            a box is proportional to the height; webs and widths are constant. A tube is scaled as a
             whole, a circle always.
         **sizes
-            Width over all, thickness of the web, of a flange and of the walls.
+            Overall width, thickness of the web, of a flange and of the walls, in units of length.
 
         Raises
         ------
         NameUnknown
             If the name is not known.
         CallError
-            If it has other sizes.
+            If it takes other sizes.
         InputError
-            If a size is not positive, or walls do not fit; in a Beam also in the height.
+            If a size is not positive or walls do not fit; for the height when the Beam is made.
 
         Examples
         --------
@@ -133,24 +132,25 @@ class Section(Immutable):
 
     @staticmethod
     def layers(*layers: Any, width: float | Callable[..., Any] | None = None) -> Section:
-        """Bonded layers, from the bottom to the top; together as high as the mesh.
+        """Bonded layers from bottom to top, whose total thickness is the height of the mesh.
 
-        Strains are continuous, and the stress of each layer is that of its own law: it jumps
-        between two.
+        Strains are continuous. Each layer has the stress of its material.
 
         Parameters
         ----------
         *layers
-            Pairs of a thickness and a material; a third entry is the width of that layer. The
-            thickness of one may be None: it takes what the others leave of the height, which may
-            vary along the mesh.
+            Pairs of a thickness and a material; a third entry is the width of that layer. One
+            thickness may be None: that layer fills the remaining height, which may vary along the
+            mesh.
         width
-            Width of the others: a positive number, or a function of material coordinates (x, y).
+            Width of the other layers: a positive number, or a function of material coordinates (x,
+            y).
 
         Raises
         ------
         InputError
-            If a layer is no such pair or is not positive; in a Beam if they do not fill the height.
+            If a layer is no such pair or is not positive; when the Beam is made, if the thicknesses
+            do not add up to the height.
 
         Examples
         --------
@@ -166,19 +166,19 @@ class Section(Immutable):
     @staticmethod
     def numbers(EA: float, EI: float, GA: float | None = None, rhoA: float | None = None,
                 rhoI: float | None = None, width: float = 1.0) -> Section:
-        """A section given by its stiffnesses and inertias about the axis.
+        """A section given by stiffnesses and inertias about the axis.
 
         Parameters
         ----------
         EA, EI
-            Stiffnesses against extension and bending.
+            Axial and bending stiffness.
         GA
-            Against shear, its factor included; None for that of a rectangle, 5/12 EA. A cable does
-            not shear: a ModelWarning says where that is felt.
+            Shear stiffness, shear factor included; None for that of a rectangle, 5/12 EA. A cable
+            is rigid in shear and warns where the value would matter (ModelWarning).
         rhoA, rhoI
-            Mass per length, and its moment of inertia; None for rhoI is rhoA EI / EA.
+            Mass per length, and rotary inertia per length; rhoI is rhoA EI / EA by default.
         width
-            Of the faces, where pressures and tractions act.
+            Width of the faces, on which pressures and tractions act.
 
         Raises
         ------
@@ -196,23 +196,23 @@ class Section(Immutable):
         return Numbers(EA, EI, GA, rhoA, rhoI, width)
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
-        """What it is made of in a beam, from the bottom to the top.
+        """The layers on the mesh of a beam, from bottom to top.
 
         Parameters
         ----------
         mesh, material
-            Those of the beam; the material is None if the section has its own.
+            Those of the beam; the material is None if the section has materials.
 
         Raises
         ------
         InputError
-            If it does not fit the height of the mesh.
+            If the section does not fit the height of the mesh.
         """
         raise NotImplementedError
 
 
 class Rectangle(Section):
-    """A full section of one width: what ``Beam(..., width=...)`` has.
+    """A full section of one width, as made by ``Beam(..., width=...)``.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class Rectangle(Section):
 
 
 def layer_of(material: Material, width: Any, measure: Any = None, **more: Any) -> Layer:
-    """The Layer of a material that may be graded; without a measure the whole height."""
+    """The Layer of a material, which may be graded; by default over the whole height."""
     uneven = callable(width) or material.graded
     if measure is None:
         measure = Uniform(more=MORE) if uneven else WHOLE
@@ -242,7 +242,7 @@ def layer_of(material: Material, width: Any, measure: Any = None, **more: Any) -
 
 
 def asked(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
-    """Positive values of a function of material coordinates, which messages call ``what``."""
+    """Values of a function of material coordinates, checked to be positive; ``what`` names it."""
     x, y = (np.ascontiguousarray(a) for a in np.broadcast_arrays(x, y))
     out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
     if not np.all(out > 0.0):
@@ -252,12 +252,12 @@ def asked(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
     return out
 
 
-#: Relative difference of the height of layers and that of a mesh.
+#: Relative tolerance between the total thickness and the height of a mesh.
 FILLS = 1e-9
 
 
 class Layers(Section):
-    """Bonded layers; :meth:`Section.layers` makes it, and has the parameters."""
+    """Bonded layers, see :meth:`Section.layers`."""
 
     has_materials = True
 
@@ -273,19 +273,19 @@ class Layers(Section):
                                  f"width, as (0.001, steel), got {shown(layer)}")
             own = layer[2] if len(layer) == 3 else width
             if own is None:
-                raise InputError(f"layer {k} has no width: give width= for all layers, or one of "
-                                 f"its own, as ({shown(layer[0])}, material, 0.01)")
+                raise InputError(f"layer {k} has no width: give width= for all layers, or a third "
+                                 f"entry, as ({shown(layer[0])}, material, 0.01)")
             found.append((
                 None if layer[0] is None else require_positive(f"the thickness of layer {k}",
                                                                layer[0]),
                 layer[1],
                 own if callable(own) else require_positive(f"the width of layer {k}", own)))
         if sum(thickness is None for thickness, _, _ in found) > 1:
-            raise InputError("only one layer can take what the others leave of the height: give "
-                             "the others a thickness in place of None")
+            raise InputError("only one layer can fill the remaining height: give "
+                             "the others a thickness instead of None")
         if len({material.plane for _, material, _ in found}) > 1:
-            raise InputError("the layers of a section are all in plane stress or all in plane "
-                             "strain")
+            raise InputError("the materials of a section must all be in plane stress, or all in "
+                             "plane strain")
         self.parts = tuple(found)
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
@@ -299,16 +299,16 @@ class Layers(Section):
                              "None")
         if mesh.heights is not None:
             if None not in given:
-                raise InputError(f"{self!r} has thicknesses that stay, and does not fill a tapered "
-                                 "mesh: give one layer the thickness None, by which it takes what "
-                                 "the others leave, or use a mesh of constant height")
+                raise InputError(f"{self!r} has constant thicknesses and does not fill a tapered "
+                                 "mesh: give one layer the thickness None, to fill the remaining "
+                                 "height, or use a mesh of constant height")
             return [layer_of(law, width, Moving(partial(_layer, given, k), mesh.height))
                     for k, (_, law, width) in enumerate(self.parts)]
         tops = np.cumsum([mesh.height - total if x is None else x for x in given])
         if abs(tops[-1] - mesh.height) > FILLS * mesh.height:
-            raise InputError(f"the layers are {tops[-1]:.9g} high together, and the mesh "
-                             f"{mesh.height:.9g}: they must fill it from the bottom to the top; "
-                             "one of the thickness None takes what the others leave")
+            raise InputError(f"the thicknesses add up to {tops[-1]:.9g}, the height of the mesh is "
+                             f"{mesh.height:.9g}: they must be equal; a layer of thickness None "
+                             "fills the remaining height")
         ends = np.append(0.0, tops / tops[-1])
         ends[-1] = 1.0
         return [layer_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
@@ -322,7 +322,7 @@ class Layers(Section):
 
 
 def _layer(given, k, h):
-    """Where layer k is, at heights (..., 1); one of the thicknesses that are given is None."""
+    """Interval of layer k at heights (..., 1); one of the given thicknesses may be None."""
     rest = given.index(None)
     low = sum(given[:k]) / h if k <= rest else 1.0 - sum(given[k:]) / h
     high = sum(given[:k + 1]) / h if k < rest else 1.0 - sum(given[k + 1:]) / h
@@ -330,10 +330,10 @@ def _layer(given, k, h):
 
 
 class Numbers(Section):
-    """A section by its numbers; :meth:`Section.numbers` makes it, and has the parameters.
+    """A section given by stiffnesses, see :meth:`Section.numbers`.
 
-    It is a rectangle of the material E = EA / (b h), nu = 0, whose height sqrt(12 EI / EA) need
-    not be that h of the mesh: this is where section coordinates are, and what pictures show.
+    It is a rectangle with E = EA / (b h) and nu = 0, whose height sqrt(12 EI / EA) may differ from
+    the height h of the mesh, which section coordinates and plots use.
     """
 
     has_materials = True
@@ -352,7 +352,7 @@ class Numbers(Section):
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         b, h = self.width_of_faces, mesh.height
         if mesh.heights is not None:
-            raise InputError("the numbers of a section are the same all along: use a mesh of "
+            raise InputError("a section given by numbers is constant along the beam: use a mesh of "
                              "constant height")
         E = self.EA / (b * h)
         GA = 5.0 / 12.0 * self.EA if self.GA is None else self.GA
@@ -370,19 +370,19 @@ class Numbers(Section):
 
 
 class _Given(StVenantKirchhoff):
-    """Hooke's law whose shear factor gives a section of any order one stiffness against shear."""
+    """Hooke's law whose shear factor gives the requested shear stiffness at every order."""
 
     def shear_factor(self, element: HasShear) -> float:
         return super().shear_factor(element) * (1.2 if element.carries_shear_parabola else 1.0)
 
 
-#: Sizes that a profile has besides the height, which is that of the mesh.
+#: Sizes of a profile besides the height, which is that of the mesh.
 SIZES = {"rectangle": ("width",), "I": ("width", "web", "flange"), "T": ("width", "web", "flange"),
          "box": ("width", "wall"), "tube": ("wall",), "circle": ()}
 
 
 class Profile(Section):
-    """A section of one material; :meth:`Section.profile` makes it, and has the parameters."""
+    """A section of one material, see :meth:`Section.profile`."""
 
     def __init__(self, name: str, scaled: bool = False, **sizes: float) -> None:
         self.name = require_option("profile", name, SIZES)
@@ -398,7 +398,7 @@ class Profile(Section):
                              f"{sizes['width']:g}")
 
     def pieces(self, h: Any) -> list[Piece]:
-        """The width, piece by piece from the bottom to the top, at heights h, one or (..., 1)."""
+        """The width in intervals from bottom to top, at heights h, a number or (..., 1)."""
         s, name = self.sizes, self.name
         width = s.get("width", h)
         thickness = s.get("flange", s.get("wall", 0.0)) / h
@@ -442,7 +442,7 @@ class Profile(Section):
 
 
 def _chord(h, inner, eta):
-    """The width at eta of a circle of height h, less that of a radius in heights h."""
+    """Width at eta of a circle of height h, minus that of a hole of relative height ``inner``."""
     outer, inner = (2.0 * h * np.sqrt(np.maximum(r * r - (eta - 0.5) ** 2, 0.0))
                     for r in (0.5, inner))
     return outer - inner

@@ -1,4 +1,4 @@
-"""The shear correction of sections that are no rectangles of one material."""
+"""Shear correction of sections other than rectangles of one material."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from numpy.polynomial.legendre import legvander
 from ..core.quadrature import gauss, lagrange
 from .section import Layer
 
-#: Points in each piece of a section.
+#: Points in each interval of a section.
 POINTS = 24
 
 
 def shear_factor(layers: Sequence[Layer], order: int) -> float:
-    """The factor on the shear moduli of a section whose shear strain is a polynomial.
+    """Factor on the shear moduli of a section whose shear strain is a polynomial across it.
 
-    The shear stress of a section in bending is that of Jourawski, ``b tau = Q S / (E I)``, with S
-    the first moment, weighted by E, of what lies beyond. Sections of order N >= 1 carry polynomials
-    of degree N - 1 in its place, the best fit to ``tau / G`` in the energy, and are too stiff by
-    the part of the energy that these miss. A rectangle has 5/6 for N = 1 and 2, and 1 from N = 3
-    on.
+    The shear stress in bending is ``b tau = Q S / (E I)`` (Jourawski), with S the E-weighted first
+    moment of the area beyond. Sections of order N >= 1 represent it by polynomials of degree N - 1,
+    the best fit to ``tau / G`` in the energy, and are too stiff by the energy of the remainder. A
+    rectangle has 5/6 for N = 1 and 2, and 1 from N = 3 on.
     """
     t, w = gauss(POINTS)
     till = np.array([b * (gauss(POINTS)[1] @ lagrange(t, b * t)) for b in t])
@@ -37,7 +36,7 @@ def shear_factor(layers: Sequence[Layer], order: int) -> float:
 
 
 def _points(layers, t, w):
-    """Points of each piece with their weights, widths and moduli."""
+    """Points in each interval with weights, widths and moduli."""
     for layer in layers:
         law, m = layer.material, layer.measure
         for low, high, width in m.pieces:
