@@ -1,4 +1,4 @@
-"""Beam elements: what is interpolated. A new element is one file and one line here."""
+"""Beam elements. A new element is one file and one line here."""
 
 from .ancf import ElementBeamANCF
 from .base import ElementBeam
@@ -8,7 +8,7 @@ from .cubic import ElementBeamANCFCubic
 from .hermite import ElementBeamANCFHermite
 from .patel_shabana import ElementBeamPatelShabana
 
-#: The elements that the tests run over, by name.
+#: Elements by name.
 ELEMENTS = {
     **{f"ancf-{n}": (lambda n=n: ElementBeamANCF(n)) for n in range(1, 11)},
     "patel-shabana": ElementBeamPatelShabana,

@@ -13,8 +13,8 @@ from .base import ElementBeam, SectionFunctions
 
 
 def _chebyshev(n: int) -> Array:
-    """Both faces, and the zeros of the Chebyshev polynomial T_{n-2} between them."""
-    m = n - 2  # sines, not cosines: antisymmetric to the last digit, and 0 in the middle
+    """Both ends of the interval, and the zeros of the Chebyshev polynomial T_{n-2}."""
+    m = n - 2  # sines instead of cosines: exactly antisymmetric
     return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
 
 
@@ -31,16 +31,16 @@ POINT_FAMILIES = {
 class ElementBeamANCF(ElementBeam):
     """Beam element with position, axis slope and N section slopes at each node.
 
-    The position is cubic along the axis; the section is a polynomial of degree N in Y whose
-    derivative ``r_Y`` is interpolated at N points of the section, from the bottom to the top.
-    Order 1 is the element of Omar and Shabana, order 2 that of Zheng.
+    The position is cubic along the axis and a polynomial of degree N across the section, whose
+    derivative ``r_Y`` is interpolated at N points from bottom to top. Order 1 is the element of
+    Omar and Shabana, order 2 that of Zheng.
 
     Parameters
     ----------
     order
         Degree N >= 1 of the section.
     points
-        Where the section slopes sit: "chebyshev" (both faces and the zeros of T_{N-2}),
+        Points of the section slopes: "chebyshev" (both faces and the zeros of T_{N-2}),
         "gauss-lobatto" or "equispaced". The space is the same, only the degrees of freedom differ.
 
     Raises
@@ -78,6 +78,6 @@ class ElementBeamANCF(ElementBeam):
         super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
-        """Names of the degrees of freedom of the section at a node, and what they are."""
+        """Names and functionals of the section's degrees of freedom at a node."""
         return ([f"r_Y{k}" for k in range(len(self.section_points))],
                 [(float(y), 0, 1) for y in self.section_points])

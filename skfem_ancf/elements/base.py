@@ -1,4 +1,4 @@
-"""What every beam element shares: products of axis and section functions."""
+"""Base class of beam elements: products of axis and section functions."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from ..mesh.reference_cell import SECTIONS, RefBeam, hermite_basis
 from .sampling import Sampling, StabilisedMode, default_sampling, missed
 
 
-#: Degrees along the axis of the elements of the package.
+#: Degrees along the axis.
 DEGREES = tuple(range(3, 16, 2))
 
 
 def require_degree(degree: object) -> int:
-    """A degree along the axis: one of :data:`DEGREES`; raises InputError for another."""
+    """Check a degree along the axis, one of :data:`DEGREES`."""
     if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
             or degree not in DEGREES):
         raise InputError(f"the degree along the axis is one of {', '.join(map(str, DEGREES))}, got "
@@ -47,30 +47,30 @@ class SectionFunctions:
         self.degree, self.number = self._dP.shape
 
     def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
-        """P_k and its derivative at eta in [-1/2, 1/2]; of all k, shape (n,) + eta.shape."""
+        """P_k and its derivative at eta in [-1/2, 1/2], shape (n,) + eta.shape."""
         return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])
 
 
 class ElementBeam(Immutable, Element):
     """A scalar beam element; wrap it in scikit-fem's ``ElementVector`` for the position field.
 
-    The local functions are, for each of the two nodes, a Hermite function in xi for the position
-    ``r``, its slope ``r_X`` and further derivatives on the axis, then ``(1 - xi) P_k(Y)`` or
-    ``xi P_k(Y)`` for each derivative of the section, Hermite functions too where their derivatives
-    along X are degrees of freedom. A subclass says what the degrees of freedom are; all else
-    follows, the :attr:`sampling` of the formulation "assumed" included, which it may override.
+    The local functions of each node are Hermite functions in xi for the position ``r``, its slope
+    ``r_X`` and higher derivatives on the axis, then ``(1 - xi) P_k(Y)`` or ``xi P_k(Y)`` for each
+    derivative across the section, or Hermite functions times P_k where their derivatives along X
+    are degrees of freedom too. A subclass defines the degrees of freedom. Everything else follows
+    from them, :attr:`sampling` of the formulation "assumed" included, which it may override.
 
     Parameters
     ----------
     section
         The functions P_k of the section, a :class:`SectionFunctions`.
     names
-        Names of the degrees of freedom of a node after ``r`` and ``r_X``: further derivatives of
+        Names of the degrees of freedom of a node after ``r`` and ``r_X``: higher derivatives of
         the axis, then those of all P_k, then their first derivatives along X, and so on.
     functionals
-        What these are, as in the attribute.
+        Their definitions, as in the attribute.
     welded
-        Those of ``names`` that a welded face fixes: the position of every point of it.
+        Those of ``names`` that fix the position of every point of a clamped face.
 
     Other Parameters
     ----------------
@@ -81,24 +81,24 @@ class ElementBeam(Immutable, Element):
     tind
         Elements, shape (nelements,), or None for all.
     i, which
-        Number of the local function, or a slice of them.
+        Number of the local function, or a slice.
 
     Attributes
     ----------
     functionals : tuple of (float, int, int)
-        For each degree of freedom of a node: eta - 1/2 of the point, and the number of derivatives
+        For each degree of freedom of a node: eta - 1/2 of its point, and the numbers of derivatives
         along X and Y.
     axis_degree : int
         Polynomial degree of the axis along X.
     sections : str
-        How the section varies between the nodes: "linear", "cubic" or "quintic" (Hermite).
+        Interpolation of the section along X: "linear", "cubic" or "quintic" (Hermite).
     kinematics : str
         "sections" or "cable", see :mod:`skfem_ancf.beam.kinematics`.
     """
 
     refdom = RefBeam
     kinematics = "sections"
-    #: Shear factor of a section that is no rectangle of one material, else None.
+    #: Shear factor of the section; None for a rectangle of one material.
     shear: float | None = None
     _measure: Any = None
 
@@ -127,13 +127,12 @@ class ElementBeam(Immutable, Element):
         self.maxdeg = max(self.strain_degree, 2 * self.section.degree)
 
     def measured(self, measure: Any, shear: float | None = None) -> ElementBeam:
-        """The same element for a section whose rules a measure gives, for formulations.
+        """The element for a section with given quadrature, as formulations take it.
 
         Parameters
         ----------
         measure, shear
-            With ``gauss(n)``, as of :mod:`skfem_ancf.sections.measure`; the shear factor of the
-            section.
+            A measure with ``gauss(n)``, see :mod:`skfem_ancf.sections.measure`; the shear factor.
         """
         other = self._thawed()
         other._measure, other.shear = measure, shear
@@ -161,20 +160,21 @@ class ElementBeam(Immutable, Element):
 
     @property
     def carries_shear_parabola(self) -> bool:
-        """True if the section functions hold Y^3, so that no shear correction is wanted."""
+        """True if the section functions include Y^3, so that no shear correction is needed."""
         return self.section.degree >= 3
 
     @property
     def facet_points(self) -> int:
-        """Gauss points of a facet, for products of two local functions."""
+        """Gauss points of a facet for products of two local functions."""
         return max(self.axis_degree, self.order) + 2
 
     # local functions
 
     @cached_property
     def _factors(self) -> Array:
-        """Of all local functions: row of the axis functions, or -1, of those along X that a
-        section function has, its number, the power of h, and that of the length."""
+        """Factors of all local functions: row of the axis function (-1 for none), row of the
+        longitudinal factor of a section function, its number, and the powers of height and length.
+        """
         m, n = self._along
         return np.array([(m * node + slope if power == 0 else -1, n * node + slope,
                           (k - m) % max(self.section.number, 1), power, slope)
@@ -182,7 +182,7 @@ class ElementBeam(Immutable, Element):
                          for k, (_, slope, power) in enumerate(self.functionals)]).T
 
     def _unit(self, X: Array, i: Any = slice(None)) -> Array:
-        """Functions of height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
+        """Functions for height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
         axis, of_node, number = self._factors[:3, i]
         out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
         of_axis, of_section = axis >= 0, axis < 0
@@ -196,20 +196,20 @@ class ElementBeam(Immutable, Element):
 
     def local(self, X: Array, h: float | Array, i: slice = slice(None),
               rate: float | Array = 0.0) -> tuple[Array, Array, Array, Array]:
-        """Local functions on the reference cell, their derivatives, and their power of the length.
+        """Local functions on the reference cell, their derivatives, and their powers of the length.
 
         Parameters
         ----------
         h, rate
-            Height of the section and its derivative by xi; of a tapered one at each point, shape
-            X.shape[1:], or of each element at the same points, shape (nelements, npoints).
+            Height and its derivative by xi: numbers, values at the points, X.shape[1:], or values
+            of each element at the same points, (nelements, npoints).
 
         Returns
         -------
         value, d_xi, d_eta
-            Arrays (n,) + X.shape[1:]; of the shape of h where that has more axes.
+            Arrays (n,) + X.shape[1:], or + the shape of h if that has more axes.
         slope
-            The power of L that a function takes: how many derivatives along X it belongs to.
+            The power of L that multiplies a function: the number of its derivatives along X.
         """
         power, slope = self._factors[3:, i]
         unit = self._unit(X, i)
@@ -222,38 +222,38 @@ class ElementBeam(Immutable, Element):
         return value, d_xi, d_eta, slope
 
     def powers(self, h: float, L: float | Array) -> Array:
-        """What height and length multiply the local functions by, shape (..., 2 nodal_dofs).
+        """Factors of height and length on the local functions, shape (..., 2 nodal_dofs).
 
         Parameters
         ----------
         h, L
-            Height and length of a straight element; of several lengths of shape (..., 1).
+            Height and length of a straight element; several lengths have shape (..., 1).
         """
         power, slope = self._factors[3:]
         return h**power * L**slope
 
     @property
     def by_reference(self) -> bool:
-        """True if elements follow from one of length and height 1, straight ones by powers."""
+        """True if elements follow from one of unit length and height by :meth:`powers`."""
         return all(getattr(type(self), name) is getattr(ElementBeam, name)
                    for name in ("local", "of_mesh", "functions", "slopes"))
 
     def unit_slopes(self, X: Array, Y: Array) -> Array:
-        """Derivatives of the local functions of height 1 and length 1, (n + m, 2 nodal_dofs).
+        """Derivatives of the local functions for unit height and length, (n + m, 2 nodal_dofs).
 
         Parameters
         ----------
         X, Y
-            Reference points of derivatives along the axis, (2, n), and of those across, (2, m).
+            Reference points of derivatives along the axis, (2, n), and across, (2, m).
         """
         out = np.concatenate([self._unit(X)[1].T, self._unit(Y)[2].T])
-        # the positions of both nodes together are a translation: exactly, or round-off resists it
+        # exactly zero for translations, so that round-off does not stiffen them
         out[:, self.nodal_dofs] = -out[:, 0]
         return out
 
     def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                 i: slice = slice(None)) -> list[Array]:
-        """Local functions ``i``, derivatives by xi and eta, (n, nelements, npoints) each."""
+        """Local functions ``i`` and derivatives by xi and eta, (n, nelements, npoints) each."""
         h, rate = mapping.height(X[0], tind) if self.section.number else (1.0, 0.0)
         *found, slope = self.local(X, h, i, rate)
         lengths = mapping.mesh.lengths if tind is None else mapping.mesh.lengths[tind]
@@ -262,8 +262,7 @@ class ElementBeam(Immutable, Element):
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
-        """The local function ``i`` on the body, with its gradient: what scikit-fem's ``Basis`` asks
-        for.
+        """The local function ``i`` and its gradient, for scikit-fem's ``Basis``.
 
         Returns
         -------
@@ -277,14 +276,14 @@ class ElementBeam(Immutable, Element):
 
     def functions(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                   which: slice = slice(None)) -> tuple[Array, Array]:
-        """Local functions ``which``, (n, nelements, npoints), and their gradients, (n, 2, ...)."""
+        """Local functions, (n, nelements, npoints), and their gradients, (n, 2, ...)."""
         value, d_xi, d_eta = self.of_mesh(mapping, X, tind, which)
         invDF = mapping.invDF(X, tind)
         return value, invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None]
 
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
-        """Derivatives of all local functions along the axis and across it, and the beam's frame.
+        """Derivatives of all local functions along and across the axis, and the beam's frame.
 
         Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints).
         """
@@ -296,16 +295,16 @@ class ElementBeam(Immutable, Element):
 
     @cached_property
     def sampling(self) -> Sampling:
-        """Where "assumed" evaluates the strain; by default :func:`.sampling.default_sampling`."""
+        """Sampling points of "assumed"; by default :func:`.sampling.default_sampling`."""
         return default_sampling(self.axis_degree, 2 * self._along[1] - 1)
 
     @cached_property
     def stabilised(self) -> tuple[StabilisedMode, ...]:
-        """The modes that eps_xx misses there, of the axis and of each section function.
+        """Modes of the axis and the section functions without eps_xx at the sampling points.
 
-        Their sizes do not lower the order of the error, which is 2 for linear sections. The more
-        derivatives are degrees of freedom, the more may resist and the less c is: for a quintic
-        axis ten times the size of a cubic one costs little and spares the higher modes.
+        The stabilisation does not lower the order of convergence, which is 2 for linear sections.
+        With more derivatives as degrees of freedom it may be larger: a quintic axis takes ten times
+        the coefficient of a cubic one, which suppresses the higher modes.
         """
         (m, k), N = self._along, self.section.number
         n = len(self.sampling.places("xx"))
@@ -315,18 +314,18 @@ class ElementBeam(Immutable, Element):
                   for j in range(N) for w in missed(k, n)))
 
     def _of_both(self, rows: Sequence[int], weights: Array) -> Array:
-        """Weights of some degrees of freedom of both nodes, among zeros for the others."""
+        """Weights of some degrees of freedom of both nodes; zero for the others."""
         full = np.zeros((2, self.nodal_dofs))
         full[:, rows] = weights.reshape(2, -1)
         return full.ravel()
 
     @cached_property
     def halving(self) -> Array:
-        """The left half of an element of length 1 and height 1 from the whole, (2 nodal_dofs, 2
-        nodal_dofs).
+        """Matrix (2 nodal_dofs, 2 nodal_dofs) from an element to its left half, for unit length and
+        height.
 
-        For degrees of freedom multiplied by the length to the number of their derivatives along X.
-        The last nodal_dofs rows are those of the middle.
+        Degrees of freedom are scaled by the length to the number of their derivatives along X. The
+        last nodal_dofs rows are those of the middle.
         """
         n = self.axis_degree + 1, max(self.order, 1) + 1
         X = np.array(np.meshgrid(np.linspace(0, 1, n[0]), np.linspace(0, 1, n[1]))).reshape(2, -1)
@@ -337,12 +336,12 @@ class ElementBeam(Immutable, Element):
     # the reference configuration
 
     def fitted(self, mesh: MeshBeam) -> MeshBeam:
-        """The mesh that a beam of this element has: a curved one with sections as its own.
+        """The mesh of a beam of this element: for a curved one with the element's ``sections``.
 
         Raises
         ------
         MeshError
-            If it is curved, and the element's axis and sections are of two degrees.
+            If it is curved and the axis and the sections of the element have different degrees.
         """
         if mesh.is_straight:
             return mesh
@@ -354,12 +353,11 @@ class ElementBeam(Immutable, Element):
 
     @property
     def mesh_sections(self) -> str:
-        """How a curved mesh of the element interpolates its sections."""
+        """Interpolation of the sections of a curved mesh of this element."""
         return self.sections
 
     def rigid(self, mesh: MeshBeam) -> Array:
-        """The DOFs of the reference configuration less the positions of nodes, (nodal_dofs, 2,
-        nvertices).
+        """DOFs of the reference configuration except positions, (nodal_dofs, 2, nvertices).
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The shear-rigid cable: order 0 of the family."""
+"""The shear-rigid cable element, order 0 of the family."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from .sampling import Sampling, StabilisedMode
 
 
 class ElementBeamCable(ElementBeam):
-    """An axis without a section of its own: ``r`` and its derivatives along X only.
+    """Axis element: ``r`` and its derivatives along X are the degrees of freedom.
 
-    Sections stay plane and normal to the axis; the beam has the stiffnesses EA and EI, and its
-    thickness follows from S_yy = 0. For slender scenes that ask for no more of the section.
+    Sections stay plane and normal to the axis. The stiffnesses are EA and EI; the thickness follows
+    from S_yy = 0. Use it for slender beams.
 
-    N = EA (stretch - 1) and M = EI (change of curvature), at any size: along a fibre the nominal
-    stress is E (stretch - 1), E / (1 - nu^2) in plane strain. Strain and stress that are read are
-    those of Green and Lagrange and the second of Piola and Kirchhoff: eps_xx = (stretch^2 - 1) / 2
-    and S_xx = E (stretch - 1) / stretch.
+    N = EA (stretch - 1) and M = EI (change of curvature) at any deformation: the nominal stress in
+    a fibre is E (stretch - 1), or E / (1 - nu^2) times the same in plane strain. Output is the
+    Green-Lagrange strain eps_xx = (stretch^2 - 1) / 2 and the second Piola-Kirchhoff stress S_xx =
+    E (stretch - 1) / stretch.
 
     Parameters
     ----------
     degree
-        Degree of the axis along X: 3 (``r``, ``r_X``), 5 (``r_XX`` too; the one for
-        frames and loads at points), 7, ... 15 (derivatives up to the (degree - 1) / 2-th). One or
-        two elements of degree 9 and more replace many where the loads are smooth.
+        Degree of the axis along X: 3 (``r``, ``r_X``), 5 (and ``r_XX``; the best for frames and
+        point loads), 7, ... 15 (derivatives up to order (degree - 1) / 2). One or two elements of
+        degree 9 and more replace many where the loads are smooth.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class ElementBeamCable(ElementBeam):
 
     @property
     def strain_degree(self) -> int:
-        # |r_X| and the curvature are no polynomials: a point for each Hermite function
+        # |r_X| and the curvature are not polynomials: one point for each Hermite function
         return self.axis_degree
 
     @property
@@ -75,15 +75,7 @@ class ElementBeamCable(ElementBeam):
         return "linear" if self.axis_degree < 7 else SECTIONS[self.nodal_dofs - 1]
 
     def axis(self, xi: Array, derivative: int) -> Array:
-        """The Hermite functions of the axis, or a derivative of them by xi, (2 m,) + xi.shape.
-
-        Parameters
-        ----------
-        xi
-            Points, of any shape (...).
-        derivative
-            Number of derivatives.
-        """
+        """Hermite functions of the axis at xi (...), or a derivative by xi, (2 m,) + xi.shape."""
         return hermite_basis(self.nodal_dofs, xi, derivative)
 
     @cached_property

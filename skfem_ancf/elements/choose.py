@@ -1,4 +1,4 @@
-"""The element of lowest order that can show what is asked for."""
+"""Choice of the element of lowest order for requested fields and accuracy."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from .base import ElementBeam
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
 
-#: The order that a field of the section needs at least; 0 is the cable.
+#: Least order for a field of the section; 0 is the cable.
 ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_xy": 3, "S_yy": 5,
                   "S_xy": 3}
 
 
 def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[str] = (),
                    tolerance: float = 1e-3) -> ElementBeam:
-    """The element of lowest order that carries the fields and is accurate enough.
+    """The element of lowest order that represents the fields to a given accuracy.
 
-    The error of a beam theory is a power of h / L, with L the length of the beam: the cable leaves
-    out shear, ``3 E I / (k_s G A L^2)`` of the deflection of a cantilever; a section of order 1 or
-    2 leaves out the shape of the section, about ``(h / L)^2 / 10``; order 3 carries the shear
-    parabola, and leaves out what is of the order of ``(h / L)^3``. The element is a quintic cable,
-    or has cubic sections, or linear ones on a beam shorter than 20 heights.
+    The error of a beam theory is a power of h / L, with L the length of the beam. The cable omits
+    shear, ``3 E I / (k_s G A L^2)`` of the deflection of a cantilever. A section of order 1 or 2
+    omits warping, about ``(h / L)^2 / 10``. Order 3 represents the shear parabola, with an error of
+    order ``(h / L)^3``. The result is a quintic cable, or has cubic sections, or linear ones on a
+    beam shorter than 20 heights.
 
     Parameters
     ----------
     mesh, material
-        The body and its material.
+        Mesh and material of the beam.
     fields
-        Fields of the section that will be looked at: names from :data:`ORDER_OF_FIELD`.
+        Fields of the section that are needed: names from :data:`ORDER_OF_FIELD`.
     tolerance
-        Relative error of the deflection that the theory may have; what the mesh adds is not in it.
+        Relative error of the deflection due to the theory, without the discretisation error.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[s
     wanted = max((ORDER_OF_FIELD[name] for name in fields), default=0)
     enough = (0 if shear <= tolerance else 2 if 0.1 * ratio**2 <= tolerance else
               3 if ratio**3 <= tolerance else 5)
-    if not material.is_hooke:  # a cable has E and nu alone
+    if not material.is_hooke:  # a cable uses E and nu only
         wanted = max(wanted, 2)
     order = max(wanted, enough)
     if order == 0:

@@ -4,14 +4,12 @@ from .hermite import ElementBeamANCFHermite
 
 
 class ElementBeamANCFCubic(ElementBeamANCFHermite):
-    """As :class:`ElementBeamANCF`, with Hermite functions along X for the section slopes too.
+    """:class:`ElementBeamANCF` with section slopes that are cubic (Hermite) along X.
 
     The degrees of freedom of a node are ``r``, ``r_X``, the section slopes ``r_Y0`` ... and their
-    derivatives along the axis ``r_XY0`` ...: the position is the full product of cubic
-    polynomials in X and polynomials of degree N in Y. With the formulation "assumed" the tip of a
-    bent beam converges at fourth order, at any slenderness.
-
-    Parameters and errors are those of :class:`ElementBeamANCF`.
+    derivatives along the axis ``r_XY0`` ...: the space is the product of cubic polynomials in X and
+    polynomials of degree N in Y. With the formulation "assumed" the deflection converges at fourth
+    order, at any slenderness. Parameters and errors are those of :class:`ElementBeamANCF`.
 
     Examples
     --------

@@ -8,13 +8,13 @@ from .base import DEGREES, require_degree
 
 
 class ElementBeamANCFHermite(ElementBeamANCF):
-    """As :class:`ElementBeamANCF`, with Hermite functions of a degree along X for axis and section.
+    """:class:`ElementBeamANCF` with axis and section slopes of any odd degree (Hermite) along X.
 
     The degrees of freedom of a node are ``r`` and the section slopes ``r_Y0`` ..., with their
-    derivatives along the axis up to the (degree - 1) / 2-th: of degree 5 ``r``, ``r_X``, ``r_XX``,
-    ``r_Y0`` ..., ``r_XY0`` ..., ``r_XXY0`` .... The position is the full product of polynomials of
-    that degree in X and of degree N in Y. One or two elements of degree 9 and more replace many
-    cubic ones where loads and section are smooth; where the shear force jumps, end the element.
+    derivatives along the axis up to order (degree - 1) / 2: for degree 5 ``r``, ``r_X``, ``r_XX``,
+    ``r_Y0`` ..., ``r_XY0`` ..., ``r_XXY0`` .... The space is the product of polynomials of that
+    degree in X and of degree N in Y. One or two elements of degree 9 and more replace many cubic
+    ones where loads and section are smooth; put nodes where the shear force jumps.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class ElementBeamANCFHermite(ElementBeamANCF):
     degree
         Degree along X: 3, 5, ... 15.
     points
-        Where the section slopes sit, as for :class:`ElementBeamANCF`.
+        Points of the section slopes, as for :class:`ElementBeamANCF`.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class ElementBeamANCFHermite(ElementBeamANCF):
         super().__init__(order, points)
 
     def raised(self) -> ElementBeamANCFHermite | None:
-        # the subclass of degree 3 is of this family; a user's is another element
+        # ElementBeamANCFCubic belongs to this family; user-defined subclasses do not
         if not ours(self) or self.axis_degree == DEGREES[-1]:
             return None
         return ElementBeamANCFHermite(self.order, self.axis_degree + 2, self._points)

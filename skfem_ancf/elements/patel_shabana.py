@@ -8,7 +8,7 @@ from .base import ElementBeam, SectionFunctions
 
 
 class ElementBeamPatelShabana(ElementBeam):
-    """Beam element with ``r``, ``r_X``, ``r_Y`` and the second derivative ``r_YY`` on the axis.
+    """Beam element with ``r``, ``r_X``, ``r_Y`` and ``r_YY`` on the axis.
 
     Its space is that of :class:`ElementBeamANCF` of order 2, with other degrees of freedom.
 

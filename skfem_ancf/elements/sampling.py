@@ -1,4 +1,4 @@
-"""Where along an element the formulation "assumed" samples the strain, and what that misses."""
+"""Sampling points of the formulation "assumed", and the modes that they miss."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..mesh.reference_cell import hermite_basis
 
 
 class Sampling(NamedTuple):
-    """Where the formulation "assumed" evaluates the strain along an element.
+    """Sampling of the strain along an element in the formulation "assumed".
 
-    ``points`` is the number of Gauss points of the integration. ``samples`` has for a strain
-    component "xx", "yy" or "xy" the places xi in [0, 1]; others are evaluated at the points of
-    integration. ``volume`` is the number of Gauss points for the volumetric part of a law in plane
-    strain, where all ``points`` would lock as nu goes to 1/2; 0 to leave it with the rest.
+    ``points`` is the number of integration points (Gauss). ``samples`` maps a strain component
+    "xx", "yy" or "xy" to the points xi in [0, 1] where it is evaluated; others are evaluated at the
+    integration points. ``volume`` is the number of Gauss points for the volumetric part in plane
+    strain, reduced against volumetric locking; 0 to integrate it with the rest.
     """
 
     points: int
@@ -26,7 +26,7 @@ class Sampling(NamedTuple):
     volume: int = 0
 
     def places(self, component: str) -> Array:
-        """Where a strain component "xx", "yy" or "xy" is evaluated, xi in [0, 1], shape (n,)."""
+        """Points xi in [0, 1] where a strain component is evaluated, shape (n,)."""
         return np.array(self.samples.get(component, gauss(self.points)[0]))
 
 
@@ -34,8 +34,8 @@ class StabilisedMode(NamedTuple):
     """A mode that the samples miss, stabilised by ``1/2 k L |c|^2``, L the length of the element.
 
     ``weights`` (2 nodal_dofs,) give c, a derivative along X of a field, from the degrees of freedom
-    of an element of length 1. ``size`` is k in units of E I over the square of the length of what
-    ``per`` names, "element" or "beam"; "" for none, where c is a curvature.
+    of an element of length 1. ``size`` is k in units of E I over the squared length of the
+    "element" or the "beam", as ``per`` says; "" for a curvature c, without division.
     """
 
     weights: Array
@@ -44,17 +44,18 @@ class StabilisedMode(NamedTuple):
 
 
 def default_sampling(p: int, s: int) -> Sampling:
-    """The samples of axes of degree ``p`` and sections of degree ``s`` along X, found by counting.
+    """Samples for axes of degree ``p`` and sections of degree ``s`` along X.
 
-    Each element of a chain adds a node: p + s + 2 numbers. When nothing stretches, shears or gets
-    thinner each sample takes one of them; of those at the nodes neighbours share one. If none is
-    left the element locks; fewer samples miss modes, see :func:`missed`, to be stabilised.
+    They follow from constraint counting. An element of a chain adds one node with p + s + 2
+    unknowns. In the thin limit each sample is a constraint; neighbours share those at nodes. If no
+    unknown is left the element locks; with fewer samples modes are missed (:func:`missed`) and must
+    be stabilised.
 
-    * eps_xx, of degree 2 (p - 1), vanishes best at p - 1 Gauss points.
-    * eps_yy vanishes at the nodes, and between them best at the s Gauss-Lobatto points, zeros of
-      the mode of the slope that eps_xx misses.
-    * eps_xy: sections as rich as the axis follow it at (s + 3) / 2 Gauss-Lobatto points, others at
-      the points of eps_xx.
+    * eps_xx, of degree 2 (p - 1): p - 1 Gauss points.
+    * eps_yy: the nodes, and between them the s Gauss-Lobatto points, zeros of the mode of the slope
+      that eps_xx misses.
+    * eps_xy: (s + 3) / 2 Gauss-Lobatto points where sections have the degree of the axis, else the
+      points of eps_xx.
 
     Linear sections, p = 3 and s = 1, have 1 of 6 left, p = s = 3 has 2 of 8, p = s = 5 1 of 12.
     """
@@ -73,12 +74,12 @@ def _lobatto(n: int) -> tuple[float, ...]:
 
 
 def missed(m: int, n: int) -> list[Array]:
-    """What n Gauss points of a slope miss, of a field with m derivatives at nodes, (2 m,) each."""
+    """Modes with m nodal derivatives whose slope vanishes at n Gauss points, (2 m,) each."""
     x, w = gauss(2 * m)
     out = []
     for degree in range(n, 2 * m - 1):
         P = legendre.legval(2.0 * x - 1.0, np.eye(degree + 1)[degree])
         weights = (2 * degree + 1) * hermite_basis(m, x, 1) @ (w * P)
-        weights[m] = -weights[0]  # exactly: a translation is not resisted
+        weights[m] = -weights[0]  # exactly zero for a translation
         out.append(weights)
     return out

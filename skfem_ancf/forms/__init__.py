@@ -1,7 +1,7 @@
-"""The weak forms of a planar body: energy, internal force, tangent, mass, loads.
+"""Weak forms of a planar body: energy, internal force, tangent, mass, loads.
 
-Each factory returns a scikit-fem form for stock ``asm`` on a stock ``Basis`` of the position
-field, with the degrees of freedom passed as ``r``:
+Each factory returns a scikit-fem form for ``asm`` on a ``Basis`` of the position field, with the
+degrees of freedom passed as ``r``:
 
 >>> import numpy as np
 >>> from skfem import Basis, ElementVector, asm
@@ -15,19 +15,17 @@ field, with the degrees of freedom passed as ``r``:
 >>> K.shape, bool(abs(asm(forms.internal_force(steel, width=0.1), basis, r=q)).max() < 1e-3)
 ((24, 24), True)
 
-There are four kinds, which agree where they are the same integral:
+There are four kinds, equal where they are the same integral:
 
-* :func:`textbook_energy`, :func:`textbook_internal_force`, :func:`textbook_tangent`: the
-  mathematics as it is written down, for scikit-fem's assembly of one pair of local functions
-  after the other. The others are tested against them.
-* :func:`energy`, :func:`internal_force`, :func:`tangent`: the same, contracted for all local
-  functions at once.
-* :func:`strain_energy`: the first of these as an :class:`~skfem_ancf.Energy`, for a scene.
-* :func:`of`: what a Beam's own formulation makes of them, whatever it samples and stabilises: the
-  forms that :class:`~skfem_ancf.Scene` solves with.
+* :func:`textbook_energy`, :func:`textbook_internal_force`, :func:`textbook_tangent`: plain
+  formulas, assembled by scikit-fem for one pair of local functions at a time. Tests compare the
+  others with them.
+* :func:`energy`, :func:`internal_force`, :func:`tangent`: the same for all local functions at once.
+* :func:`strain_energy`: the energy as an :class:`~skfem_ancf.Energy`, for a scene.
+* :func:`of`: the forms in the formulation of a Beam, as :class:`~skfem_ancf.Scene` uses them.
 
-In all of them the strain is that of Green and Lagrange in the beam's frame, ``(F^T F - 1) / 2``
-with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's law.
+The strain is the Green-Lagrange strain ``(F^T F - 1) / 2`` in the beam's frame with
+``F = grad r``, and S is the second Piola-Kirchhoff stress.
 """
 
 from .own import BeamForms, Position, of, position

@@ -1,4 +1,4 @@
-"""The weak forms of a beam's own formulation."""
+"""Weak forms of a beam in its formulation."""
 from __future__ import annotations
 
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from .weak import scattered
 
 
 class BeamForms(NamedTuple):
-    """The forms of one beam; :func:`of` makes them."""
+    """The forms of one beam, see :func:`of`."""
 
     energy: Functional
     internal_force: LinearForm
@@ -21,27 +21,26 @@ class BeamForms(NamedTuple):
 
 
 def of(beam: Any) -> BeamForms:
-    """The weak forms of a beam's own formulation, whatever it is.
+    """The weak forms of a beam in its formulation.
 
     They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that
-    :class:`~skfem_ancf.Scene` solves with, stabilisation included, for stock ``asm(form, basis,
-    r=q)``. The formulation has its own quadrature: that of the basis does not matter.
+    :class:`~skfem_ancf.Scene` uses, stabilisation included, for ``asm(form, basis, r=q)``. The
+    formulation has its own quadrature; that of the basis does not matter.
 
-    They may be called inside a form of yours: ``own.internal_force(v, w)`` and ``own.tangent(u, v,
-    w)`` are densities, constant in each element, whose integral is theirs. Then ``r`` is
+    They can be called inside another form: ``own.internal_force(v, w)`` and ``own.tangent(u, v,
+    w)`` are densities, constant in each element, with the same integral. Then ``r`` must be
     :func:`position` of the basis.
 
     Parameters
     ----------
     beam
-        A :class:`~skfem_ancf.Beam`. A ``Basis`` of ``ElementVector(element)`` on its mesh, or on
-        some of its elements, takes the forms.
+        A :class:`~skfem_ancf.Beam`. The forms are assembled on a ``Basis`` of
+        ``ElementVector(element)`` on its mesh, or on some of its elements.
 
     Raises
     ------
     InputError
-        When assembled, if the basis is not one of the beam, or ``r`` is not the vector of its
-        coordinates.
+        In the assembly, if the basis is not one of the beam, or ``r`` has the wrong shape.
 
     Examples
     --------
@@ -64,14 +63,14 @@ def of(beam: Any) -> BeamForms:
 
 
 class Position(DiscreteField):
-    """A position field that knows its basis and its degrees of freedom, ``q``."""
+    """A position field with its basis and degrees of freedom ``q``."""
 
     basis: Any
     q: Any
 
 
 def position(basis: CellBasis, q: ArrayLike) -> Position:
-    """The position field of degrees of freedom: ``basis.interpolate(q)``, which remembers them.
+    """``basis.interpolate(q)`` with the basis and the degrees of freedom attached.
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ def position(basis: CellBasis, q: ArrayLike) -> Position:
 
 
 class _Own:
-    """A form whose element contributions come from the kernel of a beam."""
+    """A form with element contributions from the kernel of a beam."""
 
     def __init__(self, beam):
         super().__init__(self._density)
@@ -98,11 +97,11 @@ class _Own:
         return self._density(*functions)
 
     def _density(self, *functions):
-        """Inside of another form: shape (nelements, npoints)."""
+        """Value inside another form, shape (nelements, npoints)."""
         *functions, w = functions
         r = w.get("r")
         if not isinstance(r, Position):
-            raise InputError("inside a form of yours the forms of a beam need the position with "
+            raise InputError("inside another form the forms of a beam need the position with "
                              "its degrees of freedom: asm(form, basis, r=forms.position(basis, q))")
         last = self._last
         if last[0] is not r:
@@ -112,12 +111,12 @@ class _Own:
             for function in reversed(functions):  # rows of v, columns of u
                 found = found[:, number[id(function)]]
         except KeyError:
-            raise InputError("the position is that of another basis: assemble the form on the "
+            raise InputError("the position belongs to another basis: assemble the form on the "
                              "basis that forms.position has") from None
         return (found / r.basis.dx.sum(axis=1))[:, None] + np.zeros(r.basis.dx.shape)
 
     def _contributions(self, basis, r=None, idx=None, **other):
-        """Those of the elements of the basis; ``idx`` is scikit-fem's."""
+        """Contributions of the elements of the basis; ``idx`` is scikit-fem's."""
         mesh, element = self.beam.mesh, self.beam.element
         other_element = getattr(basis.elem, "elem", None)
         same = (isinstance(basis, CellBasis) and basis.N == self.beam.N
@@ -161,6 +160,6 @@ class _OwnTangent(_Own, BilinearForm):
 
     def _assemble(self, ubasis, vbasis=None, **kwargs):
         if vbasis is not None and vbasis is not ubasis:
-            raise InputError("trial and test functions of a beam's tangent are of one basis: "
+            raise InputError("trial and test functions of a beam's tangent need the same basis: "
                              "asm(form, basis, r=q)")
         return scattered(self._contributions(ubasis, **kwargs), ubasis)

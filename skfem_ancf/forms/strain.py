@@ -14,12 +14,12 @@ from .weak import green_lagrange, moduli_of, piola
 
 
 def strain_energy(beam: Any) -> Energy:
-    """The strain energy of a beam as an :class:`~skfem_ancf.Energy`, of full integration.
+    """The strain energy of a beam as an :class:`~skfem_ancf.Energy`, fully integrated.
 
-    Its psi is the material's law of the Green-Lagrange strain, at the points of the formulation
-    "continuum", whatever formulation the beam has, and in all layers of its section. It is
-    not scaled with the loads: added to a scene it is there once more. The kernels of a Beam with
-    this formulation give the same numbers faster.
+    psi is the strain energy density of the material at the points of the formulation "continuum",
+    in all layers of the section, independent of the formulation of the beam. Load factors do not
+    scale it. A scene of the beam already contains this energy: adding it doubles the stiffness. The
+    kernels of a Beam with this formulation give the same numbers faster.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def strain_energy(beam: Any) -> Energy:
 
 
 class StrainEnergy(Energy):
-    """What :func:`strain_energy` returns.
+    """The energy of :func:`strain_energy`.
 
     Parameters
     ----------

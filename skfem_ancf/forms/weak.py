@@ -1,4 +1,4 @@
-"""The weak forms of a planar body, see :mod:`skfem_ancf.forms`."""
+"""Weak forms of a planar body, see :mod:`skfem_ancf.forms`."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from ..materials.base import Material
 # kinematics: grad[i, j] = d r_i / d X_j
 
 def deformation_gradient(r: Any, frame: Array) -> Array:
-    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J].
+    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J], shape (2, 2, ...).
 
     Parameters
     ----------
@@ -27,23 +27,18 @@ def deformation_gradient(r: Any, frame: Array) -> Array:
         The position field, with ``grad`` of shape (2, 2, ...).
     frame
         The beam's frame, shape (2, 2, ...).
-
-    Returns
-    -------
-    ndarray
-        Shape (2, 2, ...).
     """
     return np.einsum("ij...,jJ...->iJ...", r.grad, frame)
 
 
 def green_lagrange(F: Array) -> Array:
-    """(eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
+    """Strain (eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
     return np.array([0.5 * (dot(F[:, 0], F[:, 0]) - 1.0), 0.5 * (dot(F[:, 1], F[:, 1]) - 1.0),
                      dot(F[:, 0], F[:, 1])])
 
 
 def strain_variation(F: Array, dF: Array) -> Array:
-    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both.
+    """Variation of :func:`green_lagrange` at F in the direction dF, shape (3, ...).
 
     Parameters
     ----------
@@ -51,11 +46,6 @@ def strain_variation(F: Array, dF: Array) -> Array:
         Deformation gradient in the beam's frame, shape (2, 2, ...).
     dF
         Its variation, shape (2, 2, ...).
-
-    Returns
-    -------
-    ndarray
-        Shape (3, ...).
     """
     return np.array([dot(F[:, 0], dF[:, 0]), dot(F[:, 1], dF[:, 1]),
                      dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
@@ -71,13 +61,12 @@ def _voigt_to_tensor(D):
 
 
 def _law(material, k_s):
-    """The law of a material with its shear corrected."""
     require_like("material", material, "Material", "law")
     return material.law(require_positive("k_s", k_s))
 
 
 def piola(law: Any, F: Array, frame: Array) -> Array:
-    """The first Piola-Kirchhoff stress of a law, ``d W / d (d r_i / d X_j)``.
+    """First Piola-Kirchhoff stress ``d W / d (d r_i / d X_j)``, shape (2, 2, ...).
 
     Parameters
     ----------
@@ -85,22 +74,17 @@ def piola(law: Any, F: Array, frame: Array) -> Array:
         A material's law.
     F, frame
         Deformation gradient in the beam's frame, and the frame, (2, 2, ...).
-
-    Returns
-    -------
-    ndarray
-        Shape (2, 2, ...).
     """
     return np.einsum("iJ...,JK...,jK...->ij...", F, _tensor(law.stress(green_lagrange(F))), frame)
 
 
 def moduli_of(law: Any, F: Array, frame: Array) -> Array:
-    """The derivatives of :func:`piola` by the deformation gradient, shape (2, 2, 2, 2, ...).
+    """Derivatives of :func:`piola` by the deformation gradient, shape (2, 2, 2, 2, ...).
 
     Parameters
     ----------
     law, F, frame
-        As there.
+        As for :func:`piola`.
     """
     eps = green_lagrange(F)
     D, S = _voigt_to_tensor(law.moduli(eps)), _tensor(law.stress(eps))
@@ -109,7 +93,7 @@ def moduli_of(law: Any, F: Array, frame: Array) -> Array:
     return np.einsum("jJ...,iJkL...,lL...->ijkl...", frame, A, frame, optimize=True)
 
 
-# the textbook's forms
+# textbook forms
 
 
 def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) -> Functional:
@@ -135,7 +119,7 @@ def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) ->
 
 
 def textbook_internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
-    """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``.
+    """First variation ``delta U = int S : delta eps dV``, a ``LinearForm``.
 
     Parameters
     ----------
@@ -153,7 +137,7 @@ def textbook_internal_force(material: Material, width: float = 1.0, k_s: float =
 
 
 def textbook_tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
-    """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``.
+    """Second variation ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``.
 
     Parameters
     ----------
@@ -172,7 +156,7 @@ def textbook_tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -
     return stiffness
 
 
-#: The three of them: ``textbook.energy``, ``textbook.internal_force``, ``textbook.tangent``.
+#: The three forms: ``textbook.energy``, ``textbook.internal_force``, ``textbook.tangent``.
 textbook = SimpleNamespace(energy=textbook_energy, internal_force=textbook_internal_force,
                            tangent=textbook_tangent)
 
@@ -181,7 +165,7 @@ textbook = SimpleNamespace(energy=textbook_energy, internal_force=textbook_inter
 
 
 class _BeamFrame:
-    """A form whose ``w`` also holds the beam's frame, shape (2, 2, nelements, npoints)."""
+    """A form with the beam's frame in ``w``, shape (2, 2, nelements, npoints)."""
 
     @staticmethod
     def _normalize_asm_kwargs(w, basis):
@@ -198,23 +182,23 @@ class _BeamFrame:
 
 
 class EnergyForm(_BeamFrame, Functional):
-    """A functional, with the beam's frame as ``w.frame``."""
+    """A functional with the beam's frame as ``w.frame``."""
 
 
 class BeamLinearForm(_BeamFrame, LinearForm):
-    """A linear form, with the beam's frame as ``w.frame``."""
+    """A linear form with the beam's frame as ``w.frame``."""
 
 
 class BeamBilinearForm(_BeamFrame, BilinearForm):
-    """A bilinear form, with the beam's frame as ``w.frame``."""
+    """A bilinear form with the beam's frame as ``w.frame``."""
 
 
 class StressForm(BeamLinearForm):
-    """A linear form ``int P : grad v`` given by the first Piola-Kirchhoff stress P.
+    """A linear form ``int P : grad v`` defined by the first Piola-Kirchhoff stress P.
 
-    The decorated function takes ``w`` and returns P of shape (2, 2, nelements, npoints); the
-    fields in ``w`` are as for scikit-fem's ``LinearForm``, and ``w.frame`` is the beam's frame.
-    All local functions are contracted at once by a matrix product.
+    The decorated function takes ``w``, with fields as in scikit-fem's ``LinearForm`` and the beam's
+    frame ``w.frame``, and returns P (2, 2, nelements, npoints). All local functions are contracted
+    at once by a matrix product.
     """
 
     def _assemble(self, ubasis, vbasis=None, **kwargs):
@@ -227,10 +211,10 @@ class StressForm(BeamLinearForm):
 
 
 class ModuliForm(BeamBilinearForm):
-    """A bilinear form ``int grad v : A : grad u`` given by the moduli A = dP / dF.
+    """A bilinear form ``int grad v : A : grad u`` defined by the moduli A = dP / dF.
 
-    The decorated function takes ``w`` and returns A of shape (2, 2, 2, 2, nelements, npoints).
-    All pairs of local functions are contracted at once by matrix products.
+    The decorated function takes ``w`` and returns A (2, 2, 2, 2, nelements, npoints). All pairs of
+    local functions are contracted at once by matrix products.
     """
 
     def _assemble(self, ubasis, vbasis=None, **kwargs):
@@ -250,7 +234,7 @@ def _gradient_table(basis):
 
 
 def scattered(K: Array, basis: Any) -> tuple[Any, Array, tuple[int, int], tuple[int, int]]:
-    """Element matrices (ne, nq, nq), rows of v and columns of u, as scikit-fem's COO data."""
+    """Element matrices (ne, nq, nq), rows v and columns u, as COO data of scikit-fem."""
     nq, dofs = basis.Nbfun, basis.element_dofs
     rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
     return (np.array([rows.ravel(), cols.ravel()]), K.transpose(2, 1, 0).ravel(),
@@ -259,7 +243,7 @@ def scattered(K: Array, basis: Any) -> tuple[Any, Array, tuple[int, int], tuple[
 
 # the same for all local functions at once, and mass and loads
 
-#: :func:`textbook_energy`, whose assembly has no pairs of local functions.
+#: :func:`textbook_energy`: a functional has no local functions to contract.
 energy = textbook_energy
 
 
@@ -298,10 +282,10 @@ def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> Bilinea
 
 
 def mass(density: float, width: float = 1.0) -> BilinearForm:
-    """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion.
+    """Mass ``int rho v . u dV``, a constant ``BilinearForm``.
 
-    On curved meshes with linear sections the volumes of a stock ``Basis`` are too small by
-    theta^2 / 12, theta the angle of an element: take :meth:`~skfem_ancf.Beam.exact_basis`.
+    On curved meshes with linear sections a ``Basis`` underestimates volumes by theta^2 / 12, theta
+    the angle of an element: use :meth:`~skfem_ancf.Beam.exact_basis`.
 
     Parameters
     ----------
@@ -320,9 +304,7 @@ def mass(density: float, width: float = 1.0) -> BilinearForm:
 
 
 def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
-    """Dead load ``int rho g . v dV``, a ``LinearForm``.
-
-    The volumes are those of the basis, see :func:`mass`.
+    """Dead load ``int rho g . v dV``, a ``LinearForm``; for the volumes see :func:`mass`.
 
     Parameters
     ----------
@@ -344,7 +326,7 @@ def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
 
 
 def _widths(width):
-    """A positive width, or widths at the points of a basis."""
+    """Check a positive width, or widths at the points of a basis."""
     return require_finite("width", width, (None, None)) if isinstance(
         width, np.ndarray) else require_positive("width", width)
 
@@ -374,10 +356,10 @@ def traction(t: ArrayLike | Callable[[Array], Array], width: float | Array = 1.0
 
 
 def pressure(width: float | Array = 1.0) -> BilinearForm:
-    """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
+    """Unit follower pressure ``int -n . v da``, linear in the position: a ``BilinearForm``.
 
-    On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
-    -90 degrees. The matrix times the degrees of freedom is the force.
+    On the deformed facet ``n da`` is the derivative of the position along the facet, rotated by
+    -90 degrees. The force is the matrix times the degrees of freedom.
 
     Parameters
     ----------

@@ -14,13 +14,7 @@ FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSp
 
 
 def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formulation:
-    """A :class:`Formulation` from its name, its class or itself.
-
-    Raises
-    ------
-    NameUnknown
-        If the name is not known; the message lists the known ones.
-    """
+    """A :class:`Formulation` from its name, its class or itself; NameUnknown for another name."""
     if isinstance(formulation, Formulation):
         return formulation
     if isinstance(formulation, type) and issubclass(formulation, Formulation):

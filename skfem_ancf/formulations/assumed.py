@@ -1,4 +1,4 @@
-"""Assumed strain: free of membrane and curvature-thickness locking."""
+"""Assumed strain, free of membrane and curvature-thickness locking."""
 
 from __future__ import annotations
 
@@ -18,36 +18,34 @@ from .ecm import AXIS, split_moduli
 
 
 class Assumed(Formulation):
-    """Strain components sampled along the axis where the interpolation can make them vanish.
+    """Strain components sampled where the interpolation represents pure bending exactly.
 
-    A cubic axis cannot keep ``|r_X|`` constant while it bends, and sections that turn linearly get
-    thinner between two nodes that have turned. Sampled where the interpolation can vanish, and
-    interpolated between, neither is seen, and the error of a mesh does not grow with the
-    slenderness. The element says where, :attr:`~skfem_ancf.elements.ElementBeam.sampling`: linear
-    sections eps_xx and eps_xy at two Gauss points, eps_yy at the nodes; cubic sections eps_xx at
-    two Gauss points, eps_xy and eps_yy at xi = 0, 1/2, 1, integrated with three Gauss points.
+    A cubic axis cannot keep ``|r_X|`` constant in bending, and linearly interpolated sections get
+    thinner between rotated nodes. Both parasitic strains vanish at the sampling points, between
+    which the strain is interpolated, so the error does not depend on the slenderness. The element
+    defines the points in :attr:`~skfem_ancf.elements.ElementBeam.sampling`: linear sections use
+    eps_xx and eps_xy at two Gauss points and eps_yy at the nodes; cubic sections eps_xx at two
+    Gauss points, eps_xy and eps_yy at xi = 0, 1/2, 1, with three Gauss points of integration.
 
-    What the samples miss is stabilised by ``1/2 k L |c|^2``, with the combinations c of degrees of
-    freedom and the stiffness k of :attr:`~skfem_ancf.elements.ElementBeam.stabilised`: for a cubic
-    axis ``c = (r_X1 + r_X2) / 2 - (r_2 - r_1) / L`` and k = E I / L^2 (10 E I / l^2 with cubic
-    sections, l the length of the beam, which keeps their order). Where the reference configuration
-    is curved, c less ``beta (r_2 - r_1) / L`` with the complex number beta that makes it vanish
-    there: it turns with the beam, so the term is objective, quadratic, and its matrix constant. A
-    cubic cable has a third point of integration instead, whose weight
-    ``alpha * 1200 E I / (E A l^2)`` is small, and at most 4/9, that of three Gauss points.
+    Modes that the samples miss are stabilised by ``1/2 k L |c|^2``, with c and k from
+    :attr:`~skfem_ancf.elements.ElementBeam.stabilised`: for a cubic axis
+    ``c = (r_X1 + r_X2) / 2 - (r_2 - r_1) / L`` and k = E I / L^2 (10 E I / l^2 with cubic sections,
+    l the length of the beam, which keeps their order). On a curved reference configuration
+    ``beta (r_2 - r_1) / L`` is subtracted from c, with the complex number beta for which c vanishes
+    there: the term is objective and quadratic, and its matrix is constant. A cubic cable has a
+    third integration point instead, with the small weight ``alpha * 1200 E I / (E A l^2)``, at most
+    4/9, that of three Gauss points.
 
-    Linear sections of order 2 and more in plane strain: the volumetric part of the law
-    (:meth:`~skfem_ancf.materials.base.Material.volumetric_split`) is integrated with one point,
-    the same strains interpolated to it: selective reduced integration, which does not lock as nu
-    goes to 1/2. The stress has the volumetric part of the element's middle.
-
-    Sections of order 1 cannot change their thickness linearly in Y. For them, and a law with
-    constant moduli, the Poisson coupling acts on the mean of the strain over the section.
+    In plane strain, linear sections of order 2 and more integrate the volumetric part of the law
+    (:meth:`~skfem_ancf.materials.base.Material.volumetric_split`) with one point (selective reduced
+    integration), against volumetric locking as nu goes to 1/2. The stress has the volumetric part
+    of the element's middle. Sections of order 1 have no linear thickness strain: for laws with
+    constant moduli the Poisson coupling acts on the mean strain of the section.
 
     Parameters
     ----------
     alpha
-        Factor on the stabilisation, of cubic cables on the weight of the third point.
+        Factor on the stabilisation, and for cubic cables on the weight of the third point.
     """
 
     name = "assumed"
@@ -81,7 +79,7 @@ class Assumed(Formulation):
     @staticmethod
     def _volumetric_apart(whole: Term, element: ElementBeam, material: Material
                           ) -> list[Term] | None:
-        """The term in two, the volumetric one with few points along the axis; or None."""
+        """The term split in two, the volumetric one with few points along the axis; or None."""
         volume = element.sampling.volume
         laws = material.volumetric_split(material.shear_factor(element)) if volume else None
         if laws is None:
@@ -99,7 +97,7 @@ class Assumed(Formulation):
         L = mesh.lengths[:1 if mesh.is_uniform else None]
         EI = material.E * width * mesh.height**3 / 12.0
         along = element.powers(1.0, L[:, None]) / L[:, None]
-        if not straight:  # vectors of the plane as complex numbers
+        if not straight:  # plane vectors as complex numbers
             x, y = element.rigid(mesh).swapaxes(0, 1)
             z = x + 1j * y
             z[0] = mesh.p[0] + 1j * mesh.p[1]

@@ -1,4 +1,4 @@
-"""A formulation says where each strain component is sampled and how it is integrated."""
+"""Formulations: where strain components are sampled and integrated."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class Term:
         Points and weights on [0, 1] along the axis and across the section.
     samples
         For a strain component ("xx", "yy" or "xy") the points xi at which it is evaluated; it is
-        interpolated between them by Lagrange polynomials. Components not named are evaluated at
-        the integration points.
+        interpolated by Lagrange polynomials. Other components are evaluated at the integration
+        points.
     section_samples
         Points eta and a matrix (section points, points eta): the strain at a section point is
-        that combination of the strains at the points eta. None to evaluate it there.
+        this combination of the strains at the points eta. None to evaluate it there.
     """
 
     law: Law
@@ -53,16 +53,16 @@ class Term:
         return read_only(X), read_only(W)
 
     def nodes(self, component: str) -> Array:
-        """Where along the axis a component is sampled, shape (m,)."""
+        """Points along the axis where a component is sampled, shape (m,)."""
         return np.asarray(self.samples.get(component, self.axis[0]), dtype=float)
 
     @property
     def section_nodes(self) -> Array:
-        """Where across the section the strain is evaluated."""
+        """Points across the section where the strain is evaluated."""
         return np.asarray(self.section_samples[0] if self.section_samples else self.section[0])
 
     def matrix(self, component: str) -> Array | None:
-        """From the samples of a component to the integration points; None for the identity."""
+        """Interpolation matrix from samples to integration points; None for the identity."""
         sampled = component in self.samples
         if not sampled and self.section_samples is None:
             return None
@@ -73,7 +73,7 @@ class Term:
 
 
 class Formulation(Immutable):
-    """Base class of the formulations; a subclass gives its name and its terms.
+    """Base class of formulations; a subclass defines its name and :meth:`terms`.
 
     Other Parameters
     ----------------
@@ -84,30 +84,30 @@ class Formulation(Immutable):
     name = ""
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
-        """The integrals that make up the strain energy, a list of :class:`Term`."""
+        """The integrals of the strain energy, a list of :class:`Term`."""
         raise NotImplementedError(f"{type(self).__name__} has no terms: a formulation defines "
                                   "terms(element, material), a list of Term")
 
     def points_along(self, element: ElementBeam, material: Material) -> int:
-        """Number of points along an element of the first of :meth:`terms`."""
+        """Number of points along an element in the first of :meth:`terms`."""
         return len(self.terms(element, material)[0].axis[0])
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:
-        """A constant element stiffness (nelements or 1, 2 nb, 2 nb), added to that of the terms, or
-        None.
+        """A constant element stiffness (nelements or 1, 2 nb, 2 nb), or None.
 
-        It must vanish for rigid motions of the reference configuration, large ones included.
+        It is added to that of the terms, and must vanish for finite rigid motions of the reference
+        configuration.
         """
         return None
 
     def stress(self, layer: Any, strain: Array, u: Array, X: Array,
                tind: Array | None) -> Array:
-        """Second Piola-Kirchhoff stress, for output; shape (3, nelements, npoints).
+        """Second Piola-Kirchhoff stress for output, shape (3, nelements, npoints).
 
-        That of the first term at the points, and of the others where they are integrated: terms
-        with one point along take the strain of the middle of the element, those with one point
-        across that of the axis, those with section samples that of the section.
+        The first term is evaluated at the points, the others where they are integrated: terms with
+        one point along take the strain of the middle of the element, those with one point across
+        that of the axis, those with section samples that of the section.
 
         Parameters
         ----------
@@ -138,9 +138,9 @@ class Formulation(Immutable):
     def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:
         """Rules along the axis and across the section that integrate the energy exactly.
 
-        That is of twice the degree of the strain: ``element.strain_degree`` along the axis of a
-        straight element, and 2 N across the section, for St. Venant-Kirchhoff. Across a section
-        that is no rectangle they have its width.
+        They are exact for twice the degree of the strain (St. Venant-Kirchhoff):
+        ``element.strain_degree`` along the axis of a straight element, and 2 N across the section.
+        The rule across includes the width of sections that are not rectangles.
         """
         require_like("element", element, "beam element", "strain_degree", "order")
         n = 2 * element.order + 1

@@ -1,4 +1,4 @@
-"""The formulation of the paper: every strain component at every integration point."""
+"""Full integration: every strain component at every integration point."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[A
     law = material.law(material.shear_factor(element))
     if not isinstance(law, LinearLaw):
         raise InputError(
-            f"formulation {name!r} splits constant moduli, which {type(material).__name__} has "
-            "not: use StVenantKirchhoff, or another formulation")
+            f"formulation {name!r} needs constant moduli, which {type(material).__name__} does not "
+            "have: use StVenantKirchhoff, or another formulation")
     uncoupled = np.diag([material.E, material.E, law.D[2, 2]])
     return uncoupled, law.D - uncoupled
 
@@ -32,8 +32,8 @@ def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[A
 class EnhancedContinuum(Formulation):
     """U = 1/2 int eps : diag(E, E, k_s G) : eps dV + 1/2 int eps : (D - diag(E, E)) : eps h b dX.
 
-    The second integral is over the axis. It mends Poisson locking of sections that cannot change
-    their thickness linearly in Y, as those of order 1.
+    The second integral is over the axis. This avoids Poisson locking of sections without linear
+    thickness strain, as those of order 1.
 
     References
     ----------

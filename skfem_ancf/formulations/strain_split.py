@@ -1,4 +1,4 @@
-"""The strain split method: only the strain of the axis is Poisson-coupled with the section."""
+"""The strain split method: Poisson coupling of the axial strain only."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ class StrainSplit(EnhancedContinuum):
     """eps = a + s with a = eps(X, 0): stress D a + diag(E, E, k_s G) s.
 
     The energy is 1/2 int (a : D : a + 2 a : D : s + s : D_0 : s) dV with
-    D_0 = diag(E, E, k_s G). Its derivative by s is the stress of the method; its derivative by a
-    is D (a + s), where the method puts that same stress: the difference is the Poisson coupling
-    of the section's mean of s, of second order, and makes the tangent symmetric and the energy
-    exist. Replacing D by D_0 in the middle term would give "ecm".
+    D_0 = diag(E, E, k_s G). Its derivative by s is the stress of the method. Its derivative by a is
+    D (a + s) instead of the same stress: the difference, the Poisson coupling of the mean of s, is
+    of second order and makes the tangent symmetric. With D_0 in the middle term it would be "ecm".
 
     References
     ----------

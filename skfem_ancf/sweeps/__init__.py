@@ -1,4 +1,4 @@
-"""Many scenes, solved side by side."""
+"""Parameter sweeps over scenes."""
 
 from .members import Failure, Sweep
 from .parameter_sweep import sweep

@@ -1,4 +1,4 @@
-"""What a sweep has found: arrays over its members, and their file."""
+"""Results of a sweep: arrays over its members, and their file."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Failure(NamedTuple):
     Attributes
     ----------
     member : int
-        Its place in the order of the parameters.
+        Index of the member.
     parameters : dict
-        From name to value.
+        Its parameters by name.
     error : str
-        The class and message of what was raised.
+        Class and message of the error.
     """
 
     member: int
@@ -33,14 +33,14 @@ class Failure(NamedTuple):
 
 
 class Sweep:
-    """What :func:`skfem_ancf.sweep` has found, in the order of the parameters.
+    """Results of :func:`skfem_ancf.sweep`, in the order of the parameters.
 
-    ``sweep[name]`` is the array of a name, of what was measured or of a parameter.
+    ``sweep[name]`` is the array of a measured quantity or a parameter.
 
     Parameters
     ----------
     parameters
-        From name to array of shape (n, ...), one row for each member.
+        By name, arrays of shape (n, ...), one row for each member.
     found
         For each member a dict of arrays, the text of an error, or None where it is not done.
 
@@ -49,13 +49,13 @@ class Sweep:
     parameters : dict
         As above.
     values : dict
-        From name to an array (n, ...) of what was measured, nan where a member failed or is not
-        done. What has no name of its own is called "value".
+        By name, arrays (n, ...) of measured values, nan where a member failed or is not done. A
+        value without a name is called "value".
     status : ndarray
         Shape (n,): "done", "failed" or "open".
     failures : list of Failure
-        Those that failed; a member whose values have other names or shapes than those of the first
-        that is done has failed too.
+        The members that failed, among them those whose values differ in names or shapes from those
+        of the first.
 
     Examples
     --------
@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def failures(self) -> list[Failure]:
-        """Those that failed, with their parameters and errors."""
+        """The failed members, with parameters and errors."""
         return [Failure(k, {name: _plain(column[k]) for name, column in self.parameters.items()},
                         error) for k, error in self._errors.items()]
 
@@ -101,11 +101,7 @@ class Sweep:
         """An ``xarray.Dataset``: values along "member", with the parameters as coordinates.
 
         The coordinate "status" is :attr:`status`, unless a parameter or a value has that name.
-
-        Raises
-        ------
-        MissingExtra
-            If xarray is not installed.
+        MissingExtra is raised if xarray is not installed.
         """
         try:
             import xarray
@@ -118,10 +114,10 @@ class Sweep:
              for name, values in {**status, **self.parameters}.items()})
 
     def save(self, path: StrPath) -> None:
-        """Write a file that ``numpy.load`` reads too; one that is there is replaced at once.
+        """Write a ``.npz`` file, which replaces an existing one atomically.
 
-        Its arrays are ``parameters/NAME``, ``values/NAME``, ``status`` and ``errors``, of which
-        each has a row for a member.
+        Its arrays ``parameters/NAME``, ``values/NAME``, ``status`` and ``errors`` have one row for
+        each member; ``numpy.load`` reads them.
 
         Parameters
         ----------
@@ -141,17 +137,12 @@ class Sweep:
 
     @classmethod
     def load(cls, path: StrPath) -> Sweep:
-        """The sweep that a file holds.
+        """Load a sweep from a file; FileError if it is not one.
 
         Parameters
         ----------
         path
             Name of the file.
-
-        Raises
-        ------
-        FileError
-            If it cannot be read, or holds something else.
         """
         path = require_path("path", path, (".npz",))
         try:
@@ -164,7 +155,7 @@ class Sweep:
 
 
 def _read(path):
-    """Parameters, values, status and errors of a file; raises Unreadable."""
+    """Parameters, values, status and errors of a file; Unreadable if it is damaged."""
     arrays = read(path)
     form = arrays.pop("format", None)
     if form is None or form.shape or form.dtype.kind not in "iu" or form != _FORMAT:
@@ -186,12 +177,12 @@ def _read(path):
 
 
 def _plain(x):
-    """A number of NumPy as one of Python, which is shown as it is written."""
+    """A NumPy scalar as a Python number."""
     return x.item() if isinstance(x, np.generic) else x
 
 
 def column_of(values: Sequence[Any]) -> Array:
-    """An array (n, ...) of n values: of numbers, texts or truth values, else of objects."""
+    """An array (n, ...) of n values: numbers, texts, truth values, or objects."""
     try:
         column = np.array(values)
         types = {type(x) for x in values}
@@ -206,7 +197,7 @@ def column_of(values: Sequence[Any]) -> Array:
 
 
 def require_plain(columns: dict[str, Array]) -> None:
-    """Raise InputError if a parameter, an array (n, ...), is neither numbers nor texts."""
+    """Raise InputError if a parameter (n, ...) contains neither numbers nor texts."""
     for name, column in columns.items():
         if column.dtype.kind == "O":
             raise InputError(f"a file takes parameters that are numbers or texts; {name!r} has "
@@ -215,7 +206,7 @@ def require_plain(columns: dict[str, Array]) -> None:
 
 
 def _alike(found):
-    """The same list; members unlike the first that is done are errors."""
+    """Replace members whose names or shapes differ from the first one by errors."""
     def listed(values):
         return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())
 

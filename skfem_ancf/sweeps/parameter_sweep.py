@@ -1,4 +1,4 @@
-"""Sweeps: one scene after another from a table of parameters, wherever there are processors."""
+"""Sweeps over parameters, serial or parallel."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .members import Sweep, column_of, require_plain
 from .probes import Probes, measured
 from .workers import Task, here, in_processes, in_threads, on_cluster
 
-#: Seconds between two files, and how many times longer than writing one they are at least.
+#: Least seconds between two files, and least ratio to the time of writing one.
 _SECONDS, _RARER = 2.0, 20.0
 
 
@@ -32,41 +32,45 @@ def sweep(build: Callable[..., Any],
           path: StrPath | None = None, progress: bool | None = None) -> Sweep:
     """Build, solve and measure a scene for each of many sets of parameters.
 
-    Each member is ``measure(build(**its parameters))``: ``build`` describes, ``measure`` solves and
-    reads. Results do not depend on where members are computed, nor on their order. A member that
-    fails is nan, and is listed with its parameters in ``failures``; the others go on.
+    Each member is ``measure(build(**parameters))``: ``build`` makes the scene, ``measure`` solves
+    it and returns numbers. Results depend neither on where members are computed nor on their order.
+    A member that fails is nan and listed in ``failures``.
 
     Parameters
     ----------
     build
-        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes.
+        Function of the parameters, by keyword, that returns a :class:`Scene`, or another argument
+        of ``measure``.
     parameters
-        From name to an array of shape (n, ...), one row for each member; a table of pandas; or a
-        list of n dicts.
+        By name, arrays of shape (n, ...), one row for each member; a pandas table; or a list of n
+        dicts.
     measure
-        From the scene to a number, an array of numbers, or a dict of them by name; of equal names
-        and shapes for all members. Or what to read of the scene's ``solve_static()``: a pair
-        (what, at) or a triple (what, at, beam) of "displacement" or "position", a point (x, y),
-        points (2, n) or the name of an end, and a beam; or a dict by name of such and of functions
-        of the State. With these, members are solved in this process in as many threads as there
-        are processors: compiled code runs side by side. Members are built one after the other.
+        Function of the scene that returns a number, an array of numbers, or a dict of them by name,
+        with equal names and shapes for all members. Or quantities of ``scene.solve_static()``: a
+        pair (what, at) or a triple (what, at, beam) of "displacement" or "position", a point (x,
+        y), points (2, n) or the name of an end, and a beam; or a dict of such and of functions of
+        the State. These are computed in this process, with one thread for each processor, and built
+        one after the other.
     workers
-        How many processes; None: in this one. Processes import ``build`` and ``measure``, which
-        are to be defined by ``def`` at the top of a module; a script calls under
-        ``if __name__ == "__main__":``. Libraries of linear algebra have one thread in each.
+        Number of processes; None for this one only. ``build`` and ``measure`` must be importable:
+        defined by ``def`` at the top of a module. Scripts call sweep under
+        ``if __name__ == "__main__":``. Linear algebra uses one thread in each process.
     client
-        A ``dask.distributed.Client``, in place of ``workers``.
+        A ``dask.distributed.Client``, instead of ``workers``.
     path
-        A file (.npz) that is written as results come. If it is there, the sweep goes on: what is
-        done is taken from it, what failed is tried again. Parameters are compared with those of
-        the file; whether the functions are the same nobody can know.
+        A file (.npz) for results so far. If it exists, the sweep continues: finished members are
+        read from it, failed ones are computed again. The parameters must be those of the file; the
+        functions are not compared.
     progress
-        Show a bar: True, False, or None: on a terminal, after a second, if tqdm is installed.
+        Show a progress bar: True, False, or None: on a terminal, after a second, if tqdm is
+        installed.
 
     Raises
     ------
     InputError
-        If arguments do not fit; NameUnknown and CallError, if ``build`` takes other parameters.
+        If arguments do not fit.
+    NameUnknown, CallError
+        If ``build`` takes other parameters.
     FileError
         If the file is of another sweep, or cannot be written.
     PickleError
@@ -74,7 +78,7 @@ def sweep(build: Callable[..., Any],
     CallbackError
         If all members fail.
     Interrupted
-        By Ctrl-C; its ``state`` is the Sweep so far, and the file holds it too.
+        By Ctrl-C; its ``state`` is the Sweep so far, which is also in the file.
 
     Examples
     --------
@@ -96,7 +100,7 @@ def sweep(build: Callable[..., Any],
     require_function("build", build, "of the parameters that returns a scene")
     task = Task(build, measured(measure))
     if workers is not None and client is not None:
-        raise InputError("workers and client say both where to compute: give one of them")
+        raise InputError("workers and client exclude each other: give one of them")
     if workers is not None:
         workers = require_integer("workers", workers, 1)
     values = _columns(parameters)
@@ -129,7 +133,7 @@ def sweep(build: Callable[..., Any],
 
 
 class _Record:
-    """What is found, and its file, written now and then."""
+    """Results so far, written to the file at intervals."""
 
     def __init__(self, columns: dict[str, Array], path: Path | None) -> None:
         self.columns, self.path = columns, path
@@ -141,10 +145,10 @@ class _Record:
                 self.found = _done(path, columns)
         self.places = [k for k, one in enumerate(self.found) if one is None]
         if path is not None and self.places:
-            Sweep(columns, self.found).save(path)  # it can be written
+            Sweep(columns, self.found).save(path)  # fails early
 
     def add(self, k, found):
-        """Take what was found of a member; write, if it is time to."""
+        """Add the result of a member; write the file if it is due."""
         self.found[k] = found
         if self.path is not None and time.monotonic() >= self.next:
             begun = time.monotonic()
@@ -153,7 +157,7 @@ class _Record:
             self.next = now + max(_SECONDS, _RARER * (now - begun))
 
     def written(self):
-        """The Sweep so far, in its file too; a warning where that cannot be written any more."""
+        """The Sweep so far; write it, with a warning where that fails."""
         result = Sweep(self.columns, self.found)
         if self.path is not None:
             try:
@@ -164,7 +168,7 @@ class _Record:
         return result
 
     def stopped(self):
-        """Where it was interrupted."""
+        """The Interrupted error."""
         done = sum(isinstance(one, dict) for one in self.found)
         return (f"interrupted with {done} of {len(self.found)} members done; " + (
             "they are in the state of this exception; with path= the next call would go on"
@@ -217,7 +221,7 @@ def _require_signature(build, member):
 
 
 def _done(path, columns):
-    """What a file of an interrupted sweep of the same parameters has."""
+    """Results in the file of an interrupted sweep with the same parameters."""
     before = Sweep.load(path)
     if list(before.parameters) != list(columns):
         differ = f"{list(before.parameters)} there, {list(columns)} here"
@@ -240,7 +244,7 @@ def _same(a, b):
 
 
 def _judged(result):
-    """The result, with a warning of failures."""
+    """The result, after a warning of failures."""
     failures = result.failures
     if failures:
         text = (f"{len(failures)} of {len(result)} members failed, the first with "

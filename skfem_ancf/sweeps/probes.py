@@ -1,4 +1,4 @@
-"""What a sweep reads of the static equilibria of its members."""
+"""Quantities that a sweep reads from static equilibria."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 from ..core.errors import InputError, require_label, require_option, shown
 
-#: What is read of material points by its name.
+#: Quantities of material points by name.
 WHAT = ("displacement", "position")
 
 
 class Probes(NamedTuple):
-    """A measure of the scene: it is solved, then read.
+    """Solves a scene statically and evaluates quantities.
 
     ``named`` has by name pairs (what, at), triples (what, at, beam) or functions of the State.
     """
@@ -19,14 +19,13 @@ class Probes(NamedTuple):
     named: dict[str, Any]
 
     def __call__(self, scene: Any) -> dict[str, Any]:
-        """Values by name, of the scene's static equilibrium."""
         state = scene.solve_static()
         return {name: probe(state) if callable(probe) else getattr(state, probe[0])(*probe[1:])
                 for name, probe in self.named.items()}
 
 
 def measured(measure: Any) -> Any:
-    """The function of a scene that a measure of :func:`~skfem_ancf.sweep` is; or InputError."""
+    """The function of a scene for the ``measure`` of :func:`~skfem_ancf.sweep`."""
     if callable(measure):
         return measure
     if not isinstance(measure, (dict, tuple)) or not measure:

@@ -1,4 +1,4 @@
-"""Where members of a sweep are computed: here, in threads, in processes, on a cluster."""
+"""Computation of the members of a sweep: serial, in threads, in processes, on a cluster."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 class Task(NamedTuple):
-    """A member, from its parameters to what is measured; ``share`` members a process, about."""
+    """Builds and measures a member; ``share`` is the number of members per process."""
 
     build: Callable[..., Any]
     measure: Callable[[Any], Any]
     share: float = 1.0
 
     def __call__(self, member: dict[str, Any]) -> Found:
-        """What is measured of a member, by name, or the text of the error."""
+        """Measured values of a member by name, or the text of the error."""
         with expecting(self.share):
             return self.begun(member)()
 
     def begun(self, member: dict[str, Any]) -> Callable[[], Found]:
-        """A function that measures the scene of a member, which is built now."""
+        """Build the scene of a member now; returns a function that measures it."""
         try:
             return partial(self._measured, self.build(**member), member)
-        except Exception as error:  # of the caller's functions, which may raise anything
+        except Exception as error:  # user functions may raise anything
             return partial(str, f"{type(error).__name__}: {error}")
 
     def _measured(self, scene, member):
@@ -70,13 +70,13 @@ def _named(value, member):
 
 
 def here(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Results:
-    """Compute the members at some places here; yields the place of each and what was found."""
+    """Compute members serially; yields the index and the result of each."""
     for k in places:
         yield k, task(members[k])
 
 
 def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Results:
-    """As :func:`here`, measured in as many threads as there are processors, built one by one."""
+    """As :func:`here`, built one by one and measured in one thread for each processor."""
     threads, flying = processors(), deque()  # type: ignore[var-annotated]
     with ThreadPoolExecutor(threads) as pool:
         try:
@@ -92,7 +92,7 @@ def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int])
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors available to this process."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
@@ -101,7 +101,7 @@ def processors() -> int:
 
 def in_processes(task: Task, members: list[dict[str, Any]], places: Iterable[int], workers: int
                  ) -> Results:
-    """As :func:`here`, in processes of this computer, started again ("spawn")."""
+    """As :func:`here`, in processes of this computer, started by "spawn"."""
     for what, function in (("build", task.build), ("measure", task.measure)):
         _require_sendable(what, function)
     with _Pool(workers) as pool:
@@ -124,7 +124,7 @@ def _require_sendable(what, function):
         found = (getattr(function, "__module__", None) != "__main__"
                  or hasattr(sys.modules["__main__"], "__file__"))
         why = "it was typed where other processes cannot find it"
-    except Exception as error:  # what a function holds may raise anything
+    except Exception as error:  # pickling may raise anything
         found, why = False, str(error)
     if not found:
         raise PickleError(f"{what}, {shown(function)}, cannot be sent to another process: {why}. "
@@ -133,7 +133,7 @@ def _require_sendable(what, function):
 
 
 class _Pool:
-    """Processes that are started again where one has died."""
+    """Worker processes, restarted after a crash."""
 
     def __init__(self, workers):
         import multiprocessing  # takes long
@@ -157,7 +157,7 @@ class _Pool:
         self.pool = ProcessPoolExecutor(self.workers, self.processes.get_context("spawn"), _quiet)
 
     def submit(self, *call):
-        """A future, of other processes if one of these has died."""
+        """A future; restarts the processes if one has died."""
         with _single_threads():
             try:
                 return self.pool.submit(*call)
@@ -167,20 +167,20 @@ class _Pool:
                 return self.pool.submit(*call)
 
     def __exit__(self, kind, error, trace):
-        if kind is not None:  # no one waits for what they are doing
+        if kind is not None:  # do not wait for work in progress
             for process in set(self.processes.active_children()) - self.others:
                 process.terminate()
         self.pool.shutdown(cancel_futures=True)
 
 
 def _quiet():
-    """Ctrl-C ends a worker without a word."""
+    """Workers end silently on Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @contextmanager
 def _single_threads():
-    """Processes that are started inside have one thread for linear algebra."""
+    """Processes started inside use one thread for linear algebra."""
     names = [name for name in _THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(names, "1"))
     try:
@@ -191,10 +191,9 @@ def _single_threads():
 
 
 def _spread(submit, workers, task, members, places):
-    """Members in flight, two for each worker; what came back, as it comes.
+    """Submit two members for each worker at a time; yields results as they arrive.
 
-    Members that were in flight when a worker died are computed again, one at a time, so that the
-    one which kills is known.
+    Members in flight when a worker dies are computed again one at a time, to find the cause.
     """
     places, again, flying, back = deque(places), deque(), {}, SimpleQueue()
     task = task._replace(share=len(places) / workers)
