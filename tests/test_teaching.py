@@ -45,7 +45,7 @@ def test_loads_of_the_size_of_a_mesh():
 
     scene = cantilever().add(Nodal())
     assert scene.solve_static().converged
-    with pytest.raises(InputError, match="Meshes change, under adapt="):
+    with pytest.raises(InputError, match="Meshes change, by adapt="):
         scene.solve_static(adapt=1e-3)
     with pytest.raises(InputError, match="scene.add"):
         scene.load(np.ones(20))

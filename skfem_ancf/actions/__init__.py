@@ -1,1 +1,1 @@
-"""What acts in a scene: loads, supports, joints, springs, obstacles."""
+"""Items of a scene: loads, supports, joints, springs, obstacles."""

@@ -1,4 +1,4 @@
-"""Loads on the axis of a beam: those that turn with it, and those along its length."""
+"""Loads on the axis: follower forces, and forces per length."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from .moving import TimedLoad
 
 
 class FollowerForce(Load):
-    """A force on a material point that turns with the tangent of the axis there, or with a body.
+    """A point force that rotates with the tangent of the axis, or with a rigid body.
 
-    It has no potential: what is loaded by it may flutter.
+    It has no potential and may cause flutter.
 
     Parameters
     ----------
     force
         The force in the reference configuration, shape (2,).
     at
-        The point: its place (x, y) in the reference configuration, shape (2,).
+        The material point (x, y), shape (2,).
     beam
-        The beam, its name or its number, where several have the point; or a RigidBody.
+        Beam, name or number, where several have the point; or a RigidBody.
     amplitude
-        A function of time by which the force is multiplied in a motion.
+        Factor as a function of time.
     line
-        The number of the chain of elements of the beam whose tangent it is, where several meet.
+        Number of the chain of elements whose tangent is used, where several meet.
     """
 
     constant = False
@@ -116,18 +116,18 @@ class FollowerForce(Load):
 
 
 class LineLoad(Load):
-    """A dead force per length of the stress-free axis.
+    """A dead force per length of the reference axis.
 
     Parameters
     ----------
     force
-        Force per length, shape (2,), or a function of the points x (2, ...) of the stress-free
-        axis that returns (2, ...); or of x and the time.
+        Force per length, shape (2,), or a function of points x (2, ...) of the reference axis that
+        returns (2, ...); or of x and the time.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
 
-    #: Numbers of the chains of elements that it acts on, shape (k,); None for all of them.
+    #: Numbers of the loaded chains of elements, shape (k,); None for all.
     chains: Any = None
 
     def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
@@ -146,8 +146,10 @@ class LineLoad(Load):
 
 
 class _AxisPoints(NamedTuple):
-    """Points of the axis: xi (np,), places (2, ne, np), lengths per xi and those that points stand
-    for, 0 where nothing acts, (ne, np), and the local functions there, (nb, ne, np).
+    """Quadrature points of the axis.
+
+    xi (np,), positions (2, ne, np), lengths per xi and weights, zero where nothing acts, (ne, np),
+    and the local functions, (nb, ne, np).
     """
 
     xi: Array
@@ -157,7 +159,7 @@ class _AxisPoints(NamedTuple):
     functions: Array
 
     def load(self, beam: Beam, values: Array) -> tuple[Array, Spread]:
-        """The force (N,) of forces per length at the points, (2, ne, np), and their Spread."""
+        """Force (N,) of forces per length at the points, (2, ne, np), and its distribution."""
         vector = beam.kernel.scatter(
             np.einsum("kep,iep->eki", self.functions, self.lengths * values))
         return vector, Spread(sampled=(Sampled(AXIS, np.arange(len(self.lengths)), self.xi,
@@ -165,7 +167,7 @@ class _AxisPoints(NamedTuple):
 
 
 def _axis_points(beam, chains):
-    """The points of a rule along the axis, of some chains of elements or of all."""
+    """Quadrature points on some chains of elements, or on all."""
     mapping, (xi, w) = beam.mesh.mapping(), gauss(beam.element.axis_degree + 5)
     X = np.array([xi, 0.5 + 0.0 * xi])
     speed = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))
@@ -176,16 +178,16 @@ def _axis_points(beam, chains):
 
 
 class LineLoadInTime(TimedLoad):
-    """A force per length of the stress-free axis that depends on time, bound.
+    """A time-dependent force per length, bound.
 
     Parameters
     ----------
     beam, amplitude
         A :class:`~skfem_ancf.Beam`, and as for :class:`~skfem_ancf.actions.loads.Load`.
     points
-        Where the force is asked.
+        Its quadrature points.
     force
-        The function of the points x (2, ...) and the time that returns (2, ...).
+        Function of points x (2, ...) and the time that returns (2, ...).
     """
 
     def __init__(self, beam: Beam, points: Any, force: Any,
@@ -199,7 +201,7 @@ class LineLoadInTime(TimedLoad):
 
 
 def of_place_and_time(force: Any) -> bool:
-    """True of a function that needs two arguments, x and the time."""
+    """True for a function of two required arguments, x and the time."""
     if not callable(force):
         return False
     try:

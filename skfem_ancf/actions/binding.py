@@ -1,4 +1,4 @@
-"""Items on the degrees of freedom of a scene, and what the equations ask of user-defined ones."""
+"""Bind items to the degrees of freedom of a scene; adapt user-defined items."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .supports import Support
 
 
 def bind_item(item: Item, layout: Layout) -> list[Any]:
-    """What an item is in the equations of a scene: loads, joints, force elements, supports."""
+    """The bound loads, joints, force elements and supports of an item."""
     if isinstance(item, Support):
         return [item.bind(layout)]
     if isinstance(item, Load):
@@ -35,7 +35,6 @@ def bind_item(item: Item, layout: Layout) -> list[Any]:
 
 
 def _bind_custom(item, layout):
-    """The parts of a user-defined item."""
     hint = ("its energy(u, t), force(u, v, t) and constraint(u, t) take displacements and "
             f"velocities of all degrees of freedom, shape ({layout.N},)")
     with explained("{!r} fails in the reference configuration", hint, InputError, item):
@@ -76,7 +75,7 @@ class _Force(ForceElement):
             try_force(self, layout.sizes[self._dofs].reshape(-1, 2))
 
     def _whole(self, x):
-        """All degrees of freedom, zero where the item does not act."""
+        """A vector of all degrees of freedom, zero where the item does not act."""
         out = np.zeros(self._N, dtype=np.asarray(x).dtype)
         out[self._dofs] = np.ravel(x)
         return out

@@ -1,4 +1,4 @@
-"""Loads that are densities at points, contracted for all local functions at once."""
+"""Loads given by densities at points, for all local functions at once."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..beam.kinematics import entries_of
 from ..core.types import Array
 from .loads import Load
 
-#: The six variables are r_0, r_1, F_00, F_01, F_10, F_11: by component, of r and of both slopes.
+#: Component and derivative (0: r, then the slopes) of r_0, r_1, F_00, F_01, F_10, F_11.
 VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])
 
 
 class Points(NamedTuple):
-    """Points of elements or facets.
+    """Quadrature points of elements or facets.
 
     Attributes
     ----------
@@ -25,11 +25,11 @@ class Points(NamedTuple):
     X
         The material points, shape (2, n, np).
     weights
-        What they stand for, shape (n, np).
+        Quadrature weights, shape (n, np).
     functions
         Values and both derivatives of the local functions, shape (n, nb, np, 3).
     of
-        What else is known of them.
+        Additional data.
     """
 
     dofs: Array
@@ -40,18 +40,18 @@ class Points(NamedTuple):
 
 
 def points_of(dofs: Array, X: Array, weights: Array, N: Array, grad: Array, of: Any) -> Points:
-    """Points with the local functions N, (nb, n, np), and their gradients, (nb, 2, n, np)."""
+    """Points from local functions N, (nb, n, np), and their gradients, (nb, 2, n, np)."""
     both = np.stack(np.broadcast_arrays(N, grad[:, 0], grad[:, 1]), axis=-1)
     return Points(dofs, X, weights, np.ascontiguousarray(both.swapaxes(0, 1)), of)
 
 
 class Density(Load):
-    """A load by minus its force on virtual changes of position and deformation gradient.
+    """A load defined by the derivative of a density with respect to r and F.
 
-    A subclass finds ``_parts``, sequences of :class:`Points`, in ``bind``, and defines ``_slope(y,
-    part)`` and ``_curvature(y, part)``: six numbers at each point, (6, n, np), whose product with
-    the change of r_0, r_1, F_00, F_01, F_10, F_11 is minus the work, and their derivatives by
-    these, (6, 6, n, np), those of the change last. The variables are ``y``, (6, n, np).
+    The six variables ``y``, (6, n, np), are r_0, r_1, F_00, F_01, F_10, F_11. A subclass defines
+    ``_slope(y, part)``, the derivatives of the density, (6, n, np), and ``_curvature(y, part)``,
+    the second derivatives (6, 6, n, np), the differentiation last. ``_parts`` are the
+    :class:`Points`, known once bound.
     """
 
     constant = False
@@ -85,7 +85,7 @@ class Density(Load):
         return y
 
     def _force(self, P, part):
-        """The force (N,) of six numbers at the points."""
+        """Force (N,) of derivatives P (6, n, np) at the points."""
         n, nb = part.functions.shape[:2]
         P = (P * part.weights)[VARIABLES].transpose(2, 3, 1, 0).reshape(n, -1, 2)
         out = np.zeros(self.beam.N)

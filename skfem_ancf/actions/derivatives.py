@@ -1,4 +1,4 @@
-"""Densities of points as functions of arrays, with derivatives, by Numba's loops or by JAX."""
+"""Derivatives of densities given at a point, by Numba or by JAX."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from ..core.errors import MissingExtra
 
-#: Steps of the imaginary part, and of the real part relative to the size of a variable.
+#: Complex step, and step of differences relative to a variable.
 IMAGINARY, REAL = 1e-30, 1e-5
 
 
 @lru_cache(32)
 def by_jax(psi: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
-    """A density in JAX, and its derivatives."""
+    """A density in JAX and its derivatives."""
     try:
         import jax
     except ImportError:
@@ -43,7 +43,7 @@ def by_jax(psi: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
 
 
 def _in_two(gradient):
-    """A gradient by all six variables as those by r and F."""
+    """Split a gradient by all six variables into those by r and F."""
     def of(r, F, X, t):
         out = gradient(r, F, X, t)
         return out[:2], out[2:].reshape(F.shape)
@@ -54,9 +54,9 @@ def _in_two(gradient):
 @lru_cache(32)
 def by_loops(psi: Any, gradient: Any, hessian: Any,
              height: float) -> dict[str, Callable[..., Any]]:
-    """Compiled functions of one point, called in loops, and derivatives of psi where none is given.
+    """Compiled functions of one point as functions of arrays, with missing derivatives of psi.
 
-    These are complex steps, and differences of them for the second ones, with steps relative to
+    First derivatives are complex steps, second ones differences of these, with steps relative to
     the height.
     """
     from numba import njit

@@ -1,9 +1,8 @@
-"""Strains that a body would have without stress: of temperature, growth, muscles.
+"""Eigenstrains: stress-free strains of temperature, swelling or actuation.
 
-The potential energy is W(E - E0). For stress linear in the strain this is W(E) less the work of
-``S0 = D E0`` in the strain, which is a load: the body is pushed apart by stresses S0. They enter at
-the points of integration, E0 sampled and interpolated there as the formulation does E. Other laws:
-:mod:`skfem_ancf.actions.nonlinear_eigenstrain`.
+The strain energy is W(E - E0). For stress linear in the strain it is W(E) minus the work of
+``S0 = D E0`` in the strain, a load with the initial stress -S0. E0 is sampled and interpolated as
+the formulation does with E. For other laws see :mod:`skfem_ancf.actions.nonlinear_eigenstrain`.
 """
 
 from __future__ import annotations
@@ -29,26 +28,26 @@ from .item import Item, takes_time
 from .loads import Amplitude, Load
 from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
 
-#: Products of a function of place and one of time that a function of both may be.
+#: Largest number of products.
 MOST = 8
 
-#: How well they have to give it, relative to its largest value.
+#: Tolerance of the sum of products, relative to the largest value.
 CLOSE = 1e-9
 
 
 class EigenStrain(Load):
-    """A stress-free strain: the elastic strain is what is left of E.
+    """An eigenstrain E0: the stress is that of the strain E - E0.
 
-    It is given in the beam's frame, along the axis and across it. Of a cable only ``xx`` acts: its
-    mean stretches the axis, and its slope across bends it. There it is the stretch minus 1 that a
-    fibre has without stress; of sections it is that of Green and Lagrange.
+    It is given in the beam's frame, along and across the axis. Of a cable only ``xx`` acts, as a
+    stretch minus 1: its mean extends the axis and its gradient across bends it. With sections it is
+    a Green-Lagrange strain.
 
     Parameters
     ----------
     xx, yy, xy
-        eps_xx, eps_yy and eps_xy (not twice that): numbers, or functions of material coordinates x,
-        the parameter of the axis, and y, the distance from it, arrays of one shape; or of
-        (x, y, t), which statics take at t = 1. None for zero.
+        eps_xx, eps_yy and eps_xy (not twice that): numbers, or functions of material coordinates
+        (x, y), the parameter of the axis and the distance from it, as arrays of one shape; or of
+        (x, y, t), with t = 1 in statics. None for zero.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
 
@@ -69,29 +68,29 @@ class EigenStrain(Load):
     # strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
     _strains: Any = None
     _stresses: Any = None
-    #: True under laws that are not linear: what it does is not in proportion to its size.
+    #: True for nonlinear laws, whose forces are not proportional to the eigenstrain.
     grows = False
     # that in a motion
     _size = 1.0
-    #: What is given, and what messages call it.
+    #: Arguments and their names in messages.
     given: ClassVar = {"xx": "eps_xx", "yy": "eps_yy", "xy": "eps_xy"}
 
     def __init__(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         if xx is None and yy is None and xy is None:
-            raise InputError("a stress-free strain has a component: give xx, yy or xy")
+            raise InputError("an eigenstrain needs a component: give xx, yy or xy")
         self.xx, self.yy, self.xy = (_number_or_function(f"eps_{name}", f) for name, f in (
             ("xx", xx), ("yy", yy), ("xy", xy)))
 
     def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
-        """(eps_xx, eps_yy, 2 eps_xy) of a layer at coordinates x, y (...); shape (3, ...)."""
+        """(eps_xx, eps_yy, 2 eps_xy) of a layer at coordinates x, y (...), shape (3, ...)."""
         factors = 1.0, 1.0, 2.0
         return np.array([c * _asked(f"eps_{name}", f, x, y) for c, name, f in zip(
             factors, COMPONENTS, (self.xx, self.yy, self.xy))])
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        """Products of functions of place and of time, and what does not depend on time."""
+        """Split functions of (x, y, t) into products of functions of place and of time."""
         k, beam = layout.number(self.beam), layout.beam(self.beam)
         given = {name: getattr(self, name) for name in self.given}
         timed = {name: f for name, f in given.items() if takes_time(f)}
@@ -132,18 +131,18 @@ class EigenStrain(Load):
         return 1.0, one
 
     def element_forces(self, u: Array, factor: float = 1.0) -> Array:
-        """Forces (nelements, nb, 2) on each element at u (N,), of a factor times the strain."""
+        """Element forces (nelements, nb, 2) at u (N,)."""
         return -self.beam.kernel.pushed_forces(self._pushed(factor), u)
 
     def small_forces(self, factor: float = 1.0) -> Array:
-        """As :meth:`element_forces` without displacement, linear in the strain."""
+        """As :meth:`element_forces` at u = 0, linear in the strain."""
         if not self.grows:
             return self.element_forces(np.zeros(self.beam.N), factor)
         return self.beam.kernel.forces_of([factor * T for T in self._stresses],
                                           np.zeros(self.beam.N))
 
     def _pushed(self, factor):
-        """What is given to the kernel."""
+        """The kernel's arguments."""
         return [-factor * given for given in self.pushes]
 
     def force(self, u: Array) -> Array:
@@ -181,20 +180,20 @@ class EigenStrain(Load):
         return out
 
     def stress_at(self, u: Array, X: Array, e: Array, factor: float = 1.0) -> Array:
-        """What the stress is less by at points, S(E) - S(E - factor E0), shape (3, n, m)."""
+        """Reduction of the stress at points, S(E) - S(E - factor E0), shape (3, n, m)."""
         beam, E0 = self.beam, self.strain_at(X, e)
         if not beam.has_sections:
             stretch, _ = stretched(on_grid(strain_at, beam, u, X, e)[0])
             return self.nominal_at(X, e, factor) / stretch
         which = np.broadcast_to(beam.across.which(X, e), E0.shape[1:])
-        for k, layer in enumerate(beam.across.layers):  # what acts on the elements
+        for k, layer in enumerate(beam.across.layers):
             E0[1] -= np.where(which == k, unmatched(beam, self, layer, X, e), 0.0)
         E = on_grid(strain_at, beam, u, X, e) if self.grows else 0.0 * factor * E0
         laws = [partial(stress_of, layer.law) for layer in beam.layers]
         return beam.across.of_layers(X, E, lambda k: laws[k](E) - laws[k](E - factor * E0), e)
 
     def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
-        """What a cable's nominal stress, force per stress-free area, is less by, (3, n, m)."""
+        """Reduction of a cable's nominal stress, force per reference area, (3, n, m)."""
         E0 = factor * self.strain_at(X, e) * np.array([1.0, 0.0, 0.0])[:, None, None]
         layers = self.beam.across.layers
         return self.beam.across.of_layers(
@@ -202,14 +201,14 @@ class EigenStrain(Load):
 
 
 class Temperature(EigenStrain):
-    """The stress-free strain of a temperature: that of each material's ``thermal_expansion``.
+    """Thermal strain: a temperature change times the ``thermal_expansion`` of each material.
 
     Parameters
     ----------
     change
-        In degrees from the reference configuration: a number, or a function of material coordinates
-        x, the parameter of the axis, and y, the distance from it, arrays of one shape; or of (x, y,
-        t), which statics take at t = 1.
+        Degrees from the reference configuration: a number, or a function of material coordinates
+        (x, y), the parameter of the axis and the distance from it, as arrays of one shape; or of
+        (x, y, t), with t = 1 in statics.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     """
@@ -247,25 +246,25 @@ def _number_or_function(name, value, optional=True):
 
 
 def _asked(name, f, x, y):
-    """A number or a function of material coordinates, at arrays of one shape."""
+    """Evaluate a number or a function of material coordinates, arrays of one shape."""
     if not callable(f):
         return np.full(np.shape(x), 0.0 if f is None else f)
     return ask_array(f"{name}(x, y)", np.shape(x), f, x, y, number=True)
 
 
 def require_alone(loads: Sequence[Any]) -> None:
-    """Raise InputError where two stress-free strains of one beam do not add up."""
+    """Raise InputError where several eigenstrains act on one beam with a nonlinear law."""
     strains = [load for load in loads if isinstance(load, EigenStrain)]
     for load in strains:
         if load.grows and sum(other.beam is load.beam for other in strains) > 1:
             raise InputError(
-                f"{load.beam!r} has a stress that is not linear in the strain, so its stress-free "
-                "strains do not add up: give their sum as one eigenstrain, a function of (x, y) "
-                "or one product of it and a function of t")
+                f"the material of {load.beam!r} is nonlinear, so eigenstrains cannot be "
+                "superposed: give their sum as one eigenstrain, a function of (x, y), or such a "
+                "function times a function of t")
 
 
 def _resultants(beam, eigen):
-    """Weighted normal forces and moments of a cable that a strain would take, (ne, 2 points)."""
+    """Weighted normal forces and moments of a cable's eigenstrain, (ne, 2 points)."""
     xi = beam.kernel.points
     out = np.zeros((2, beam.mesh.nelements, len(xi)))
     across = beam.across
@@ -286,10 +285,9 @@ def _resultants(beam, eigen):
 
 def products(name: str, function: Callable[..., Any], beam: Beam
              ) -> list[tuple[Callable[..., Any], Coefficient]]:
-    """A function (x, y, t) as a sum of functions of (x, y) times functions of t.
+    """A function (x, y, t) as a sum of products of functions of (x, y) and of t.
 
-    Found by empirical interpolation: the function at some times, and its values at as many places
-    as the factors; exact for what is such a sum.
+    By empirical interpolation at some times and as many places; exact where such a sum exists.
 
     References
     ----------
@@ -319,7 +317,7 @@ def products(name: str, function: Callable[..., Any], beam: Beam
 
 
 class _AtTime:
-    """A function (x, y, t) at one time."""
+    """A function (x, y, t) at fixed t."""
 
     def __init__(self, function, t):
         self.function, self.t = function, t
@@ -329,7 +327,7 @@ class _AtTime:
 
 
 class Coefficient:
-    """The factor of one product as a function of time: its values at some places, weighted."""
+    """The time factor of one product: weighted values of the function at some places."""
 
     def __init__(self, name: str, function: Callable[..., Any], x: Array, y: Array,
                  weights: Array, amplitude: TimeFunction = None) -> None:

@@ -1,4 +1,4 @@
-"""A user-defined energy density of position, deformation gradient, material point and time."""
+"""User-defined energy densities of position, deformation gradient, material point and time."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .derivatives import IMAGINARY, REAL, by_jax, by_loops
 from .item import Item, beside
 
 _LOWER = np.tril_indices(6)
-#: Part of the energies that is round-off of their sums.
+#: Relative round-off of energies.
 _ROUND_OFF = 1e-15
-#: By how much a density may change where the body is turned, relative to its largest value.
+#: Tolerance of invariance under rigid motions, relative to the largest density.
 _INVARIANT = 1e-9
 
 
 class _Where(NamedTuple):
-    """Where points are: BODY, AXIS, a face or -1, the elements (n,), and the rule."""
+    """Location of points: BODY, AXIS, a face or -1, the elements (n,), and the rule."""
 
     where: int
     elements: Array
@@ -38,59 +38,58 @@ class _Where(NamedTuple):
 
 
 class Energy(Density):
-    """An energy whose density is a function of yours, with derivatives that may be found.
+    """A user-defined energy density, with derivatives by complex steps, JAX or given functions.
 
-    ``psi(r, F, X, t)`` is the energy per volume of the reference configuration, per area of a side
-    or an end, or per length of the axis. It is asked at many points at once:
+    ``psi(r, F, X, t)`` is the energy per reference volume, per area of a side or an end, or per
+    length of the axis. It is evaluated at many points at once:
 
     * ``r``: the position, shape (2, nelements, npoints),
     * ``F``: the deformation gradient, ``F[i, j] = d r_i / d X_j``, (2, 2, nelements, npoints),
-    * ``X``: the material point, (2, nelements, npoints), its place in the reference configuration,
+    * ``X``: the position in the reference configuration, (2, nelements, npoints),
     * ``t``: the time of a motion; 0 in statics.
 
-    It is scaled with the loads, as gravity is: ``scene.buckling()`` finds the factor on it; with
-    ``scaled=False`` it is there before any load, as a bedding is. The energy-momentum scheme keeps
-    the total energy. It acts on elements with sections.
+    Load factors scale it, as they scale gravity, and ``scene.buckling()`` finds the critical
+    factor; with ``scaled=False`` it acts in full, as an elastic foundation does. The
+    energy-momentum scheme conserves the total energy. It acts on elements with sections.
 
-    A psi that Numba compiles, by ``@njit``, is asked at one point after the other, with arrays of
-    shapes (2,), (2, 2), (2,) and the time, and returns a number.
+    A psi compiled by ``numba.njit`` is called for one point at a time, with arrays of shapes (2,),
+    (2, 2), (2,) and the time, and returns a number.
 
     Parameters
     ----------
     psi
-        The density: returns numbers of shape (nelements, npoints), whatever these are.
+        The density; returns numbers of shape (nelements, npoints).
     gradient
-        Returns d psi / d r, (2, ...), and d psi / d F, (2, 2, ...), of the same arguments. Without
-        it by complex steps: psi then has to take complex r and F.
+        Returns d psi / d r, (2, ...), and d psi / d F, (2, 2, ...), of the same arguments. By
+        default by complex steps, for which psi must accept complex r and F.
     hessian
-        Returns the second derivatives, (6, 6, ...), by r_0, r_1, F_00, F_01, F_10, F_11. Without it
-        by complex steps of the gradient, without that by differences of complex steps.
+        Returns the second derivatives, (6, 6, ...), by r_0, r_1, F_00, F_01, F_10, F_11. By default
+        by complex steps of the gradient, or by differences of complex steps of psi.
     over
         "cells" for the body, "axis", or a place: "top", "bottom", "left", "right", see
         :func:`skfem_ancf.mesh.places.facets_of`.
     beam
-        The beam, its name or its number; None for all, of a place where the scene has only one.
+        Beam, name or number; None for all, or for a place in a scene with one beam.
     amplitude
-        A function of time by which the energy is multiplied in a motion.
+        Factor as a function of time.
     scaled
-        False for an energy that load factors do not scale. Its time is, as that of springs, in
-        statics the load factor.
+        False for an energy that load factors do not scale. In statics its time is then the load
+        factor, as for springs.
     autodiff
-        psi is written in ``jax.numpy``, for one point, and JAX finds its derivatives. Needs the
-        extra "autodiff".
+        psi is written in ``jax.numpy`` for one point, and JAX differentiates it. Needs the extra
+        "autodiff".
     check
-        Raise InputError if psi changes where the body is moved and turned as a whole: an energy of
-        the material alone does not.
+        Raise InputError if psi changes under rigid motions; a strain energy does not.
 
     Raises
     ------
     InputError
-        When it is added, if psi or a derivative has another shape, is not finite, or if the
+        When it is added, if psi or a derivative has the wrong shape or is not finite, or if the
         derivatives are not those of psi.
 
     Examples
     --------
-    A beam in a soft medium that holds each of its points:
+    A beam in a soft elastic medium:
 
     >>> import numpy as np
     >>> from skfem_ancf import Beam, ElementBeamANCF, Energy, MeshBeam, Scene, StVenantKirchhoff
@@ -123,8 +122,8 @@ class Energy(Density):
                                      else f"psi is compiled by Numba: the {name} has to be, too")
         self.scaled, self.check = require_flag("scaled", scaled), require_flag("check", check)
         if amplitude is not None and not scaled:
-            raise InputError("an amplitude scales a load, and scaled=False says that this is none: "
-                             "let psi depend on its time t")
+            raise InputError("an amplitude is for loads, and scaled=False excludes it: let psi "
+                             "depend on its time t")
         self.psi, self.gradient, self.hessian, self.over = psi, gradient, hessian, over
         self.autodiff = require_flag("autodiff", autodiff)
 
@@ -163,7 +162,7 @@ class Energy(Density):
                    y[2:].reshape(2, 2, *y.shape[1:]), X, self._time)
 
     def _density(self, y, part):
-        """psi at the variables (6, ..., n, np), all at once."""
+        """psi at the variables (6, ..., n, np)."""
         flat = y.reshape(6, -1, y.shape[-1])
         found = self._ask("psi", flat, part, flat.shape[1] // part.X.shape[1])
         return _shaped("psi", found, flat.shape[1:]).reshape(y.shape[1:])
@@ -203,7 +202,7 @@ class Energy(Density):
         return self._gain(np.zeros(self.beam.N), u)[0]
 
     def _gain(self, u0, u1):
-        """The energy at u1 less that at u0, and what of it is round-off."""
+        """Change of the energy from u0 to u1, and its round-off."""
         gain = noise = 0.0
         for part in self._parts:
             a, b = (self._density(self._variables(u, part), part) for u in (u0, u1))
@@ -221,7 +220,7 @@ class Energy(Density):
         return force - rest / float(d @ along) * along
 
     def spread(self, u: Array) -> Spread | None:
-        """How its force is distributed; None if psi depends on F, or in sections of layers."""
+        """Distribution of its force; None if psi depends on F, or for layered sections."""
         sampled = []
         for part in self._parts:
             P, (where, elements, rule) = self._slope(self._variables(u, part), part), part.of
@@ -246,7 +245,7 @@ class Energy(Density):
         return f"<Energy {name} over {self.over!r}>"
 
     def _require_derivatives(self, u, d):
-        """Raise InputError unless all functions fit together near a displacement u."""
+        """Raise InputError unless the functions are consistent near a displacement u."""
         for part in self._parts:
             y, dy = self._variables(u, part), self._variables(d, part)
             dy -= self._variables(0.0 * d, part)
@@ -268,7 +267,7 @@ class Energy(Density):
                               1e-13 * np.max(np.abs(slopes[1])))
 
     def _require_invariance(self):
-        """Raise InputError where psi changes while the body is moved and turned as a whole."""
+        """Raise InputError where psi changes under rigid motions."""
         shift, Q = self.beam.size * np.array([0.7, -0.4]), np.array([[0.6, -0.8], [0.8, 0.6]])
         for part in self._parts:
             y = self._variables(1e-2 * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)
@@ -280,24 +279,24 @@ class Energy(Density):
             for what, other in zip(("moved", "turned"), others):
                 if np.max(np.abs(other - psi)) > _INVARIANT * np.max(np.abs(psi)):
                     raise InputError(
-                        f"psi of {self!r} changes where the body is {what} as a whole: it is no "
-                        "energy of the material alone, which depends on F^T F. Leave out check=True"
-                        " if something outside acts, as a bedding or a field")
+                        f"psi of {self!r} changes where the body is {what} as a whole: it is not "
+                        "a strain energy, which depends on F^T F. Leave out check=True for "
+                        "external actions, as a foundation or a field")
 
 
 def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) -> None:
     """Raise InputError unless gradient and hessian of an energy are derivatives of its psi.
 
-    A scene asks for this near the reference configuration, where it is given the energy.
+    A scene does this near the reference configuration when the energy is added.
 
     Parameters
     ----------
     energy
         An :class:`Energy`.
     beam
-        A :class:`~skfem_ancf.Beam` with sections, at whose points it is asked.
+        A :class:`~skfem_ancf.Beam` with sections, at whose points it is evaluated.
     u
-        Displacement of the degrees of freedom, shape (N,), near which it is asked, too.
+        Another displacement of the degrees of freedom to check at, shape (N,).
 
     Examples
     --------
@@ -329,7 +328,7 @@ def _shaped(name, found, shape):
 
 
 def _parts_of(beam, over):
-    """The points of the cells, the axis or a place of a beam."""
+    """Points of the cells, the axis or a place of a beam."""
     mapping, along, out = beam.mesh.mapping(), points_along(beam) + 1, []
     every = np.arange(beam.mesh.nelements)
     if over == "cells":
@@ -354,7 +353,7 @@ def _parts_of(beam, over):
 
 
 def _points(beam, elements, X, weights, of):
-    """Points at reference places X (2, np) of elements (n,)."""
+    """Points at reference coordinates X (2, np) of elements (n,)."""
     mapping = beam.mesh.mapping()
     return points_of(element_dofs(beam, elements), np.asarray(mapping.F(X, elements)), weights,
                      *beam.element.functions(mapping, X, elements), of)

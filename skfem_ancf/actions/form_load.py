@@ -1,4 +1,4 @@
-"""A scikit-fem LinearForm as a load, dead or not."""
+"""A scikit-fem LinearForm as a load."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _form_of(module, name):
 
 
 def _reduced(form):
-    """For pickle: by its name what a decorator made, since its function has the same name."""
+    """Pickle a decorated form by its name, which the function shares."""
     module, name = form.form.__module__, form.form.__qualname__
     named = getattr(sys.modules.get(module), name, None) is form
     return (_form_of, (module, name)) if named else object.__reduce_ex__(form, 4)
@@ -47,7 +47,7 @@ copyreg.pickle(BilinearForm, _reduced)
 
 
 class _Parameters(FormExtraParams):
-    """What a form knows as w; it notes what is asked for."""
+    """The parameters w of a form, which record what is used."""
 
     def __getitem__(self, name):
         vars(self).setdefault("asked", set()).add(name)
@@ -57,30 +57,30 @@ class _Parameters(FormExtraParams):
 class FormLoad(Density):
     """A scikit-fem ``LinearForm`` as a load, on the body or on a place of its boundary.
 
-    It is dead if it depends on the place alone. If it uses the position ``w.r``, a field with
+    It is a dead load if it depends on the place only. If it uses the position ``w.r``, a field with
     ``grad``, the deformation gradient ``w.F``, (2, 2, ...), or the time ``w.t``, 0 in statics, it
-    follows the deformation; then it has no potential for the package, and acts on elements with
-    sections. On a :class:`~skfem_ancf.Domain` it is dead. What is known by its energy is better an
+    depends on the deformation; then it has no potential and acts on elements with sections. On a
+    :class:`~skfem_ancf.Domain` it is dead. For conservative loads prefer an
     :class:`~skfem_ancf.Energy`.
 
     Parameters
     ----------
     form
-        A ``LinearForm`` of scikit-fem, which knows ``w.x``, ``w.h``, on a boundary ``w.n``, and
-        ``w.r``, ``w.F``, ``w.t``.
+        A ``LinearForm`` with the parameters ``w.x``, ``w.h``, on a boundary ``w.n``, and ``w.r``,
+        ``w.F``, ``w.t``.
     boundary
         A place, see :func:`skfem_ancf.mesh.places.facets_of`; None for the body.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     tangent
-        The ``BilinearForm`` of the derivative of the form: of u, the change of r, v and w. Without
-        it by differences.
+        The ``BilinearForm`` of the derivative of the form: of u, the change of r, v and w; by
+        default differences.
     scaled
-        False for what load factors do not scale.
+        False for an action that load factors do not scale.
 
     Examples
     --------
-    A wind that is the stronger the higher, with its derivative:
+    Wind that increases with height, with its derivative:
 
     >>> import numpy as np
     >>> from skfem import BilinearForm, LinearForm
@@ -143,7 +143,7 @@ class FormLoad(Density):
 
     @property
     def _tests(self):
-        """Test functions whose value or gradient has one entry of 1, the others of 0."""
+        """Test functions of which one entry of value or gradient is 1, the others 0."""
         for k in range(6):
             y = np.zeros((6, *self._basis.dx.shape))
             y[k] = 1.0
@@ -154,7 +154,7 @@ class FormLoad(Density):
                             "F": y[2:].reshape(2, 2, *y.shape[1:]), "t": self._time})
 
     def _values(self, form, *args):
-        """What a form of the caller's returns at the points."""
+        """Values of a user-defined form at the points."""
         what = f"the form of a load, form({'u, ' * (len(args) == 3)}v, w),"
         hint = "it must return a real number at each point, as v[1]"
         with explained("{} fails", hint, CallbackError, what), warnings_as_errors(_COMPLEX):
@@ -197,7 +197,7 @@ class FormLoad(Density):
         return self._spread(-self._slope(self._variables(u, part), part))
 
     def _spread(self, P):
-        """How a force is spread over the body; None if it acts on derivatives."""
+        """Distribution of a force over the body; None if it acts on derivatives."""
         basis, f = self._basis, P[:2]
         if np.any(P[2:]):
             return None
@@ -218,5 +218,5 @@ class FormLoad(Density):
 
 
 def _field(y):
-    """A field with its gradient, of six numbers at each point."""
+    """A field with its gradient from six numbers at each point."""
     return DiscreteField(value=y[:2], grad=y[2:].reshape(2, 2, *y.shape[1:]))

@@ -1,4 +1,4 @@
-"""The protocol of all that acts in a scene."""
+"""Protocol of all items of a scene."""
 
 from __future__ import annotations
 
@@ -20,44 +20,44 @@ if TYPE_CHECKING:
 
 
 class Item(Immutable):
-    """What acts in a scene: base class of loads, supports, joints, force elements, and of yours.
+    """Base class of loads, supports, joints, force elements and user-defined items.
 
-    An item is described without a mesh. :meth:`skfem_ancf.Scene.add` keeps a copy of it and binds
-    another to the degrees of freedom (DOFs) of the scene, and again on another mesh, as for
-    ``solve_static(adapt=...)``. A custom class defines what it has of
+    An item is described without a mesh. :meth:`skfem_ancf.Scene.add` stores a copy and binds
+    another to the degrees of freedom (DOFs) of the scene, again for every other mesh, as in
+    ``solve_static(adapt=...)``. A user-defined class defines some of
 
-    * ``energy(u, t)``: its potential energy, a number,
-    * ``force(u, v, t)``: the force that it exerts on the DOFs, shape (N,); by default minus the
-      gradient of the energy,
-    * ``stiffness(u, v, t)`` and ``damping(u, v, t)``: the derivatives of the force by u and by v,
-      as arrays or sparse matrices (N, N); by default differences of the force,
-    * ``constraint(u, t)``: what Lagrange multipliers hold at zero, shape (m,),
-    * ``jacobian(u, t)``: the derivative of that by u, shape (m, N); by default by differences,
-    * ``mass()``: what it adds to the mass matrix, (N, N), between DOFs of one node.
+    * ``energy(u, t)``: potential energy, a number,
+    * ``force(u, v, t)``: force on the DOFs, shape (N,); by default minus the gradient of the
+      energy,
+    * ``stiffness(u, v, t)`` and ``damping(u, v, t)``: derivatives of the force by u and by v,
+      arrays or sparse matrices (N, N); by default differences of the force,
+    * ``constraint(u, t)``: equations that Lagrange multipliers keep at zero, shape (m,),
+    * ``jacobian(u, t)``: its derivative by u, shape (m, N); by default by differences,
+    * ``mass()``: contribution to the mass matrix, (N, N), between DOFs of one node.
 
-    Here u and v are the displacement and the velocity of all DOFs of the scene, shape (N,), and t
-    is the time, in statics the load factor. Derivatives by differences take complex steps, to
-    round-off, where the functions take complex arrays.
+    Here u and v are displacement and velocity of all DOFs of the scene, shape (N,), and t is the
+    time, in statics the load factor. Differences take complex steps, exact to round-off, where the
+    functions accept complex arrays.
 
-    :class:`~skfem_ancf.actions.loads.Load`, :class:`~skfem_ancf.actions.joints.Joint` and
-    :class:`~skfem_ancf.actions.forces.ForceElement` are other kinds of items: for what is
-    scaled with the loads, for sparse constraints, and for forces on few points.
+    Derive from :class:`~skfem_ancf.actions.loads.Load` for loads,
+    :class:`~skfem_ancf.actions.joints.Joint` for sparse constraints and
+    :class:`~skfem_ancf.actions.forces.ForceElement` for forces on few points.
 
     Attributes
     ----------
     symmetric : bool
-        The stiffness is symmetric: the force has a potential. Where it is not, say so in the class.
+        The stiffness is symmetric: the force has a potential. Set it to False otherwise.
     moving : bool
-        The constraint depends on time; False saves asking for that.
+        The constraint depends on time; False saves its evaluation.
     dofs
         Numbers of the DOFs that energy and force depend on and act on, which :meth:`bind` may set;
-        all by default, which makes matrices dense: for small scenes.
+        all by default, with dense matrices: for small scenes.
     name : str or None
-        What messages call it.
+        Name in messages.
 
     Examples
     --------
-    A spring of fourth order, known by its energy:
+    A quartic spring, defined by its energy:
 
     >>> import numpy as np
     >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
@@ -88,23 +88,23 @@ class Item(Immutable):
 
     def __new__(cls, *args: Any, **options: Any) -> Self:
         made = super().__new__(cls)
-        #: by which copies are known again: bound ones, on another mesh, in another process
+        #: identifies copies: bound ones, on another mesh, in another process
         vars(made)["_key"] = uuid4().hex
         return made
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        """What it consists of in a scene: itself by default, or one item for each of some beams."""
+        """The items it consists of: itself, or one for each of several beams."""
         return (self,)
 
     def bind(self, layout: Any) -> Any:
-        """The item on the DOFs of a scene, given its :class:`~skfem_ancf.beam.layout.Layout`.
+        """A copy bound to the DOFs of a scene, of a :class:`~skfem_ancf.beam.layout.Layout`.
 
-        By default a copy. Leave ``self`` as it is, which is bound to other meshes later.
+        Do not change ``self``, which is bound to other meshes later.
         """
         return self._thawed()
 
     def same(self, other: Any) -> bool:
-        """True if both were made at once: one is a copy of the other, bound or not."""
+        """True if both are copies of one item, bound or not."""
         return self._key == getattr(other, "_key", None)
 
     def __repr__(self) -> str:
@@ -112,7 +112,7 @@ class Item(Immutable):
         return f"<{' '.join(part for part in parts if part)}>"
 
     def _with(self, **changes):
-        """A copy with other attributes."""
+        """A copy with changed attributes."""
         other = self._thawed()
         for name, value in changes.items():
             setattr(other, name, value)
@@ -132,7 +132,7 @@ def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int)
 
 
 def takes_time(function: Any) -> bool:
-    """True if a function takes three arguments, x, y and t."""
+    """True for a function of three arguments, x, y and t."""
     if not callable(function):
         return False
     try:
@@ -144,9 +144,9 @@ def takes_time(function: Any) -> bool:
 
 
 def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
-    """Call a check of derivatives at displacements at which nothing is zero by chance.
+    """Call a check of derivatives at two generic displacements.
 
-    At one of two it may fail: there may be a kink.
+    It may fail at one of them, where there may be a kink.
     """
     angles = np.arange(len(sizes))
     try:

@@ -1,8 +1,4 @@
-"""Loads: their force on the coordinates of a beam, its derivative, and its potential.
-
-A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to its beams: once, and
-again for the same scene on other meshes.
-"""
+"""Loads: force on the degrees of freedom of a beam, its derivative, and its potential."""
 
 from __future__ import annotations
 
@@ -33,13 +29,13 @@ from .item import Item, beside, require_entries
 from .places import members_at, nearest_of
 
 
-#: A traction on a cable is warned of where the moment by its lever across is more than this part
-#: of that by the length, and than the other part of force times height, which is round-off.
+#: Warn of a traction on a cable if its neglected moment exceeds these parts of force times length,
+#: and of force times height (round-off).
 LEVER, ROUND_OFF = 0.01, 1e-12
 
 
 class Amplitude:
-    """A function of time, asked with care: what it raises or returns is said."""
+    """A user-defined function of time with checks of its values."""
 
     def __init__(self, function: Callable[[float], float]) -> None:
         self.function = require_function("amplitude", function, "of time that returns a number")
@@ -49,47 +45,45 @@ class Amplitude:
 
 
 class Load(Item):
-    """Base class: a force on the coordinates of one beam as a function of their displacement.
+    """Base class: a force on the degrees of freedom of one beam as a function of displacement.
 
-    A custom load, for :meth:`skfem_ancf.Scene.add`, is a subclass. It defines
+    A user-defined load, for :meth:`skfem_ancf.Scene.add`, is a subclass. It defines
 
-    * :meth:`force`, and :meth:`stiffness` and ``constant = False`` if that depends on
+    * :meth:`force`, and :meth:`stiffness` and ``constant = False`` if the force depends on
       displacements,
     * :meth:`potential`, or ``symmetric = False`` if its stiffness is not symmetric,
-    * :meth:`bind`, if it computes something of the beam, as it needs to act on another mesh.
+    * :meth:`bind`, if it computes data of the beam; needed to act on another mesh.
 
     Parameters
     ----------
     beam
-        The beam it acts on, its name or its number; None where the scene has only one.
+        Beam, name or number; None where the scene has only one.
     amplitude
-        A function of time by which the force is multiplied in a motion, or None.
+        Factor as a function of time, or None.
 
     Attributes
     ----------
     beam
-        The beam it acts on: a :class:`~skfem_ancf.Beam` once the load is bound.
+        A :class:`~skfem_ancf.Beam` once the load is bound.
     constant : bool
         The force does not depend on the displacement.
     symmetric : bool
         The derivative of the force is symmetric: the load has a potential.
     linear : bool
-        The force is linear in the displacement, but for a constant: it is assembled once.
+        The force is affine in the displacement: it is assembled once.
     scaled : bool
-        Load factors scale it. False for what is there before any load.
-    for_bodies : bool
-        It may act on a :class:`~skfem_ancf.RigidBody` too.
-    for_domains : bool
-        It may act on a :class:`~skfem_ancf.Domain` too.
+        Load factors scale it; False for permanent actions.
+    for_bodies, for_domains : bool
+        It may act on a :class:`~skfem_ancf.RigidBody`, or a :class:`~skfem_ancf.Domain`.
 
     Other Parameters
     ----------------
     u, u0, u1
-        Displacements of the beam's degrees of freedom, shape (N,), and at both ends of a step.
+        Displacements of the beam's degrees of freedom, shape (N,), also at both ends of a step.
 
     Examples
     --------
-    Springs below a beam, so many newton a metre at each node:
+    Springs at the nodes of a beam, with stiffness k each:
 
     >>> import numpy as np
     >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
@@ -126,16 +120,16 @@ class Load(Item):
     scaled = True
     #: The factor in statics: 1 but for some loads of the package.
     at_rest = 1.0
-    #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.
+    #: Its derivative belongs to a stress that it causes, which the initial tangent lacks.
     prestress = False
-    #: Of a stress-free strain: for each pack of the beam what is given for it, an array
-    #: (components, points, elements), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
+    #: Of an eigenstrain: for each element table of the beam an array (components, points,
+    #: elements), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
     pushes: Sequence[Array] = ()
     for_bodies = for_domains = False
 
     @property
     def first_order(self) -> bool:
-        """Its stiffness counts in linear theory: of a load of the user's, as a spring's does."""
+        """True if linear theory includes its stiffness: user-defined loads, as springs."""
         return not ours(self)
 
     def __init__(self, beam: WhichMember = None, amplitude: TimeFunction = None) -> None:
@@ -147,10 +141,10 @@ class Load(Item):
         return (self._with(beam=layout.number(self.beam)),)
 
     def bind(self, beam: Any) -> Any:
-        """The load on a beam, or a rigid body if :attr:`for_bodies`: by default a copy.
+        """A copy bound to a beam, or to a rigid body if :attr:`for_bodies`.
 
-        Override it where something is computed from the beam, and leave ``self`` as it is, which is
-        bound to other beams later.
+        Override it to compute data of the beam. Do not change ``self``, which is bound to other
+        beams later.
         """
         return self._with(beam=beam)
 
@@ -159,19 +153,19 @@ class Load(Item):
         return self.at_rest if t is None else 1.0 if self.amplitude is None else self.amplitude(t)
 
     def acting(self, t: float | None) -> tuple[float, Load]:
-        """A factor, and the load that it is on, at time ``t``; None in statics."""
+        """Factor and load at time ``t``; None in statics."""
         return self.factor(t), self
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        """A mean (N,) of the force from u0 to u1, (N,) each, whose work is exact if it can be."""
+        """Mean force (N,) from u0 to u1, (N,) each, with exact work if there is a potential."""
         return self.force(0.5 * (u0 + u1))
 
     def force(self, u: Array) -> Array:
-        """Force at the displacement ``u`` of the beam's coordinates, shape (beam.N,)."""
+        """Force on the beam's degrees of freedom at the displacement ``u``, shape (beam.N,)."""
         raise NotImplementedError
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        """Derivative of the force: rows, columns and values.
+        """Rows, columns and values of the derivative of the force.
 
         Rows and columns are degrees of freedom of one node or of neighbouring nodes.
         """
@@ -182,10 +176,10 @@ class Load(Item):
         return None
 
     def spread(self, u: Array) -> Spread | None:
-        """How the force at the displacement ``u`` is distributed over the body, or None.
+        """Distribution of the force over the body at the displacement ``u``, for recovered fields.
 
-        Recovered fields need to know. By default it is taken to act on the nodes, or the point
-        inside of an element, whose degrees of freedom it acts on; not known if they are neighbours.
+        By default it acts on the nodes, or on the point inside an element, whose degrees of freedom
+        it acts on; None (unknown) if these are neighbours.
         """
         stations = stations_of_vector(self.beam, self.force(u))
         return None if stations is None else Spread(stations=stations)
@@ -195,7 +189,7 @@ class Load(Item):
 
 
 def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
-    """A load on a beam, tried there: what it returns fits the beam."""
+    """A load bound to a beam; its results are checked."""
     if isinstance(beam, RigidBody) and not load.for_bodies:
         raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
                          "takes scene.gravity, point_force, follower_force, moment, springs and "
@@ -219,10 +213,10 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
-        raise InputError(f"{load!r} is no load of this beam: {error}. Meshes change, under adapt= "
-                         "and by refinement: what has the size of one is made in bind(beam) or "
-                         "force(u), of places along self.beam") from None
-    except Exception as error:  # it is the user's: it may raise anything
+        raise InputError(f"{load!r} does not fit this beam: {error}. Meshes change, by adapt= and "
+                         "by refinement: compute arrays of the size of a mesh in bind(beam) or "
+                         "force(u)") from None
+    except Exception as error:  # user-defined loads may raise anything
         raise InputError(f"{load!r} fails in the reference configuration: {type(error).__name__}: "
                          f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
                          "unless it is constant") from error
@@ -240,19 +234,19 @@ def _require_constant(load):
 
     def check(u, _):
         if np.any(np.abs(load.force(u) - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
-            raise InputError("force(u) depends on the displacement: say so in its class, constant "
-                             "= False, and define stiffness(u)")
+            raise InputError("force(u) depends on the displacement: set constant = False in its "
+                             "class and define stiffness(u)")
 
     beside(check, load.beam.sizes)
 
 
 def _require_derivatives(load, u, d):
-    """Raise InputError unless stiffness and potential of a load of the user's fit its force."""
+    """Raise InputError unless stiffness and potential of a user-defined load fit its force."""
     try:
         force, *forces = (load.force(u + s * d) for s in (0.0, -1.0, 1.0))
         potentials = [load.potential(u + s * d) for s in (0.0, -1.0, 1.0)]
         i, j, v = load.stiffness(u)
-    except Exception:  # it may be one of the reference configuration alone
+    except Exception:  # it may be defined in the reference configuration only
         return
     K, noise = sparse.coo_array((v, (i, j)), shape=(len(u), len(u))), 1e-13 * np.abs(force).max()
     require_slope(f"stiffness(u) of {load!r}", "force(u)", forces[1] - forces[0], 2.0 * (K @ d),
@@ -268,16 +262,16 @@ def _require_derivatives(load, u, d):
 
 
 class Weight(Load):
-    """The weight of beams and rigid bodies.
+    """Weight of beams and rigid bodies.
 
     Parameters
     ----------
     g
         Acceleration, shape (2,), as ``(0, -9.81)``.
     beam
-        The beam or the rigid body, its name or its number; None for all.
+        Beam or rigid body, name or number; None for all.
     amplitude
-        A function of time by which the force is multiplied in a motion.
+        Factor as a function of time.
     """
 
     for_bodies = for_domains = True
@@ -306,15 +300,15 @@ def number_at(layout: Layout, at: Any, beam: Any) -> int:
 
 
 class Traction(Load):
-    """A dead traction on a surface. The surface of a cable is its axis, without the lever across.
+    """A dead traction on a surface. On a cable it acts on the axis, without moment.
 
     Parameters
     ----------
     boundary
         A place, see :func:`skfem_ancf.mesh.places.facets_of`.
     t
-        Force per area of the reference configuration, shape (2,), or a function of the points x (2,
-        ...) that returns (2, ...).
+        Force per reference area, shape (2,), or a function of points x (2, ...) that returns
+        (2, ...).
     beam, amplitude
         As for :class:`Load`.
     """
@@ -341,7 +335,7 @@ class Traction(Load):
 
 
 def _warn_of_lever(beam, surfaces, forces):
-    """Give a ModelWarning if forces on a cable, (2, nf, np) each, would turn it by their lever."""
+    """Warn (ModelWarning) if forces on a cable, (2, nf, np) each, have a large neglected moment."""
     mapping, length = beam.mesh.mapping(), np.sum(beam.mesh.lengths)
     lost, kept, size = {}, 0.0, 0.0
     for one, force in zip(surfaces, forces):
@@ -359,19 +353,18 @@ def _warn_of_lever(beam, surfaces, forces):
 
 
 class DeadLoad(Load):
-    """A force that keeps its direction and size.
+    """A constant force on the degrees of freedom.
 
     Parameters
     ----------
     beam
         A :class:`~skfem_ancf.Beam`.
     vector
-        Force on its coordinates, shape (N,).
+        Force on its degrees of freedom, shape (N,).
     amplitude
         As for :class:`Load`.
     spread
-        How it is spread over the body, a :class:`~skfem_ancf.beam.distribution.Spread`; None to
-        find out.
+        Its distribution, a :class:`~skfem_ancf.beam.distribution.Spread`; None to determine it.
     """
 
     for_bodies = for_domains = True
@@ -393,8 +386,8 @@ class DeadLoad(Load):
 
     def bind(self, beam: Beam) -> Load:
         if beam is not self._of:
-            raise InputError("a DeadLoad is a vector of the coordinates of one mesh and cannot be "
-                             "put on another: use scene.load(form) or a Load with bind(beam)")
+            raise InputError("a DeadLoad is a vector of the degrees of freedom of one mesh and "
+                             "does not fit another: use scene.load(form) or a Load with bind(beam)")
         return self._with(beam=beam)
 
     def force(self, u: Array) -> Array:
@@ -405,17 +398,17 @@ class DeadLoad(Load):
 
 
 class Pressure(Load):
-    """A pressure on a surface that stays normal to it as it deforms.
+    """A follower pressure, normal to the deformed surface.
 
-    It is linear in the position. On the bottom and the top of a cable it acts on its axis, as long
-    as that is: on a curve of radius R its resultant is off by h / (2 R) of it.
+    It is linear in the position. On the bottom and the top of a cable it acts on the axis, with the
+    length of the axis: at a radius of curvature R the resultant has a relative error of h / (2 R).
 
     Parameters
     ----------
     boundary
         A place, see :func:`skfem_ancf.mesh.places.facets_of`.
     p
-        Force per area of the deformed surface; positive pushes.
+        Force per deformed area; positive is compressive.
     beam, amplitude
         As for :class:`Load`.
     """
@@ -437,8 +430,8 @@ class Pressure(Load):
         facets = np.asarray(facets_of(beam.mesh, self.boundary))
         if not beam.has_sections and np.any(facets < beam.mesh.p.shape[1]):
             raise InputError(
-                f"a pressure at {self.boundary!r} of a cable would do nothing: its points across "
-                "the section are no coordinates. Use an element with sections, as "
+                f"a pressure at {self.boundary!r} of a cable has no effect: a cable has no degrees "
+                "of freedom across the section. Use an element with sections, as "
                 "ElementBeamANCF(2), or for a force of constant direction scene.traction or "
                 "scene.point_force")
         rows = _follower(beam, facets, self.p)
@@ -456,7 +449,7 @@ class Pressure(Load):
 
 
 def _follower(beam, facets, p):
-    """The force of a pressure over the position, ``-n da`` being its derivative, turned; sparse."""
+    """Sparse matrix from the position to the force of a pressure."""
     mesh, row, column, value = beam.mesh, [], [], []
     for one in surfaces_of(beam, facets, beam.element.facet_points):
         functions, grad = beam.element.functions(mesh.mapping(), one.X, one.elements)
@@ -471,11 +464,11 @@ def _follower(beam, facets, p):
 
 
 class EndMoment(Load):
-    """A moment M on a section: M times the angle of the section is its potential, negated.
+    """A moment M on a section, with the potential -M times the angle of the section.
 
     The section's direction is ``d = 12 / h^3 int Y r dY``, the best fit of a straight line to the
     deformed face, and its angle that of ``d``. The force is a traction linear in Y and normal
-    to ``d``; it turns with the section.
+    to ``d``; it rotates with the section.
 
     Parameters
     ----------
@@ -491,7 +484,7 @@ class EndMoment(Load):
     constant = False
     turning = True
     for_bodies = True
-    #: An object that two opposite moments share: they keep the angular momentum.
+    #: An object shared by two opposite moments, which conserve the angular momentum.
     couple: Any = None
     # of a bound one: the node, and coordinates and weights of the direction of its section
     node: int
@@ -518,10 +511,10 @@ class EndMoment(Load):
         return (self.beam.q0_local[self.dofs] + u[self.dofs]) @ self.c
 
     def angle(self, u: Array) -> float:
-        """The angle by which the section has turned, in radians.
+        """Rotation of the section in radians.
 
-        Whole turns are counted along the beam, from the section at its other end, whose own angle
-        is taken in (-pi, pi].
+        Full turns are counted along the beam from the section at its other end, whose angle is
+        taken in (-pi, pi].
         """
         nd = self.beam.nd
         rows = self.dofs - self.node * nd + nd * np.arange(self.beam.N // nd)[:, None, None]

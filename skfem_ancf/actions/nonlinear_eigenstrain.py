@@ -1,7 +1,7 @@
-"""Stress-free strains of laws whose stress is not linear in the strain.
+"""Eigenstrains of nonlinear laws.
 
-The energy of such a law is W(E - E0). As a load that is ``W(E - E0) - W(E)``, whose stress at the
-points of integration depends on the strain and, not in proportion, on the size of E0.
+The strain energy is W(E - E0), so the load is ``W(E - E0) - W(E)``. Its stress at the integration
+points depends on the strain, and nonlinearly on E0.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..core.types import Array
 from ..formulations import COMPONENTS
 
 
-#: Half of the points across a layer, and what is no part of a strain relative to the largest.
+#: Half the number of points across a layer, and round-off relative to the largest strain.
 SECTION, ROUND_OFF = 6, 1e-12
 
 
@@ -38,12 +38,12 @@ def energy_lost(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> 
 
 
 def pushed_at(t: Any, E0: Array, stresses: Array) -> Array:
-    """What a kernel takes for a stress-free strain: strains at the points, or linear stresses."""
+    """The kernel's argument for an eigenstrain: strains at the points, or linear stresses."""
     return stresses if t.law.kind == LINEAR else at_points(t, E0)
 
 
 def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
-    """A stress-free strain where a term samples the strain, (ns, nelements)."""
+    """An eigenstrain where a term samples the strain, (ns, nelements)."""
     term, layer, out = integral.term, integral.layer, []
     for row, name in enumerate(COMPONENTS):
         xi, eta = term.nodes(name), term.section_nodes
@@ -54,15 +54,15 @@ def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
 
 
 def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None = None) -> Array:
-    """The part of eps_yy that a section takes freely and that its element cannot have.
+    """The part of eps_yy that a section develops freely and its element cannot represent.
 
-    A section that bends freely under E0 has a plane eps_xx, and S_yy = 0: eps_yy is E0_yy - nu
-    (eps_xx - E0_xx). It jumps between layers, and may be of any degree across, where eps_yy of an
-    element is one polynomial. Less this part, E0 has no S_yy that resists the element.
+    A section that bends freely under E0 has a linear eps_xx and S_yy = 0, thus eps_yy = E0_yy - nu
+    (eps_xx - E0_xx). It jumps between layers and may have any degree, while eps_yy of an element is
+    one polynomial. Without this part E0 causes no spurious S_yy.
     """
     across, degree = beam.across, beam.element.order - 1
     x, y = across.coordinates(X, tind)
-    if degree < 1:  # its lateral strain is coupled to the mean over the section
+    if degree < 1:  # its Poisson coupling is to the mean over the section
         return np.zeros(x.shape)
     fit: Any = np.zeros((*x.shape, degree + 1, degree + 1))
     right, pushed, parts = np.zeros(fit.shape[:-1]), np.zeros((2, *x.shape)), []

@@ -1,4 +1,4 @@
-"""Where items act: material points, sections and points of the ground."""
+"""Material points, sections and points of the ground, as functions of the DOFs."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from ..core.errors import InputError, MeshError, require_finite, shown
 from ..core.types import Array
 from ..mesh.places import as_point, is_place, is_point, node_of, points_of_rows
 
-#: What a joint or a spring calls the ground in the place of a beam.
+#: Name of the ground, in place of a beam.
 GROUND = "ground"
 
 
 class Vector:
-    """A plane vector that depends affinely on the degrees of freedom (DOFs).
+    """A plane vector that is affine in the degrees of freedom (DOFs).
 
-    ``start + sum(u[dofs] * weights, axis=1)``, as the position of a material point, or the
-    direction of a section or a rigid body. ``dofs`` (2, n) are those of both components, None if it
-    is constant; ``weights`` are (2, n), or (n,) for both.
+    It is ``start + sum(u[dofs] * weights, axis=1)``: the position of a material point, or the
+    direction of a section or a rigid body. ``dofs`` (2, n) are those of both components, None for a
+    constant; ``weights`` are (2, n), or (n,) for both.
     """
 
     def __init__(self, start: ArrayLike, dofs: Array | None = None,
@@ -44,13 +44,13 @@ class Vector:
         return self.start + np.sum(u[self.dofs] * self.weights, axis=1)
 
     def row(self, direction: ArrayLike, n: int) -> Array:
-        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,)."""
+        """Derivative of ``direction . vector`` by the DOFs, dense, (n,)."""
         out = np.zeros(n)
         np.add.at(out, self.dofs, np.asarray(direction)[:, None] * self.weights)
         return out
 
     def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
-        """The derivative of ``direction . vector`` by the coordinates."""
+        """Derivative of ``direction . vector``: DOFs and values."""
         return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
 
 
@@ -67,11 +67,10 @@ def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     layout
         Of the scene.
     beam
-        The beam, rigid body or domain, its name or its number; "ground" for a point of the ground.
+        Beam, rigid body or domain, its name or number; "ground" for a fixed point.
     at
-        The point: its place (x, y) in the reference configuration, shape (2,); None for the centre
-        of mass of a rigid body; a place of a beam that is one section, as "left", for its axis
-        there.
+        The point (x, y) in the reference configuration, shape (2,); None for the centre of mass of
+        a rigid body; a place of a beam that is one section, as "left", for its axis there.
     """
     if is_ground(beam):
         return Vector(np.array(as_point(at)))
@@ -95,12 +94,12 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
     layout
         Of the scene.
     beam
-        The beam or rigid body, its name or its number; "ground" for the ground.
+        Beam or rigid body, its name or number; "ground" for the ground.
     place
-        A place that is one section, whose position is that of its axis; or a material point (x, y),
-        at which the section through it may lie inside an element. Of a cable the position is that
-        of the axis, and the direction that of its tangent. Of a rigid body a point, or None for its
-        centre of mass. Of a domain a straight boundary: the mean, and the best straight line.
+        A place that is one section, with the position of the axis; or a material point (x, y),
+        whose section may be inside an element. For a cable the position is on the axis and the
+        direction is the tangent. For a rigid body a point, or None for its centre of mass. For a
+        domain a straight boundary: its mean position and best-fit line.
     """
     if is_ground(beam):
         return point(layout, beam, place), Vector(np.array([1.0, 0.0]))
@@ -145,7 +144,7 @@ def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
 
 
 def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
-    """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
+    """A Vector of DOFs of a beam or body, numbered there, without round-off."""
     found = Vector(start, dofs + layout.offset(member), weights)
     size = np.max(np.abs(found.weights), axis=0) * member.sizes[dofs[0]]
     keep = size > 1e-14 * np.max(size)
@@ -154,7 +153,7 @@ def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) 
 
 
 def members_at(layout: Layout, at: ArrayLike) -> list[int]:
-    """Numbers of the beams that have a material point at a place, and of bodies around it."""
+    """Numbers of the beams and bodies that contain a material point."""
     found = []
     if not isinstance(at, str):
         at = as_point(at)
@@ -172,8 +171,7 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
 
 
 def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
-    """Of beams that have a point those whose axes are nearest to it; others if a body has it, too.
-    """
+    """Of beams that contain a point those with the nearest axes; all others if a body does, too."""
     beams: list[Any] = [layout.members[k] for k in found]
     if len(found) < 2 or isinstance(at, str) or not all(isinstance(b, Beam) for b in beams):
         return found
@@ -183,7 +181,7 @@ def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
 
 
 def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
-    """Which beam or body a place is of, and the place there."""
+    """The beam or body of a place, and the place on it."""
     if isinstance(place, RigidBody):
         return place, None
     if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
@@ -211,7 +209,7 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
 
 
 def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
-    """A place for each of several beams: given once for all of them, or once for each."""
+    """A value for each of n beams: given once for all, or once for each."""
     if value is None:
         raise InputError(f"a joint needs {what}")
     value = points_of_rows(value)
@@ -224,7 +222,7 @@ def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
 
 
 def both_of(name: str, place: Any) -> tuple[Any, Any]:
-    """A beam or body and a place of it; a RigidBody alone is all of it."""
+    """A beam or body and a place on it; a RigidBody alone has the place None."""
     if isinstance(place, RigidBody):
         return place, None
     if not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place):
@@ -234,12 +232,12 @@ def both_of(name: str, place: Any) -> tuple[Any, Any]:
 
 
 def several(beams: Any) -> tuple[Any, ...]:
-    """The beams and bodies of a joint, two at least."""
+    """Check the beams and bodies of a joint, two at least."""
     if not isinstance(beams, (tuple, list)) or len(beams) < 2:
         raise InputError("beams must be two beams or rigid bodies or more, by Beam, RigidBody, "
                          f"name or number, or 'ground', got {shown(beams)}")
     if all(map(is_ground, beams)):
-        raise InputError(f"a joint holds a beam or a rigid body, got {shown(beams)}")
+        raise InputError(f"a joint needs a beam or a rigid body, got {shown(beams)}")
     return tuple(beams)
 
 

@@ -28,13 +28,13 @@ class PointForce(Load):
     force
         The force, shape (2,).
     at
-        The point: its place (x, y) in the reference configuration, shape (2,), or "right" for the
-        axis at that end; of a rigid body also None, for its centre of mass. Of a force that moves
-        a function of time, see :class:`~skfem_ancf.actions.moving.MovingForce`.
+        The point (x, y) in the reference configuration, shape (2,), or "right" for the axis at that
+        end; None for the centre of mass of a rigid body. For a function of time see
+        :class:`~skfem_ancf.actions.moving.MovingForce`.
     beam
-        The beam, its name or its number, where several have the point; or a RigidBody.
+        Beam, name or number, where several have the point; or a RigidBody.
     amplitude
-        A function of time by which the force is multiplied in a motion.
+        Factor as a function of time.
     """
 
     for_bodies = for_domains = True
@@ -57,6 +57,6 @@ class PointForce(Load):
             np.add.at(vector, dofs, self.total[:, None] * weights)
             return DeadLoad(beam, vector, self.amplitude)
         e, X = locate(beam, self.at)
-        probe(beam, self.at, (e, X))  # not off the axis of a cable
+        probe(beam, self.at, (e, X))  # a point of a cable must be on the axis
         vector, spread = on_points(beam, [(self.total, e, X)])
         return DeadLoad(beam, vector, self.amplitude, spread)

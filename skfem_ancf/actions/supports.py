@@ -1,4 +1,4 @@
-"""Supports: degrees of freedom that are held at a place."""
+"""Supports: prescribed degrees of freedom."""
 
 from __future__ import annotations
 
@@ -20,22 +20,21 @@ from .joints.plane_section import PlaneSection
 
 
 class Support(Item):
-    """Degrees of freedom of a place that are held at a displacement, by their scikit-fem names.
+    """Degrees of freedom with prescribed displacements, by their scikit-fem names.
 
     Parameters
     ----------
     boundary
-        A place: the name of a boundary; a point (x, y) of the reference configuration, which means
-        the section of a node; a function of the points x that returns truth values; or numbers of
-        facets as an array of integers. See :func:`skfem_ancf.mesh.places.facets_of`. A RigidBody is
-        held as a whole.
+        A place: the name of a boundary, a point (x, y) on the section of a node, a function of
+        points x that returns truth values, or an integer array of facets. See
+        :func:`skfem_ancf.mesh.places.facets_of`. A RigidBody is fixed as a whole.
     names
         As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
     displacement
-        Their displacement at full load, in the unit of the degree of freedom; it grows with the
-        load.
+        Their displacement at full load, in the unit of the degree of freedom, proportional to the
+        load factor.
     beam
-        The beam, its name or its number, in a scene of several.
+        Beam, name or number, in a scene of several.
     """
 
     # of a bound one: numbers of the degrees of freedom in the scene, and their names
@@ -60,11 +59,10 @@ class Support(Item):
         return self._with(dofs=dofs + layout.offset(beam), _words=words)
 
     def hold(self, fixed: dict[int, float]) -> None:
-        """Add what it holds, by number of the DOF; SupportError where two displacements are given.
-        """
+        """Add its prescribed DOFs to ``fixed``; SupportError where two displacements conflict."""
         for d, words in zip(self.dofs.tolist(), self._words):
             if fixed.setdefault(d, self.displacement) != self.displacement:
-                raise SupportError(f"coordinate {words} is fixed twice, with displacements "
+                raise SupportError(f"degree of freedom {words} is fixed twice, with displacements "
                                    f"{fixed[d]!r} and {self.displacement!r}")
 
     def __repr__(self) -> str:
@@ -73,14 +71,14 @@ class Support(Item):
 
 
 class Pin(Support):
-    """The position of the axis is fixed; the section may turn.
+    """A pinned support: fixes the position of the axis, not the rotation of the section.
 
     Parameters
     ----------
     boundary
-        A place, as for :class:`Support`; of a rigid body a point, or None for its centre of mass.
+        A place, as for :class:`Support`; for a rigid body a point, or None for its centre of mass.
     beam
-        The beam, its name or its number, in a scene of several; or a RigidBody.
+        Beam, name or number, in a scene of several; or a RigidBody.
     """
 
     def __init__(self, boundary: Place, beam: Any = None) -> None:
@@ -108,20 +106,19 @@ class Pin(Support):
 
 
 class Clamp(Item):
-    """A face is welded, or held as a plane; a rigid body is held as a whole.
+    """A clamped section; a rigid body is fixed as a whole.
 
     Parameters
     ----------
     boundary
         A place, as for :class:`Support`.
     beam
-        The beam, its name or its number, in a scene of several; or a RigidBody.
+        Beam, name or number, in a scene of several; or a RigidBody.
     thickness
-        "fixed": the position of every material point of the face is fixed, that is ``r`` and the
-        section coordinates at the node; the slope ``r_X``, a strain measure there, stays free.
-        "free": ``r`` is fixed and the section stays in its plane, but may get thinner or thicker
-        there. With nu not zero a welded face causes a boundary layer as long as the beam is high,
-        which long elements exaggerate; the plane does not.
+        "fixed": every material point of the face is fixed: ``r`` and the section slopes of the
+        node. The slope ``r_X`` stays free, as it is a strain measure. "free": ``r`` is fixed and
+        the section stays in its plane, with a free thickness. For nu not zero a fixed face causes a
+        boundary layer of length h, which long elements exaggerate; a free thickness does not.
     """
 
     def __init__(self, boundary: Place, beam: Any = None, thickness: str = "fixed") -> None:

@@ -1,4 +1,4 @@
-"""What pictures show of items: arrows of loads, symbols of supports, joints and springs."""
+"""Symbols of items in pictures: arrows of loads, symbols of supports, joints and springs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .point_force import PointForce
 from .places import Vector, is_ground, named_place, point, section
 from .supports import Support
 
-#: Arrows of a distributed load on one chain of elements or one side, and on one beam, at most.
+#: Largest number of arrows of a distributed load on one chain or side, and on one beam.
 ARROWS, MOST = 9, 200
 
 #: Kinds of symbols that are loads; "support", "joint", "slider", "spring", "foundation",
@@ -51,19 +51,19 @@ class Symbol(NamedTuple):
         "force", "moment", "weight", "support", "joint", "slider", "spring", "torsional spring",
         "foundation" or "mass".
     at
-        Its places, n vectors that follow the degrees of freedom: two ends of a spring, several
-        arrows of a distributed load, one of others.
+        Positions as n vectors: two ends of a spring, several arrows of a distributed load, else
+        one.
     direction
-        At each place: of a force that of the largest size 1, of a support away from the body, of
-        a slider along its line; shape (n, 2).
+        At each position, shape (n, 2): forces relative to the largest, the outward direction of a
+        support, the line of a slider.
     value
-        Largest force, moment or mass, by which the direction is multiplied; 1 of others.
+        Largest force, moment or mass; 1 for others.
     text
-        What stands before the value, or beside the symbol; of a support what is held, as "x y".
+        Text before the value, or beside the symbol; for a support its fixed motions, as "x y".
     turn
-        Vectors with which the directions turn, n or none.
+        Vectors with which the directions rotate, n or none.
     show
-        The value is written.
+        Show the value.
     """
 
     kind: str
@@ -77,16 +77,16 @@ class Symbol(NamedTuple):
 
 def all_symbols(items: Iterable[Any], layout: Layout, load: float = 1.0,
                 t: float | None = None, start: bool = False) -> list[Symbol]:
-    """The symbols of items, loads times their factors.
+    """Symbols of items, with loads multiplied by their factors.
 
     Parameters
     ----------
     items, layout
-        Items as they were given, and the Layout of the scene.
+        Unbound items, and the Layout of the scene.
     load, t
         The load factor, and the time of a motion or None.
     start
-        Loads that move or depend on time are those of the time 0, or if they are zero of 1.
+        Show moving or time-dependent loads at time 0, or at 1 if they vanish there.
     """
     out = []
     for item in items:
@@ -112,7 +112,7 @@ def symbols(item: Any, layout: Layout) -> Iterable[Symbol]:
 
     Examples
     --------
-    A custom item, in pictures a mass:
+    A user-defined item, drawn as a mass:
 
     >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
     >>> from skfem_ancf.actions.places import point
@@ -133,20 +133,20 @@ def symbols(item: Any, layout: Layout) -> Iterable[Symbol]:
 
 def force_symbol(at: Iterable[Vector], force: Any, turn: Iterable[Vector] = (),
                  show: bool = True) -> Symbol:
-    """Arrows of forces (n, 2) at n places, with the largest as the value."""
+    """Arrows of forces (n, 2) at n positions; the value is the largest force."""
     force = np.reshape(force, (-1, 2))
     size = float(np.max(np.hypot(*force.T), initial=0.0))
     return Symbol("force", tuple(at), force / (size or 1.0), size, "", tuple(turn), show)
 
 
 def at_node(layout: Layout, beam: Beam, node: int) -> Vector:
-    """The position of the axis at a node of a beam."""
+    """Position of the axis at a node."""
     first = layout.offset(beam) + node * beam.nd
     return Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1))
 
 
 def _inside(layout: Layout, beam: Any, e: int, xi: float, eta: float = 0.5) -> Vector:
-    """The position of a point of an element; of a cable of its axis."""
+    """Position of a point of an element, on the axis of a cable."""
     X = np.array([xi, eta if beam.has_sections else 0.5])
     dofs, weights = probe_reference(beam, e, X)
     start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
@@ -154,20 +154,19 @@ def _inside(layout: Layout, beam: Any, e: int, xi: float, eta: float = 0.5) -> V
 
 
 def _tangent(beam: Any, e: int, xi: float) -> Array:
-    """The unit tangent of the axis at a place of an element."""
     tangent = beam.mesh.mapping().DF(np.array([[xi], [0.5]]), np.array([e]))[:, 0, 0, 0]
     return np.asarray(tangent / np.hypot(*tangent))
 
 
 def _along(elements: Array, runs: int) -> list[tuple[int, float]]:
-    """Elements and xi of places along one of some runs of elements."""
+    """Elements and xi of arrows along one of several runs of elements."""
     s = np.linspace(0, len(elements), int(np.clip(MOST // runs, 2, ARROWS)))
     k = np.minimum(s.astype(int), len(elements) - 1)
     return list(zip(elements[k].tolist(), (s - k).tolist()))
 
 
 def _faces(layout: Layout, beam: Any, boundary: Any) -> Iterable[tuple[Any, Any, Any]]:
-    """Of sections and runs of faces: places, outward normals (n, 2), directions of sections."""
+    """For sections and runs of faces: positions, outward normals (n, 2), directions of sections."""
     n, ne = beam.mesh.p.shape[1], beam.mesh.nelements
     facets = np.sort(np.asarray(facets_of(beam.mesh, boundary)))
     found = [([(int(e), float(xi))], 0.5) for node in facets[facets < n] for xi in (0, 1)
@@ -190,7 +189,7 @@ def _faces(layout: Layout, beam: Any, boundary: Any) -> Iterable[tuple[Any, Any,
 
 
 def _values(function, at):
-    """A constant (2,) or a function of points at places, as (n, 2)."""
+    """A constant (2,) or a function of points, as (n, 2)."""
     x = np.array([place.start for place in at]).T
     return np.broadcast_to(function(x) if callable(function) else function[:, None], x.shape).T
 
@@ -199,7 +198,7 @@ def _values(function, at):
 
 @symbols.register(Load)
 def _(load, layout):
-    beam = layout.beam(load.beam)  # user-defined, or a form: its forces on the nodes
+    beam = layout.beam(load.beam)  # user-defined loads and forms: nodal forces
     if isinstance(beam, Beam) and not isinstance(load, EigenStrain):
         given = load if isinstance(load, DeadLoad) else load.bind(beam)
         force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]
@@ -240,7 +239,7 @@ def _(load, layout):
     for t in _times(load):
         try:
             places = load.bind(beam).places(t)
-        except AncfError:  # it has left the beam
+        except AncfError:  # beyond the end of the beam
             continue
         yield from (force_symbol([_inside(layout, beam, e, *X)], force) for force, e, X in places)
         if places:
@@ -272,14 +271,14 @@ def _(load, layout):
 # supports and joints
 
 def _outward(beam: Beam, node: int) -> Array:
-    """At an end of a chain along the axis, away from it; else below the axis."""
+    """Direction out of the beam at the end of a chain; below the axis elsewhere."""
     left, right = (bool(np.any(beam.mesh.t[k] == node)) for k in (0, 1))
     tangent = beam.mesh.p_X[:, node]
     return -beam.mesh.p_Y[:, node] if left and right else -tangent if left else tangent
 
 
 def _boundary(layout: Layout, domain: Domain, boundary: Any) -> Vector:
-    """The mean of the degrees of freedom at a boundary of a domain."""
+    """Mean position of a boundary of a domain."""
     dofs = domain.dofs(boundary)
     place = domain.basis.doflocs[:, np.argsort(domain.numbers(np.arange(domain.N)))[dofs]]
     pairs = layout.offset(domain) + dofs.reshape(-1, 2).T

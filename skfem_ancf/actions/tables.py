@@ -1,4 +1,4 @@
-"""Joints and loads of a scene as tables, and what they do.
+"""Tables of the joints and loads of a scene, and the kernels that evaluate them.
 
 Joints are ``Phi = c + g . u + u . H u / 2``; c and g may depend on time.
 """
@@ -19,8 +19,8 @@ class JointTables(NamedTuple):
     """The joints of a scene.
 
     ``hk, hi, hj, hv`` are H by equation, row, column and value, both halves; ``gk, gi`` equation
-    and column of each entry of g; ``sizes`` the residual of each equation in a displacement of the
-    scene's size; ``own`` the handle of what has joints that are not quadratic, 0 for none.
+    and column of each entry of g; ``sizes`` scale the residual of each equation; ``own`` is the
+    handle of joints that are not quadratic, 0 for none.
     """
 
     hk: I1
@@ -34,13 +34,13 @@ class JointTables(NamedTuple):
 
 
 class LoadTables(NamedTuple):
-    """The loads of a scene; each row of factors has those of all kinds, one behind the other.
+    """The loads of a scene; a row of factors is the concatenation of those of all kinds.
 
     ``vectors`` are dead forces (k, N); ``rows, columns, values, which`` forces linear in the
-    displacement and the numbers of their factors; ``pushed, pushes`` beams with stress-free
-    strains, and for each such load the stresses or, of nonlinear laws, strains that are lost to it,
-    (k, n), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`; ``own`` the handle of
-    user-defined loads.
+    displacement and the numbers of their factors; ``pushed, pushes`` beams with eigenstrains, and
+    for each such load its stresses or, for nonlinear laws, its strains, (k, n), see
+    :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`; ``own`` is the handle of user-defined
+    loads.
     """
 
     vectors: F2
@@ -56,13 +56,13 @@ class LoadTables(NamedTuple):
 
 @primitive("skfem_ancf.core.loops")
 def add_each(out, at, x):
-    """out[at] += x, however often a place occurs."""
+    """out[at] += x, with repeated indices."""
     np.add.at(out, at, x)
 
 
 @primitive("skfem_ancf.core.loops")
 def add_products(out, at, v, x, i):
-    """out[at] += v x[i], however often a place occurs."""
+    """out[at] += v x[i], with repeated indices."""
     np.add.at(out, at, v * x[i])
 
 
@@ -86,7 +86,7 @@ def add_weighted_entries(J, k, i, v, x, j):
 
 @primitive("skfem_ancf.core.loops")
 def subtract_from_band(A, i, j, v, x, k):
-    """A[i, j] -= v x[k], of a band matrix; of the lower half alone where that is all there is."""
+    """A[i, j] -= v x[k] in a band matrix, or in its lower half if only that is stored."""
     there = np.nonzero((i >= j) | (A.top > 0))[0]
     np.add.at(A.flat, (j * A.ld + A.top + i - j)[there], (-v * x[k])[there])
 
@@ -130,7 +130,7 @@ def add_joint_force(joints, g, t, u, multipliers, out):
 
 @source
 def add_curvature_force(joints, multipliers, v, out):
-    """out += (sum over k of multipliers[k] H_k) v, of joints that are tables."""
+    """out += (sum over k of multipliers[k] H_k) v for tabled joints."""
     add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, v, joints.hj)
 
 
@@ -151,7 +151,7 @@ def joint_directions(joints, g, t, u, J):
 
 @source
 def _dead_force(loads, factors, out):
-    """The forces of constant direction."""
+    """Force of dead loads."""
     clear(out)
     for k in range(loads.vectors.shape[0]):
         c, vector = factors[k], loads.vectors[k]
@@ -161,18 +161,17 @@ def _dead_force(loads, factors, out):
 
 @source
 def _of_moments(loads, factors):
-    """The factors of the moments, a view."""
+    """A view of the factors of moments."""
     n = loads.vectors.shape[0]
     return factors[n:n + loads.moments.M.size]
 
 
 @source
 def push(loads, what, factors, u, v, out, flat, ld):
-    """What stress-free strains change: internal forces become less, and their tangent.
+    """Subtract the internal forces, or their tangent, of eigenstrains.
 
-    ``what`` is PUSH: the force at u; PUSH_MEAN: that whose work from u to v is theirs;
-    PUSH_TANGENT: the derivative at u, which is added to ``flat``. The external force ``out`` is
-    added to.
+    ``what`` is PUSH: the force at u; PUSH_MEAN: the mean force with exact work from u to v;
+    PUSH_TANGENT: the derivative at u, added to ``flat``. Forces are added to ``out``.
     """
     given, f = np.empty(loads.pushes.shape[1]), np.empty(u.size)
     clear(given)
@@ -189,7 +188,7 @@ def push(loads, what, factors, u, v, out, flat, ld):
 
 @source
 def external_force(loads, factors, t, scale, u, out):
-    """The force of all loads; ``scale`` is on user-defined ones, the others have factors."""
+    """External force of all loads; ``scale`` multiplies user-defined ones, others have factors."""
     _dead_force(loads, factors, out)
     add_moments(loads.moments, _of_moments(loads, factors), u, out)
     if loads.rows.size > 0:
@@ -202,10 +201,7 @@ def external_force(loads, factors, t, scale, u, out):
 
 @source
 def mean_external_force(loads, factors, t, u0, u1, out):
-    """The mean force of all loads from u0 to u1: its work is what their potentials lose.
-
-    From u to u it is the force at u.
-    """
+    """Mean force of all loads from u0 to u1, whose work is minus the change of the potentials."""
     _dead_force(loads, factors, out)
     add_mean_moments(loads.moments, _of_moments(loads, factors), u0, u1, out)
     if loads.rows.size > 0:
@@ -223,7 +219,7 @@ def mean_external_force(loads, factors, t, u0, u1, out):
 def add_load_stiffness(loads, factors, t, scale, u, A):
     """Subtract the derivative of :func:`external_force` from a band matrix.
 
-    Of the matrix the lower half is given; what is symmetric comes first, then the upper half.
+    If only the lower half is stored, symmetric entries come first, then the upper half.
     """
     lower = A.flat[A.top:]
     add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)

@@ -75,7 +75,15 @@ class ElementBeamCable(ElementBeam):
         return "linear" if self.axis_degree < 7 else SECTIONS[self.nodal_dofs - 1]
 
     def axis(self, xi: Array, derivative: int) -> Array:
-        """Hermite functions of the axis at xi (...), or a derivative by xi, (2 m,) + xi.shape."""
+        """The Hermite functions of the axis, or a derivative by xi, (2 m,) + xi.shape.
+
+        Parameters
+        ----------
+        xi
+            Points, of any shape (...).
+        derivative
+            Order of the derivative.
+        """
         return hermite_basis(self.nodal_dofs, xi, derivative)
 
     @cached_property

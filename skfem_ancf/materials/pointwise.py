@@ -68,7 +68,15 @@ class PointwiseMaterial(Material):
         return found.reshape((3, 3) + found.shape[1:])
 
     def evaluated(self, strain: Array, number: int) -> Array:
-        """Energy, stress or moduli at strains (3, ...), shape (number, ...), number = 1, 3 or 9."""
+        """Energy, stress or moduli, shape (number, ...).
+
+        Parameters
+        ----------
+        strain
+            Shape (3, ...).
+        number
+            1 (energy), 3 (stress) or 9 (moduli, row by row).
+        """
         strain = np.asarray(strain)
         strain = strain.astype(np.result_type(strain, float), copy=False)
         energy, stress, moduli = getattr(self.point, "py_func", self.point)(self.constants, *strain)

@@ -1,4 +1,4 @@
-"""What every force element shares: points of beams, what it does there, and derivatives."""
+"""Base class of force elements: forces on points and sections, and their derivatives."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from ...core.types import Array
 from ..item import Item, beside
 from ..places import Vector
 
-#: Relative step of differences, where a force takes no complex numbers.
+#: Relative step of differences, where a force does not accept complex numbers.
 STEP = 1e-6
-#: Where a user-defined element is tried besides the reference configuration: off by so much.
+#: Relative perturbation of the reference configuration for checks of user-defined elements.
 ASIDE = 0.01
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
@@ -36,41 +36,41 @@ class Part(NamedTuple):
 
 
 class ForceElement(Item):
-    """A force on points and sections of beams, of their places, velocities and time.
+    """Forces on points and sections of beams as functions of positions, velocities and time.
 
-    A custom element, for :meth:`skfem_ancf.Scene.add`, is a subclass that defines :meth:`bind` and
-    :meth:`force`, and perhaps :meth:`potential`, :meth:`stiffness` and :meth:`resistance`. In
-    statics velocities are zero. It is not scaled with the loads. The energy-momentum scheme keeps
-    the energy if there is a :meth:`potential`; the work of what depends on velocities is in
-    ``history.dissipated``.
+    A user-defined element, for :meth:`skfem_ancf.Scene.add`, is a subclass that defines
+    :meth:`bind` and :meth:`force`, and optionally :meth:`potential`, :meth:`stiffness` and
+    :meth:`resistance`. In statics velocities are zero. Load factors do not scale it. The
+    energy-momentum scheme conserves the energy if there is a :meth:`potential`; the work of
+    velocity-dependent forces is in ``history.dissipated``.
 
     Attributes
     ----------
     distributed : bool
-        It acts all along a beam, not on a few points.
+        It acts along a beam instead of on a few points.
     along
-        Of such a one, bound: the beam, where its parts are, and stations, as
-        :func:`skfem_ancf.beam.surfaces.groups_of` returns them; None if that is not known.
+        For a distributed element, once bound: the beam and the location of its parts, as returned
+        by :func:`skfem_ancf.beam.surfaces.groups_of`; None if not known.
     links
-        What :meth:`bind` has returned, once it is bound.
+        The result of :meth:`bind`, once bound.
     groups
-        Points of the surface that it may touch, of an obstacle.
+        Surface points that an obstacle may touch.
     entries
-        Of one whose stiffness is sparse, bound: rows and columns of its values, numbers of
-        components of the links, neighbours; None for one of the shape (n, 2, n, 2).
+        For a sparse stiffness, once bound: rows and columns of its values, numbers of components of
+        neighbouring links; None for the shape (n, 2, n, 2).
 
     Other Parameters
     ----------------
     layout
         The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     x, v, t
-        Places and velocities of the points, shape (n, 2) each; time, in statics the load factor.
+        Positions and velocities of the points, shape (n, 2) each; time, in statics the load factor.
     y
-        Places at the end of a step, shape (n, 2), whose start is at ``x`` and middle at ``t``.
+        Positions at the end of a step, shape (n, 2); ``x`` is its start and ``t`` its middle.
 
     Examples
     --------
-    A spring to the ground that hardens, with a dashpot:
+    A hardening spring to the ground with a dashpot:
 
     >>> import numpy as np
     >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
@@ -93,7 +93,7 @@ class ForceElement(Item):
     """
 
     distributed = False
-    #: It is the inner force of a member of the scene.
+    #: It is the internal force of a member of the scene.
     internal = False
     #: Its force may depend on velocities.
     resists = True
@@ -103,40 +103,40 @@ class ForceElement(Item):
     entries: tuple[Array, Array] | None = None
 
     def bind(self, layout: Layout) -> Sequence[Vector]:
-        """The points and sections on which it acts; the scene calls it of a copy.
+        """The points and sections on which it acts, called on a copy.
 
         Returns
         -------
         list
-            What :func:`skfem_ancf.actions.forces.point` and
-            :func:`skfem_ancf.actions.forces.section` return.
+            Results of :func:`skfem_ancf.actions.forces.point` and
+            :func:`skfem_ancf.actions.forces.section`.
         """
         raise NotImplementedError
 
     def force(self, x: Array, v: Array, t: float) -> Array:
-        """The force on each point, (n, 2); on directions of sections what works on their change."""
+        """Force on each point, (n, 2); on section directions the conjugate force."""
         raise NotImplementedError
 
     def potential(self, x: Array) -> float | None:
-        """The potential of the force without velocities; None if there is none."""
+        """Potential of the force at zero velocity; None if there is none."""
         return None
 
     def potential_at(self, x: Array, t: float) -> float | None:
-        """The potential at a time, of items whose energy depends on it."""
+        """Potential at a time, for time-dependent energies."""
         return self.potential(x)
 
     def gain(self, x: Array, y: Array, t: float) -> float | None:
-        """The potential at y less that at x; None if there is none."""
+        """Change of the potential from x to y; None if there is none."""
         before = self.potential_at(x, t)
         after = None if before is None else self.potential_at(y, t)
         return None if before is None or after is None else after - before
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
-        """A mean (n, 2) of the force without velocity whose work is what the potential loses.
+        """Mean force (n, 2) at zero velocity, whose work is minus the change of the potential.
 
-        By default that in the middle, corrected along the change of the places (Gonzalez 1996):
-        the work is exact, but the correction may have a moment. What keeps angular momentum
-        exactly is a mean of its own, as of :class:`Spring` and :class:`TorsionalSpring`.
+        By default the force in the middle, corrected along the displacement (Gonzalez 1996): the
+        work is exact, but the correction may have a moment. :class:`Spring` and
+        :class:`TorsionalSpring` define means that conserve the angular momentum exactly.
         """
         d = y - x
         force = np.asarray(self.force(0.5 * (x + y), 0.0 * x, t), dtype=float)
@@ -147,9 +147,9 @@ class ForceElement(Item):
         return force - (gain + np.sum(force * d)) / square * d
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
-        """Derivative of the force by the places, shape (n, 2, n, 2), the derivative's last.
+        """Derivative of the force by the positions, shape (n, 2, n, 2), the derivative's axes last.
 
-        By a complex step or differences by default.
+        By default by a complex step or differences.
         """
         return derivative(lambda y: self.force(y, v, t), x)
 
@@ -158,11 +158,11 @@ class ForceElement(Item):
         return derivative(lambda w: self.force(x, w, t), v)
 
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
-        """Rows, columns and values (k,) that it adds to the mass matrix; None for none."""
+        """Rows, columns and values (k,) added to the mass matrix; None for none."""
         return None
 
     def parts(self) -> list[Part] | None:
-        """Of what kernels know, once it is bound; None for a user-defined element."""
+        """Its parts of kinds that kernels know, once bound; None for a user-defined element."""
         return None
 
     def __repr__(self) -> str:
@@ -170,7 +170,7 @@ class ForceElement(Item):
 
 
 def differences(function: Callable[[Array], Any], x: Array) -> Array:
-    """The derivative of a function of an array by central differences."""
+    """Derivative of a function of an array by central differences."""
     step = STEP * max(1.0, float(np.abs(x).max(initial=0.0)))
     units = step * np.eye(x.size).reshape(x.size, *x.shape)
     columns = [(np.asarray(function(x + d)) - function(x - d)) / (2.0 * step) for d in units]
@@ -178,7 +178,7 @@ def differences(function: Callable[[Array], Any], x: Array) -> Array:
 
 
 def derivative(function: Callable[[Array], Any], x: Array) -> Array:
-    """As :func:`differences`, by complex steps where those agree; of a complex x by these alone."""
+    """As :func:`differences`, by complex steps where both agree; for complex x by these only."""
     if np.iscomplexobj(x):
         raise TypeError("complex steps of complex steps")
     out = differences(function, x)
@@ -197,12 +197,12 @@ def derivative(function: Callable[[Array], Any], x: Array) -> Array:
 
 
 def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
-    """A copy of a force element, bound to a scene and tried there; or InputError.
+    """A copy of a force element, bound to a scene and checked.
 
     Parameters
     ----------
     element, layout
-        As it was given, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+        The unbound element, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     """
     bound = element._thawed()
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
@@ -228,14 +228,14 @@ def _links(element, links):
 
 
 def try_force(bound: Any, sizes: Any = None) -> None:
-    """Raise InputError unless what a user-defined force element returns fits together."""
+    """Raise InputError unless the methods of a user-defined force element are consistent."""
     x = np.array([x.start for x in bound.links])
     n, zero = len(x), np.zeros_like(x)
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
     for name in ("stiffness", "resistance"):
         require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
                        (n, 2, n, 2))
-    # where nothing is zero by chance, as it may be in the reference configuration
+    # generic positions, as terms may vanish in the reference configuration
     sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
     y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
     K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))
@@ -243,7 +243,7 @@ def try_force(bound: Any, sizes: Any = None) -> None:
         beside(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
     if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
-                         "symmetric: it has no potential. Say so in its class: symmetric = False")
+                         "symmetric: it has no potential. Set symmetric = False in its class")
     if bound.potential_at(y, 0.0) is not None:
         beside(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
 

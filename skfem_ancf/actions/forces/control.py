@@ -1,4 +1,4 @@
-"""Forces and moments as functions of time and of what is measured: controllers, motors."""
+"""Forces and moments as functions of time and measurements: controllers, motors."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .base import ForceElement, differences
 from .kernels import turned, turning
 
 KINDS = ("force", "moment")
-#: Part of the time between two samples that is round-off.
+#: Round-off relative to the sampling time.
 ROUND_OFF = 1e-9
 
 
 class MeasuredPoint(NamedTuple):
-    """What is measured at a point.
+    """Measurements at a point.
 
     Attributes
     ----------
@@ -38,13 +38,13 @@ class MeasuredPoint(NamedTuple):
 
 
 class MeasuredSection(NamedTuple):
-    """What is measured of a section.
+    """Measurements of a section.
 
     Attributes
     ----------
     angle, rate
-        From the reference configuration, in radians and in (-pi, pi], counterclockwise; and its
-        rate.
+        Rotation from the reference configuration in radians, in (-pi, pi], counterclockwise; and
+        its rate.
     """
 
     angle: float
@@ -57,23 +57,22 @@ class Control(ForceElement):
     Parameters
     ----------
     law
-        A function ``law(t, name=..., ...)`` of the time (in statics the load factor) and of what is
-        measured, by the names of ``points`` and ``sections``. It returns the force (2,), or the
-        moment, counterclockwise.
+        A function ``law(t, name=..., ...)`` of the time (in statics the load factor) and of the
+        measurements named in ``points`` and ``sections``. It returns the force (2,), or the moment,
+        counterclockwise.
     at
-        Where it acts: a point as for a spring, or the section for a moment: a place or
-        (beam, place).
+        Where it acts: a point as for a spring, or for a moment a section: a place or (beam, place).
     kind
         "force" or "moment".
     other
-        Where the opposite acts; None for the ground.
+        Where the opposite force or moment acts; None for the ground.
     points, sections
-        Names and places of what is measured: :class:`MeasuredPoint` and :class:`MeasuredSection`.
+        Names and places of measurements: :class:`MeasuredPoint` and :class:`MeasuredSection`.
     dt
-        Time between two samples: the law is asked at ``t_start + k dt`` and its value is held;
-        None to ask it with the state at every time, in each iteration.
+        Sampling time: the law is evaluated at ``t_start + k dt`` and its value held (zero-order
+        hold); None to evaluate it continuously, in each iteration.
     beam
-        The beam, its name or its number, in a scene of several, of places that name none.
+        Beam, name or number, for places that name none.
     """
 
     symmetric = False
@@ -112,7 +111,7 @@ class Control(ForceElement):
         return [*ends, *places, *directions]
 
     def _place(self, layout, place, where_none_is=None):
-        """A beam or body, and the place of it."""
+        """A beam or body, and the place on it."""
         named = isinstance(place, RigidBody) or (
             isinstance(place, (tuple, list)) and not is_point(place))
         return named_place(layout, place if named or self.beam is None else (self.beam, place),
@@ -127,10 +126,10 @@ class Control(ForceElement):
             raise InputError("the ground does not turn: leave other= out for a moment from there")
         return section(layout, which, at)[1]
 
-    # what it does
+    # forces
 
     def measured(self, x: Array, v: Array) -> dict[str, Any]:
-        """What the law is given, by name."""
+        """Measurements by name."""
         out: dict[str, Any] = {}
         k = self._ends
         for name, _ in self.points:
@@ -145,14 +144,14 @@ class Control(ForceElement):
         return out
 
     def ask(self, x: Array, v: Array, t: float) -> Any:
-        """The value of the law: a number, or a force (2,)."""
+        """Value of the law: a number, or a force (2,)."""
         values = self.measured(x, v)
         if self.kind == "moment":
             return ask_number("law(t = {:g})", lambda t: self.law(t, **values), float(t))
         return ask_array("law(t = {:g})", (2,), lambda t: self.law(t, **values), float(t))
 
     def sample(self, x: Array, v: Array, t: float) -> None:
-        """Ask the law and hold its value, if it is time to."""
+        """Evaluate the law and hold its value, if it is time to."""
         if self.dt is None:
             return
         if not self._held or t >= self._held[-1][0] + (1.0 - ROUND_OFF) * self.dt:
@@ -160,11 +159,11 @@ class Control(ForceElement):
 
     @property
     def held(self) -> Array:
-        """Times of the samples and the values held, shape (n, 2) or (n, 3)."""
+        """Sampling times and held values, shape (n, 2) or (n, 3)."""
         return np.array([np.append(t, value) for t, value in self._held])
 
     def hold(self, held: ArrayLike) -> None:
-        """Take over what another run has held, as :attr:`held` gave it; (n, 2) or (n, 3)."""
+        """Restore held values of another run, from :attr:`held`; (n, 2) or (n, 3)."""
         moment = self.kind == "moment"
         self._held[:] = [(float(row[0]), float(row[1]) if moment else row[1:])
                          for row in np.asarray(held)]
@@ -199,7 +198,6 @@ class Control(ForceElement):
 
 
 def _named(what, places):
-    """Pairs of names and places of a dictionary."""
     if places is None:
         return ()
     if not isinstance(places, dict) or not all(

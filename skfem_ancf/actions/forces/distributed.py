@@ -1,4 +1,4 @@
-"""Foundations and drag: force elements at the points of a rule."""
+"""Foundations and drag: force elements at quadrature points."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .kernels import DRAG, FOUNDATION
 
 
 class Foundation(ForceElement):
-    """Winkler's foundation: springs along the normal of a side in the reference configuration.
+    """Winkler foundation: springs along the normal of a side in the reference configuration.
 
     Parameters
     ----------
     k
-        Stiffness per area of the side: force per area and displacement, zero or positive.
+        Stiffness per area: force per area and displacement, zero or positive.
     side
-        A place of the boundary, see :func:`skfem_ancf.mesh.places.facets_of`; of a cable, whose
-        surface is no coordinate, the axis is held in place of it.
+        A place of the boundary, see :func:`skfem_ancf.mesh.places.facets_of`; for a cable it acts
+        on the axis.
     one_sided
-        It pushes and does not pull.
+        It acts in compression only.
     damping
-        Force per area and velocity, zero or positive; while it pushes, if it is one-sided.
+        Force per area and velocity, zero or positive; in compression only, if it is one-sided.
     beam
-        The beam, its name or its number, in a scene of several.
+        Beam, name or number, in a scene of several.
     """
 
     distributed = True
@@ -71,19 +71,19 @@ class Foundation(ForceElement):
 
 
 class Drag(ForceElement):
-    """A force per length of the axis against its velocity v, quadratic in it.
+    """Quadratic drag per length of the axis in a medium at rest.
 
-    ``density width / 2 (normal |v_n| v_n + tangential |v_t| v_t)`` per length of the stress-free
-    axis, with the velocities across and along the axis. What is around is at rest.
+    ``-density width / 2 (normal |v_n| v_n + tangential |v_t| v_t)`` per length of the reference
+    axis, with the velocities across and along the axis.
 
     Parameters
     ----------
     density
-        Mass per volume of what is around, zero or positive.
+        Mass per volume of the medium, zero or positive.
     normal, tangential
-        Coefficients, zero or positive.
+        Drag coefficients, zero or positive.
     beam
-        The beam, its name or its number; None for all.
+        Beam, name or number; None for all.
 
     References
     ----------

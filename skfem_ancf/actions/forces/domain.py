@@ -1,4 +1,4 @@
-"""The internal force of a domain in the equations of a scene."""
+"""The internal force of a domain as a force element."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .base import ForceElement
 
 
 class DomainForce(ForceElement):
-    """The residual and tangent of a :class:`~skfem_ancf.Domain`, bound.
+    """Internal force and tangent of a :class:`~skfem_ancf.Domain`, bound.
 
     Parameters
     ----------
     domain
-        Whose they are.
+        The domain.
     first
         The number of its first degree of freedom in the scene.
     """

@@ -1,9 +1,9 @@
-"""Force elements: springs, foundations, drag as tables, and their forces and derivatives.
+"""Tables of springs, foundations and drag, and kernels of their forces and derivatives.
 
-An element has vectors that depend affinely on the coordinates: places of points, differences of
-them, directions of sections. Elements of the kinds below have two, ``d`` and ``e``, four numbers
-that are rows of arrays (4, n), elements of one kind side by side; behind them in one array are
-user-defined elements. Forces are those that resist, as internal forces do.
+An element has vectors that are affine in the degrees of freedom: positions, their differences,
+directions of sections. Elements of the kinds below have two, ``d`` and ``e``: four numbers, the
+rows of arrays (4, n), with elements of one kind side by side. Vectors of user-defined elements
+follow in the same array. Forces are resisting, as internal forces.
 """
 
 from typing import NamedTuple
@@ -22,9 +22,9 @@ from ..contact.tables import RESISTING as RUBBING
 
 #: Kinds of elements.
 SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
-#: Numbers of an element. Spring: stiffness, length without force, damping. Torsion: stiffness,
-#: damping, cosine and sine of the angle without moment. Foundation: stiffness, damping, normal,
-#: and 1 if it only pushes. Drag: factors of squares of normal and tangential velocity.
+#: Parameters of an element. Spring: stiffness, free length, damping. Torsion: stiffness, damping,
+#: cosine and sine of the free angle. Foundation: stiffness, damping, normal, and 1 if
+#: compression-only. Drag: factors of the squared normal and tangential velocity.
 #: Then rows of the vectors, and of the derivatives by them. Numba compiles for each int.
 NUMBERS, VECTORS, BLOCK = map(np.int64, (5, 4, 16))
 TINY = 1e-200
@@ -35,7 +35,7 @@ AT_ONCE = 1e-300
 
 
 class Kinds(NamedTuple):
-    """Of the elements of the kinds above: their number, where each begins, and their numbers."""
+    """Elements of the kinds above: their number, the first of each kind, and their parameters."""
 
     number: int
     ends: I1
@@ -48,19 +48,19 @@ class ForceTables(NamedTuple):
     Attributes
     ----------
     start, at, of, weight
-        The vectors in the reference configuration, and which grows with which DOF, and how.
+        Vectors in the reference configuration; rows, DOFs and weights of their derivatives.
     number, ends, numbers
-        Elements of the kinds above, where kinds begin and end among them, and their numbers (5 n,).
+        Number of elements of the kinds above, ends of kinds among them, and parameters (5 n,).
     size
-        Of the derivative by the vectors: 16 n, and what user-defined elements have.
+        Length of the derivatives by the vectors: 16 n, and those of user-defined elements.
     band_at, band_of, band_weight
-        Where in the tangent's band each derivative goes.
+        Positions in the band, derivatives and weights.
     row_at, row_of
-        Where it goes between the rows of elements that couple what is far apart.
+        Positions between the rows of elements that couple distant DOFs.
     own, contacts
-        Handle of what has user-defined elements, 0 for none; the obstacles.
+        Handle of user-defined elements, 0 for none; the obstacles.
     address
-        That of the compiled :func:`of_kinds`; 0 in NumPy.
+        Address of the compiled :func:`of_kinds`; 0 in NumPy.
     """
 
     start: F1
@@ -83,7 +83,7 @@ class ForceTables(NamedTuple):
 
 @source
 def vectors_of(tables, u, factor, out):
-    """factor times the vectors in the reference configuration, and what u adds to them."""
+    """out = factor * start + the part linear in u."""
     for k in indices(out.size):
         out[k] = factor * tables.start[k]
     add_products(out, tables.at, tables.weight, u, tables.of)
@@ -91,31 +91,31 @@ def vectors_of(tables, u, factor, out):
 
 @source
 def _part(kinds, kind, rows, x):
-    """The rows of the elements of one kind, a view of a flat array."""
+    """A view of the rows of one kind."""
     n = kinds.number
     return shaped(x[:rows * n], (rows, n))[:, kinds.ends[kind]:kinds.ends[kind + 1]]
 
 
 @source
 def _of(kinds, kind, y, w, rows, out):
-    """Numbers, vectors, their ends or rates, and results of one kind."""
+    """Parameters, vectors, end vectors or rates, and results of one kind."""
     return (_part(kinds, kind, NUMBERS, kinds.numbers), _part(kinds, kind, VECTORS, y),
             _part(kinds, kind, VECTORS, w), _part(kinds, kind, rows, out))
 
 
-#: What is asked of the kinds.
+#: Values of ``what``.
 ELASTIC, RESISTING, DERIVATIVES = range(3)
 
 
 @primitive("skfem_ancf.equations.loops")
 def run_kinds(tables, what, y, w, factor, out):
-    """As :func:`of_kinds`; compiled once, and not again in each kernel that calls it."""
+    """As :func:`of_kinds`; compiled once for all kernels that call it."""
     of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)
 
 
 @source
 def _evaluate(tables, what, t, factor, y, w, out):
-    """What is asked, of the kinds and of user-defined elements."""
+    """Evaluate ``what`` for all kinds and for user-defined elements."""
     run_kinds(tables, what, y, w, factor, out)
     if tables.own > 0:
         own_elements(tables.own, what, t, factor, y, w, out)
@@ -123,7 +123,7 @@ def _evaluate(tables, what, t, factor, y, w, out):
 
 @source
 def _add_force(tables, what, t, u, v, start, f):
-    """Add a force of the vectors at u, and of those at v or, without their start, their rates."""
+    """Add the force for vectors at u and, without ``start``, rates at v."""
     size = tables.start.size
     if size == 0:
         return
@@ -136,9 +136,9 @@ def _add_force(tables, what, t, u, v, start, f):
 
 @source
 def add_elastic_force(tables, t, span, u0, u1, f):
-    """Add the force without velocity whose work from u0 to u1 is the change of the potential.
+    """Add the mean force at zero velocity with exact work from u0 to u1.
 
-    A mean over a span of time about t; the force at t where both states are one and the span zero.
+    It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
     """
     _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
     add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
@@ -146,15 +146,14 @@ def add_elastic_force(tables, t, span, u0, u1, f):
 
 @source
 def add_resisting_force(tables, t, u, v, f):
-    """Add the part of the force that velocities cause."""
+    """Add the velocity-dependent part of the force."""
     _add_force(tables, np.int64(RESISTING), t, u, v, 0.0, f)
     add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
 
 @source
 def add_contact(contacts, asked, u, v, out):
-    """Add what is asked of obstacles, a
-    :class:`~skfem_ancf.actions.contact.tables.Question`."""
+    """Add the answer of obstacles to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     if contacts.number > 0:
         if contacts.moving > 0:
             own_poses(contacts.own, asked.t, asked.span, contacts.poses)
@@ -169,20 +168,20 @@ def _at(what, t):
 
 @source
 def add_contact_tangent(tables, t, span, u0, u1, A):
-    """Add to a band the derivative of their mean force by its end: twice, unless both are one."""
+    """Add the derivative of the mean contact force by u1 to a band: twice, unless u0 = u1."""
     add_contact(tables.contacts, Question(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
 
 
 @source
 def add_rubbing_tangent(tables, t, factor, u, v, A):
-    """Add to a band the derivative of friction and damping, that by velocities with a factor."""
+    """Add the derivative of friction and damping to a band; that by velocities times a factor."""
     add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
                 A.flat)
 
 
 @source
 def contact_work(tables, t, u, du, f):
-    """The product of the force at u and du; f is scratch, which is left at zero."""
+    """Product of the contact force at u and du; f is workspace, zero on return."""
     add_contact(tables.contacts, _at(FORCE, t), u, u, f)
     work = dot(f, du)
     clear(f)
@@ -191,34 +190,34 @@ def contact_work(tables, t, u, du, f):
 
 @source
 def contact_along(tables, t, u, du, out):
-    """Its derivative along du, and the largest way of an element, into out, shape (2,)."""
+    """Derivative of :func:`contact_work` along du, and the largest slip of an element, (2,)."""
     out[0], out[1] = 0.0, 0.0
     add_contact(tables.contacts, _at(ALONG, t), u, du, out)
 
 
 @source
 def pace_contact(tables, dt):
-    """Tell obstacles the size of a step in time."""
+    """Pass the time step to obstacles."""
     tables.contacts.memory[RATE] = 1.0 / (dt * dt)
 
 
 @source
 def augment_contact(tables, t, u, out):
-    """Where points at u are too deep pressures reach on; their number is put into out, (1,)."""
+    """Augment pressures where penetration at u is too large; their number goes to out, (1,)."""
     out[0] = 0.0
     add_contact(tables.contacts, _at(AUGMENT, t), u, u, out)
 
 
 @source
 def settle_contact(tables, t, span, u0, u1, out):
-    """Anchors follow at the end of a step; what it has taken is put into out, (1,)."""
+    """Update friction anchors at the end of a step; the dissipated energy goes to out, (1,)."""
     out[0] = 0.0
     add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
 
 
 @source
 def element_stiffness(tables, t, u, v, factor, D):
-    """The derivative by the vectors and, with a factor, by their velocities, shape (size,)."""
+    """Derivative by the vectors plus factor times that by their velocities, shape (size,)."""
     size = tables.start.size
     y, w = np.empty(size), np.empty(size)
     vectors_of(tables, u, 1.0, y)
@@ -229,7 +228,7 @@ def element_stiffness(tables, t, u, v, factor, D):
 
 @source
 def add_element_tangent(tables, t, u, A):
-    """Add the derivative of :func:`add_elastic_force` to a band matrix, for near elements."""
+    """Add the derivative of :func:`add_elastic_force` to a band, without distant couplings."""
     if tables.start.size > 0:
         D, v = np.empty(tables.size), np.zeros(u.size)
         element_stiffness(tables, t, u, v, 0.0, D)
@@ -239,7 +238,7 @@ def add_element_tangent(tables, t, u, A):
 
 @source
 def add_element_damping(tables, t, u, v, A):
-    """Add the derivative of :func:`add_resisting_force` by v to a band, for near elements."""
+    """Add the derivative by v of :func:`add_resisting_force`, without distant couplings."""
     if tables.start.size > 0:
         D = np.empty(tables.size)
         element_damping(tables, t, u, v, D)
@@ -248,7 +247,7 @@ def add_element_damping(tables, t, u, v, A):
 
 @source
 def element_damping(tables, t, u, v, D):
-    """The derivative by the velocities of the vectors, shape (size,)."""
+    """Derivative by the velocities of the vectors, shape (size,)."""
     elastic = np.empty(tables.size)
     element_stiffness(tables, t, u, v, 1.0, D)
     element_stiffness(tables, t, u, v, 0.0, elastic)
@@ -258,7 +257,7 @@ def element_damping(tables, t, u, v, D):
 
 @source
 def put_between(tables, D, factor, first, S):
-    """Put derivatives of far elements, times a factor, between their rows: from ``first`` on."""
+    """Put derivatives of distant couplings times a factor between their rows, from ``first`` on."""
     k = S.shape[0] - first
     between = np.zeros(k * k)
     add_products(between, tables.row_at, np.ones(tables.row_at.size), D, tables.row_of)
@@ -272,7 +271,7 @@ def put_between(tables, D, factor, first, S):
 
 @source
 def of_kinds(kinds, what, y, w, factor, out):
-    """What is asked of all kinds, from their vectors y, and those at the end or their rates w."""
+    """Evaluate ``what`` for all kinds from vectors y, and end vectors or rates w."""
     if what == ELASTIC:
         elastic(kinds, y, w, out)
     elif what == RESISTING:
@@ -283,7 +282,7 @@ def of_kinds(kinds, what, y, w, factor, out):
 
 @source
 def elastic(kinds, y0, y1, F):
-    """The forces of the kinds, means between two states; both may be the same."""
+    """Elastic forces of the kinds, means between two states, which may be equal."""
     p, a, b, f = _of(kinds, SPRING, y0, y1, VECTORS, F)
     for e in indices(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
         length = (np.sqrt(a[0, e] * a[0, e] + a[1, e] * a[1, e])
@@ -307,7 +306,7 @@ def elastic(kinds, y0, y1, F):
 
 @source
 def mean_moments(p, a, b, f):
-    """The forces of torsional springs, means between two states."""
+    """Mean forces of torsional springs between two states."""
     turn = np.empty((2, a.shape[1]))
     turned(p, a, turn[0])
     turned(p, b, turn[1])
@@ -319,13 +318,13 @@ def mean_moments(p, a, b, f):
 
 @source
 def pressed(nx, ny, x, y):
-    """How far a point has moved along a normal."""
+    """Displacement of a point along a normal."""
     return nx * x + ny * y
 
 
 @source
 def turned(p, y, out):
-    """The angle from e to d, less that without a moment, in (-pi, pi]."""
+    """Angle from e to d minus the one without moment, in (-pi, pi]."""
     for e in indices(out.size):
         cross = y[2, e] * y[1, e] - y[3, e] * y[0, e]
         dot = y[0, e] * y[2, e] + y[1, e] * y[3, e]
@@ -334,7 +333,7 @@ def turned(p, y, out):
 
 @source
 def turning(y, g):
-    """The derivative of the angle from e to d by both."""
+    """Derivative of the angle from e to d by both."""
     for e in indices(g.shape[1]):
         d, s = y[0, e] ** 2 + y[1, e] ** 2, y[2, e] ** 2 + y[3, e] ** 2
         g[0, e], g[1, e] = -y[1, e] / d, y[0, e] / d
@@ -343,7 +342,7 @@ def turning(y, g):
 
 @source
 def resisting(kinds, y, w, G):
-    """The forces of the kinds that resist velocities w."""
+    """Velocity-dependent forces of the kinds for rates w."""
     p, d, v, f = _of(kinds, SPRING, y, w, VECTORS, G)
     for e in indices(p.shape[1]):
         square = d[0, e] * d[0, e] + d[1, e] * d[1, e]
@@ -371,7 +370,7 @@ def resisting(kinds, y, w, G):
 
 @source
 def derivatives(kinds, y, w, factor, D):
-    """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j of zeros."""
+    """Derivatives of forces, and factor times those of ``resisting`` by w; (i, j) at 4 i + j."""
     p, d, v, s = _of(kinds, SPRING, y, w, BLOCK, D)
     for e in indices(p.shape[1]):
         square = np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY)
@@ -401,7 +400,7 @@ def derivatives(kinds, y, w, factor, D):
 
 @source
 def moment_derivatives(p, d, factor, s):
-    """The derivatives of torsional springs."""
+    """Derivatives of torsional springs."""
     g, turn = np.empty(d.shape), np.empty(d.shape[1])
     turning(d, g)
     turned(p, d, turn)
@@ -420,7 +419,7 @@ def moment_derivatives(p, d, factor, s):
 
 
 def potential(tables: ForceTables, y: np.ndarray) -> float:
-    """The potential of the kinds at vectors y, shape (rows,)."""
+    """Potentials of the kinds at vectors y, shape (rows,)."""
     p, d = _part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, VECTORS, y)
     total = 0.5 * np.sum(p[0] * (np.hypot(d[0], d[1]) - p[1]) ** 2)
     p, d = _part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, VECTORS, y)

@@ -1,4 +1,4 @@
-"""Laws of springs and dashpots as functions of the caller's: of an elongation, an angle, a rate."""
+"""User-defined laws of springs and dashpots: force of elongation, angle or rate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...core.quadrature import gauss
 
 #: Points by which the work between two states of a step is integrated.
 POINTS = 8
-#: Part of a potential that is its round-off.
+#: Relative round-off of a potential.
 ROUND_OFF = 1e-13
 #: Relative step of the differences that give the slope of a law.
 STEP = 1e-6
@@ -22,8 +22,8 @@ STEP = 1e-6
 class Law:
     """A force, or moment, as a function of one number, with its potential.
 
-    ``given`` is a function of the elongation that returns the force; or that and its potential,
-    which is else the integral of the force from zero. ``name`` and ``of`` are for messages.
+    ``given`` is the function, or a pair of it and its potential, by default the integral from zero.
+    ``name`` and ``of`` are for messages.
 
     Examples
     --------
@@ -48,19 +48,19 @@ class Law:
         return ask_number(f"{self.name}({self.of} = {{:g}})", self.function, float(s))
 
     def potential(self, s: float) -> float:
-        """The potential at s; its integral from zero where none was given."""
+        """Potential at s, by default the integral of the force from zero."""
         if self.energy is not None:
             return ask_number(f"the potential of {self.name} at {{:g}}", self.energy, float(s))
         return float(scipy.integrate.quad(self, 0.0, s, epsabs=0.0, epsrel=1e-12, limit=200)[0])
 
     def work(self, a: float, b: float) -> float:
-        """What the potential gains from a to b, two states of one step."""
+        """Change of the potential from a to b."""
         if self.energy is not None:
             return self.potential(b) - self.potential(a)
         return (b - a) * self.mean(a, b)
 
     def mean(self, a: float, b: float) -> float:
-        """The mean force from a to b, whose product with b - a is :meth:`work`."""
+        """Mean force from a to b: :meth:`work` over b - a."""
         if a == b:
             return self(a)
         x, w = gauss(POINTS)
@@ -73,7 +73,7 @@ class Law:
         return found
 
     def slope(self, s: float, scale: float = 1.0) -> float:
-        """Its derivative at s, by differences."""
+        """Derivative at s by differences."""
         d = STEP * max(abs(s), scale)
         return (self(s + d) - self(s - d)) / (2.0 * d)
 
@@ -82,7 +82,7 @@ class Law:
 
 
 class Proportional(float):
-    """A number as a law: the force in proportion to it."""
+    """A linear law."""
 
     def __call__(self, s: float) -> float:
         return self * s
@@ -104,7 +104,7 @@ class Proportional(float):
 
 
 def number_or_law(name: str, given: Any, of: str) -> Proportional | Law:
-    """A number that is not negative, or a function, as a law."""
+    """A non-negative number or a function as a law."""
     if isinstance(given, Law):
         return given
     if callable(given) or isinstance(given, (tuple, list)):

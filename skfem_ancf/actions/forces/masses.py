@@ -1,4 +1,4 @@
-"""Point masses: they add to the mass matrix, and weigh where there is gravity."""
+"""Point masses: they add to the mass matrix and to the weight."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from .base import ForceElement, Part
 
 
 class PointMass(ForceElement):
-    """A mass on a material point, perhaps with a moment of inertia about it.
+    """A mass on a material point, optionally with a moment of inertia.
 
     Parameters
     ----------
     mass
         Zero or positive.
     at
-        The point: its place (x, y) in the reference configuration, or the name of an end.
+        The point (x, y) in the reference configuration, or the name of an end.
     inertia
-        Moment of inertia, zero or positive, of what turns with the section of a node, which the
-        point then has to be on.
+        Moment of inertia about the point, zero or positive, rotating with a section: the point must
+        be on the section of a node.
     beam
-        The beam, its name or its number, in a scene of several.
+        Beam, name or number, in a scene of several.
     """
 
     def __init__(self, mass: float, at: ArrayLike, inertia: float = 0.0,
@@ -48,7 +48,7 @@ class PointMass(ForceElement):
         return []
 
     def mass_entries(self) -> tuple[Array, Array, Array]:
-        """What it adds to the mass matrix: rows, columns and values, shapes (k,)."""
+        """Rows, columns and values added to the mass matrix, shapes (k,)."""
         rows, columns, values = [], [], []
         for size, place in self._masses:
             for dofs, weights in zip(place.dofs, place.weights):

@@ -1,4 +1,4 @@
-"""Springs and dashpots between points, and between directions of sections."""
+"""Springs and dashpots between points, and between section directions."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from .base import ForceElement, Part
 from .kernels import SPRING, TINY, TORSION, turned, turning
 from .laws import Law, number_or_law
 
-#: Rate beside which the step of a difference of a dashpot's law is small.
+#: Reference rate for the difference step of a dashpot's law.
 STILL = 1e-3
 
 
 def end_of(layout: Layout, place: Any) -> Vector:
-    """A material point, or one of the ground."""
+    """The Vector of a material point or a fixed point."""
     which, at = named_place(layout, place, GROUND)
     return point(layout, which, at)
 
 
 class Spring(ForceElement):
-    """A spring between two points, with a dashpot along the same line.
+    """A spring between two points, with a parallel dashpot.
 
-    Its force is ``k (l - length) + damping dl / dt`` of the distance l, or
+    The tension is ``k (l - length) + damping dl / dt`` with the distance l, or
     ``k(l - length) + damping(dl / dt)`` where these are functions.
 
     Parameters
     ----------
     k
         Stiffness (force per length), zero or positive; or a function of the elongation that returns
-        the force, positive in tension; or such a function and its potential.
+        the force, positive in tension; or a pair of such a function and its potential.
     between
-        Two places, each (x, y): the material point there, or the point of the ground where no beam
-        is; or (beam, (x, y)) with a Beam, a RigidBody, a name or a number; or ("ground", (x, y)).
+        Two places, each (x, y): the material point there, or a fixed point where there is no beam;
+        or (beam, (x, y)) with a Beam, a RigidBody, a name or a number; or ("ground", (x, y)).
     damping
         Force per velocity, zero or positive; or a function of the rate that returns the force.
     length
-        Length without force; that of the reference configuration by default.
+        Free length; that of the reference configuration by default.
     """
 
     def __init__(self, k: Any, between: Any, damping: Any = 0.0,
@@ -80,7 +80,7 @@ class Spring(ForceElement):
                      (self.k, self._length, self.damping, 0.0, 0.0))]
 
     def _along(self, x):
-        """Its length, at least a little, and its direction."""
+        """Its length, at least a small positive number, and its direction."""
         length = max(float(np.hypot(*x[0])), TINY)
         return length, x[0] / length
 
@@ -114,27 +114,27 @@ class Spring(ForceElement):
 
 
 class TorsionalSpring(ForceElement):
-    """A moment against the angle by which a section turns, with a dashpot.
+    """A torsional spring on a section, with a parallel dashpot.
 
-    The moment is ``k (phi - angle) + damping dphi / dt``, phi the angle from the reference
-    configuration, to the ground or to another section, taken in (-pi, pi] about ``angle``; or
+    The moment is ``k (phi - angle) + damping dphi / dt``, phi the rotation from the reference
+    configuration relative to the ground or another section, taken in (-pi, pi] about ``angle``; or
     ``k(phi - angle) + damping(dphi / dt)`` where these are functions.
 
     Parameters
     ----------
     k
         Moment per angle, zero or positive; or a function of the angle that returns the moment; or
-        such a function and its potential.
+        a pair of such a function and its potential.
     at
-        A place that is one section of a beam, or a point through which it goes; or a RigidBody.
+        A place that is one section of a beam, or a point on it; or a RigidBody.
     damping
         Moment per angular velocity, zero or positive; or a function of it.
     beam
-        The beam, its name or its number, in a scene of several.
+        Beam, name or number, in a scene of several.
     other
         The other section as (beam, place), or a RigidBody; None for the ground.
     angle
-        The angle without moment, in [-pi, pi].
+        Free angle, in [-pi, pi].
     """
 
     def __init__(self, k: Any, at: Place, damping: Any = 0.0, beam: WhichBeam = None,
@@ -163,7 +163,7 @@ class TorsionalSpring(ForceElement):
                                                  np.sin(self._start), 0.0))]
 
     def _angle(self, x):
-        """The angle at directions d and e, (2, 2)."""
+        """The angle for directions d and e, (2, 2)."""
         p = np.array([0.0, 0.0, np.cos(self._start), np.sin(self._start)])[:, None]
         out = np.empty(1)
         turned(p, x.reshape(4, 1), out)
@@ -171,7 +171,7 @@ class TorsionalSpring(ForceElement):
 
     @staticmethod
     def _turning(x):
-        """The derivative of the angle by both directions, (2, 2)."""
+        """Derivative of the angle by both directions, (2, 2)."""
         out = np.empty((4, 1))
         turning(x.reshape(4, 1), out)
         return out.reshape(2, 2)

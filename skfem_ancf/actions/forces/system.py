@@ -1,4 +1,4 @@
-"""The force elements of a scene in its equations: their tables, and user-defined elements."""
+"""The force elements of a scene: tables of known kinds, and user-defined elements."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ KINDS = 4
 
 
 class Forces:
-    """The force elements of a scene, bound; ``own`` are those that are no tables.
+    """The bound force elements of a scene; ``own`` are the user-defined ones.
 
-    ``far``: one couples DOFs that are not in the band. ``symmetric``: all have symmetric
-    derivatives. ``resists``: velocities may cause a force. ``masses`` add to the mass, ``contacts``
-    are the obstacles.
+    ``far``: an element couples DOFs outside the band. ``symmetric``: all derivatives are symmetric.
+    ``resists``: there are velocity-dependent forces. ``masses`` contribute to the mass matrix;
+    ``contacts`` are the obstacles.
     """
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
@@ -68,7 +68,7 @@ class Forces:
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _coupling(self, k):
-        """Rows, columns, weights and places of the derivatives that element k adds."""
+        """Rows, columns, weights and source positions of the derivatives of element k."""
         links, _, places = self._blocks[k]
         dofs = [link.dofs[c] for link in links for c in range(2)]
         if k >= len(self.parts) and (entries := self.own[k - len(self.parts)].entries) is not None:
@@ -88,14 +88,14 @@ class Forces:
         return tuple(np.concatenate(column) for column in out)
 
     def _entries(self, far):
-        """Rows, columns, weights and places of near elements, or of far ones."""
+        """Rows, columns, weights and source positions of elements inside, or outside, the band."""
         none = np.zeros(0, dtype=np.int64)
         found = [(none, none, np.zeros(0), none)] + [
             c for c, other in zip(self._couplings, self._far) if other == far]
         return tuple(np.concatenate(column) for column in zip(*found))
 
     def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
-        """What kernels take."""
+        """The tables for kernels."""
         if not self.elements:
             return NO_FORCES
         at, of, weight, start = [], [], [], np.zeros(self.rows)
@@ -122,11 +122,11 @@ class Forces:
             handle if self.own else 0, self.contacts.tables)
 
     def acting_rows(self) -> Array:
-        """The derivatives of the places where elements act on few points, shape (k, N)."""
+        """Derivatives of positions of concentrated elements, shape (k, N)."""
         return self._derivatives([one for element in self.elements if not element.distributed
                                   and not element.internal for one in element.links])
 
-    # elements that couple what is far apart
+    # elements that couple distant DOFs
 
     def _far_blocks(self):
         for block, far in zip(self._blocks, self._far):
@@ -134,7 +134,7 @@ class Forces:
                 yield block
 
     def far_rows(self) -> Array:
-        """The derivatives of far elements' vectors by the coordinates, shape (k, N)."""
+        """Derivatives of vectors of elements outside the band, shape (k, N)."""
         return self._derivatives([one for links, _, _ in self._far_blocks() for one in links])
 
     def _derivatives(self, links):
@@ -145,7 +145,7 @@ class Forces:
         return out
 
     def _between_rows(self):
-        """Row, column and place of the derivatives between those rows."""
+        """Row, column and source position of the derivatives between those rows."""
         found, first = [np.zeros((3, 0), dtype=np.int64)], 0
         for _, rows, places in self._far_blocks():
             m = len(rows)
@@ -155,19 +155,19 @@ class Forces:
         return np.concatenate(found, axis=1)
 
     def far_entries(self) -> tuple[Array, Array, Array, Array]:
-        """Rows, columns, weights and places of what is not in the band; shapes (k,)."""
+        """Rows, columns, weights and source positions outside the band; shapes (k,)."""
         return self._entries(True)
 
     # values
 
     def vectors(self, tables: ForceTables, u: Array) -> Array:
-        """The vectors' numbers at u."""
+        """Values of the vectors at u."""
         y = np.empty(self.rows)
         vectors_of(tables, u, 1.0, y)
         return y
 
     def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
-        """The potential of all elements; those without one count as zero."""
+        """Potential of all elements; zero for those without one."""
         y = self.vectors(tables, u)
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
@@ -175,12 +175,12 @@ class Forces:
 
     @cached_property
     def sampled(self) -> list[Control]:
-        """Controls whose law is asked now and then, and its value held."""
+        """Controls with a sampling time."""
         return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
 
     @contextmanager
     def unheld(self) -> Iterator[None]:
-        """As at the start of a motion: without what sampled controls hold."""
+        """The elements as at the start of a motion, without held values of controls."""
         held = [control.held for control in self.sampled]
         for control in self.sampled:
             control.hold(())
@@ -191,7 +191,7 @@ class Forces:
                 control.hold(values)
 
     def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
-        """Ask sampled controls whose time it is; at first what they held is forgotten."""
+        """Evaluate sampled controls that are due; ``first`` clears held values."""
         y, w = self.vectors(tables, u), np.empty(self.rows)
         vectors_of(tables, v, 0.0, w)
         for element, (rows, _) in zip(self.own, self._slices):
@@ -201,7 +201,7 @@ class Forces:
                 element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t)
 
     def rows_of(self, element: ForceElement) -> Array:
-        """Where the parts of an element are among all, in its own order; shape (n,)."""
+        """Positions of the parts of an element among all, in its order; shape (n,)."""
         first = 0
         for other in self.elements:
             n = len(other.parts() or ())
@@ -211,7 +211,7 @@ class Forces:
         return self._place[:0]
 
     def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
-        """What resists on the first vector of each part, shape (2, parts)."""
+        """Resisting force on the first vector of each part, shape (2, parts)."""
         y, w, out = self.vectors(tables, u), np.empty(self.rows), np.zeros(self.rows)
         vectors_of(tables, v, 0.0, w)
         run_kinds(tables, np.int64(ELASTIC), y, y, 0.0, out)
@@ -221,7 +221,7 @@ class Forces:
         return (out + resisting)[:2 * n].reshape(2, n)
 
     def small_part_forces(self, tables: ForceTables, t: float, base: Array, d: Array) -> Array:
-        """As :meth:`part_forces` of elements on single points at rest, linearised."""
+        """:meth:`part_forces` of elements on single points at rest, linearised."""
         n, w = len(self.parts), np.empty(self.rows)
         vectors_of(tables, d, 0.0, w)
         D = self.stiffness(tables, t, base, 0.0 * base, 0.0)[:16 * n].reshape(4, 4, n)
@@ -229,7 +229,7 @@ class Forces:
             "ijk,jk->ik", D[:2, :2], w[:2 * n].reshape(2, n))
 
     def turns(self, u: Array) -> Array:
-        """The angles of springs of sections, in (-pi, pi] about those without moment."""
+        """Angles of torsional springs relative to the free angles, in (-pi, pi]."""
         springs = [part for part in self.parts if part.kind == TORSION and part.numbers[0] > 0.0]
         out = np.empty((len(springs), len(u)))
         for row, part in zip(out, springs):
@@ -241,19 +241,19 @@ class Forces:
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
-        """The derivatives by the vectors, shape (size,)."""
+        """Derivatives by the vectors, shape (size,)."""
         D = np.zeros(self.size)
         element_stiffness(tables, t, u, v, factor, D)
         return D
 
     def firmnesses(self, tables: ForceTables, u: Array) -> Array:
-        """The largest stiffness of each element in any direction, shape (k,)."""
+        """Largest eigenvalue of the stiffness of each element, shape (k,)."""
         D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
         return np.array([np.linalg.norm(D[at], 2) for _, _, at in self._blocks])
 
     def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
                 factor: float) -> tuple[Array, Array, Array]:
-        """The same by the coordinates: rows, columns and values."""
+        """The stiffness in the DOFs: rows, columns and values."""
         D = self.stiffness(tables, t, u, v, factor)
         near, far = self._entries(False), self._entries(True)
         i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
@@ -263,10 +263,11 @@ class Forces:
 
     def add_own(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
-        """User-defined elements, as :func:`skfem_ancf.core.callbacks.own_elements` asks.
+        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.own_elements`.
 
-        ``what`` is 0: the mean force without velocity between places a and b; 1: what velocities b
-        add to the force at a; 2: the derivatives by places, and by velocities times a factor.
+        ``what`` is 0: the mean force at zero velocity between positions a and b; 1: the force at a
+        due to velocities b; 2: the derivatives by positions, plus a factor times those by
+        velocities.
         """
         for element, (rows, places) in zip(self.own, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
@@ -284,13 +285,12 @@ class Forces:
 
 
 _X, _I = np.zeros(0), np.zeros(0, np.int64)
-#: Of scenes without force elements.
+#: For scenes without force elements.
 NO_FORCES = ForceTables(_X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I,
                         0, NO_CONTACTS)
 
 
 def _resists(part):
-    """True if a part has a damping."""
     k, c, damping = part.numbers[:3]
     return {0: damping, 1: c, 2: c, 3: k or c}[part.kind] > 0.0
 

@@ -1,4 +1,4 @@
-"""Angles of rigid bodies, and of sections on which moments act, with their whole turns."""
+"""Rotations of rigid bodies and of sections with moments, with full turns."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..loads import EndMoment
 
 
 class Turns:
-    """The angles of a system by which moments have turned, and those of its rigid bodies.
+    """Rotations of sections with moments, then those of rigid bodies.
 
-    A displacement has them up to whole turns. They are followed from one to the next, between which
-    none changes by more than half a turn. Those of moments come first, in the order of the loads.
+    A displacement defines them up to full turns. They are tracked over a sequence of displacements
+    with changes of less than half a turn.
     """
 
     def __init__(self, system: Any) -> None:
@@ -28,7 +28,7 @@ class Turns:
             first[:, None, None] + [[2], [3]], np.ones((len(first), 1)), directions)]
 
     def angles(self, u: Array) -> Array:
-        """Angles from the reference configuration at displacements (n, N), in (-pi, pi]: (n, k)."""
+        """Rotations at displacements (n, N) in (-pi, pi]: (n, k)."""
         found = [np.zeros((len(u), 0))]
         for dofs, c, start in self._groups:
             d = start + np.einsum("nkim,km->nki", u[:, dofs], c)
@@ -37,12 +37,12 @@ class Turns:
         return np.concatenate(found, axis=1)
 
     def begin(self, u: Array) -> Array:
-        """The angles at a displacement (N,) of which nothing is known before, shape (k,)."""
+        """Rotations at a displacement (N,) without history, shape (k,)."""
         counted = [load.angle(u[self._system.of(load)]) for load in self._loads]
         return np.append(counted, self.angles(u[None])[0, self.moments:])
 
     def follow(self, last: Array, u: Array) -> Array:
-        """The angles at displacements one after the other."""
+        """Rotations at successive displacements."""
         if not self.number:
             return np.zeros((len(u), 0))
         return np.unwrap(np.vstack([last, self.angles(u)]), axis=0)[1:]

@@ -1,4 +1,4 @@
-"""A load that load factors do not scale, among the force elements."""
+"""A load that load factors do not scale, as a force element."""
 
 from __future__ import annotations
 

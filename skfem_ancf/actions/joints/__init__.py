@@ -38,7 +38,7 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
     joint
         A name from :data:`JOINTS`, or a Joint.
     **options
-        Arguments of the joint's class, where it is given by its name.
+        Arguments of the class, for a name.
     """
     if isinstance(joint, Joint):
         return joint

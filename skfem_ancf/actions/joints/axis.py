@@ -1,6 +1,6 @@
-"""The axis of a beam as a curve of its coordinates, and the point of it that is nearest to another.
+"""The axis of a beam as a curve, and the closest point on it.
 
-A point of the axis has the parameter s: the number of its element, and where in it, from 0 to 1.
+The parameter s of a point is the number of its element plus its xi in [0, 1].
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from ...beam.beam import Beam
 from ...core.types import Array
 from ...mesh.reference_cell import hermite_basis
 
-#: Points at least of an element among which the nearest is looked for first.
+#: Least number of sample points of an element for the initial search.
 SAMPLES = 5
-#: Iterations for the nearest point.
+#: Largest number of iterations for the closest point.
 ITERATIONS = 40
 
 
 class Axis:
-    """The axis of a beam: a polynomial of s in each element; ``first`` is the beam's first DOF."""
+    """The axis of a beam, a polynomial of s in each element; ``first`` is the beam's first DOF."""
 
     def __init__(self, beam: Beam, first: int) -> None:
         self.beam, self.first, degree = beam, first, beam.element.axis_degree
-        # the coordinates of the axis, by their derivatives of both nodes as Hermite functions are
+        # DOFs of the axis in the order of the Hermite functions
         along = np.array([-1 if across else a for _, a, across in beam.element.functionals])
         m, nb = (degree + 1) // 2, len(along)
         one = np.array([int(np.flatnonzero(along == k)[0]) for k in range(m)])
         self._used = np.concatenate([one, nb + one])
         self._slope = np.tile(np.arange(m), 2)
-        # coefficients of the functions, and of their derivatives by s: (4, nb, degree + 1), in
-        # powers of the distance from the middle of the element, where they stay small
+        # coefficients of the functions and their derivatives by s, (4, nb, degree + 1), in powers
+        # of the distance from the middle of the element
         self._powers = np.zeros((4, len(self._used), degree + 1))
         for k in range(degree + 1):
             self._powers[0, :, k] = hermite_basis(m, 0.5, k) / factorial(k)
@@ -46,22 +46,22 @@ class Axis:
         self._scales = beam.mesh.lengths[:, None] ** self._slope
 
     def _local(self, e: Any) -> Array:
-        """Coordinates of elements, (..., 2, nb)."""
+        """Nodal coordinates of elements, (..., 2, nb)."""
         first = np.asarray(self.beam.mesh.t[0, e] * self.beam.nd)
         return first[..., None, None] + 2 * self._used + np.arange(2)[:, None]
 
     def element(self, s: float) -> int:
-        """The element of a parameter: the nearest one beyond the ends."""
+        """The element at s; the end element beyond the ends."""
         return int(np.clip(np.floor(s), 0, self.beam.mesh.nelements - 1))
 
     def weights(self, s: float) -> tuple[Array, Array]:
-        """Coordinates of the scene, and their weights in the axis and its derivatives by s."""
+        """DOFs of the scene, and their weights in the axis and its derivatives by s."""
         e = self.element(s)
         xi = (s - e - 0.5) ** np.arange(self._powers.shape[2])
         return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
 
     def between(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
-        """Weights at two parameters, and quotients of their differences."""
+        """Weights at two parameters, and their divided differences."""
         (one, a), (two, b) = self.weights(s0), self.weights(s1)
         e, f = self.element(s0), self.element(s1)
         nb = one.shape[1]
@@ -79,12 +79,12 @@ class Axis:
         return dofs, weights, quotients
 
     def at(self, u: Array, s: float) -> Array:
-        """The position and its first three derivatives by s, shape (4, 2)."""
+        """Position and its first three derivatives by s, shape (4, 2)."""
         dofs, weights = self.weights(s)
         return weights @ self.places(u, dofs).T
 
     def nearest(self, u: Array, p: Array) -> float:
-        """The parameter of the point of the axis that is nearest to a point."""
+        """Parameter of the closest point of the axis to p."""
         q = self._start[self._all] + u[self.first + self._all]
         x = np.einsum("eck,ek,ks->ecs", q, self._scales, self._samples)
         gap = np.sum((x - p[:, None]) ** 2, axis=1)
@@ -102,10 +102,10 @@ class Axis:
         return s
 
     def places(self, u: Array, dofs: Array) -> Array:
-        """Coordinates of the axis, of the body with a displacement."""
+        """Nodal coordinates at a displacement."""
         return self._start[dofs - self.first] + u[dofs]
 
     def length(self, s: float) -> float:
-        """Length of the stress-free axis from its start to a parameter."""
+        """Length of the reference axis from its start to s."""
         e = self.element(s)
         return float(np.sum(self.beam.mesh.lengths[:e]) + (s - e) * self.beam.mesh.lengths[e])

@@ -1,4 +1,4 @@
-"""What every joint shares: constraint equations on points and sections of beams."""
+"""Base class of joints: constraint equations on points and sections of beams."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..places import Vector
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
-    """The entries of a Jacobian that are not zero."""
+    """Nonzero entries of a Jacobian."""
     none = np.zeros(0, dtype=int)
     rows, columns, values = [none], [none], [np.zeros(0)]
     for k, terms in enumerate(equations):
@@ -35,7 +35,7 @@ def gradients(*equations: list) -> tuple[Array, Array, Array]:
 
 
 def rotation(angle: float) -> Array:
-    """The matrix that turns by ``angle``."""
+    """The rotation matrix."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
 
@@ -43,40 +43,36 @@ def rotation(angle: float) -> Array:
 class Joint(Item):
     """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
 
-    A joint is bound to a scene by :meth:`bind`, which finds its points; from then on ``u`` is
-    the displacement of all coordinates of the scene. The multipliers are the forces (or moment)
-    that the joint exerts, in the order of :attr:`equations`.
-
-    A custom joint, for :meth:`skfem_ancf.Scene.add`, is a subclass that sets :attr:`equations` and
-    defines :meth:`bind`, :meth:`value`, :meth:`jacobian` or :meth:`entries`, and :meth:`curvature`
-    if it is not constant.
+    :meth:`bind` finds the points of a joint in a scene; ``u`` is the displacement of all its
+    degrees of freedom. The multipliers are the constraint forces (or moments), in the order of
+    :attr:`equations`. A user-defined joint, for :meth:`skfem_ancf.Scene.add`, is a subclass that
+    sets :attr:`equations` and defines :meth:`bind`, :meth:`value`, :meth:`jacobian` or
+    :meth:`entries`, and :meth:`curvature` if the Jacobian depends on u.
 
     Attributes
     ----------
     equations : tuple of str
-        What each equation holds.
+        Names of the equations.
     constant : bool
-        The derivative of Phi depends neither on u nor on t. Where it does,
+        The Jacobian depends neither on u nor on t. Otherwise
         :class:`~skfem_ancf.dynamics.EnergyMomentum` is exact if Phi is at most quadratic in u, or
         if :meth:`mean_entries` and :meth:`mean_turning` are exact.
     moving : bool
         Phi depends on t.
     tabled : bool
-        Of the package's own joints: Phi is at most quadratic in u, with second derivatives that do
-        not depend on t. Those of others are tried.
+        Phi is at most quadratic in u, with constant second derivatives; for joints of the package.
 
     Other Parameters
     ----------------
     beam, name
-        The beam, by Beam, name or number, None where there is only one; what messages call the
-        joint.
+        Beam, name or number, None where there is only one; name in messages.
     layout
         The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     u, v, t
         Displacement of the scene's degrees of freedom and a direction, shape (N,); time, in statics
         the load factor.
     multipliers
-        Those of the equations, shape (m,).
+        Lagrange multipliers, shape (m,).
     u0, u1, v0, v1
         Displacements and velocities at the ends of a step, shape (N,); ``t`` is in its middle.
     times, N
@@ -89,24 +85,24 @@ class Joint(Item):
     tabled = True
 
     def bind(self, layout: Layout) -> None:
-        """Find the points and sections; the scene calls it of a copy."""
+        """Find the points and sections; called on a copy."""
         raise NotImplementedError
 
     def value(self, u: Array, t: float) -> Array:
-        """The equations Phi, which are zero where the joint is closed; shape (m,)."""
+        """Residual Phi, shape (m,)."""
         raise NotImplementedError
 
     def jacobian(self, u: Array, t: float) -> Array:
-        """Derivative of Phi by u, shape (m, N); by default that of :meth:`entries`."""
+        """Derivative of Phi by u, shape (m, N); by default from :meth:`entries`."""
         rows, columns, values = self.entries(u, t)
         J = np.zeros((len(self.equations), len(u)))
         np.add.at(J, (rows, columns), values)
         return J
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """Rows, columns and values (k,) of :meth:`jacobian`; those at one place add up.
+        """Rows, columns and values (k,) of :meth:`jacobian`; repeated entries are summed.
 
-        By default they are looked for in the dense rows, which cost more the larger a scene is.
+        By default from the dense matrix, which is slow in large scenes.
         """
         J = self.jacobian(u, t)
         rows, columns = np.nonzero(J)
@@ -114,17 +110,17 @@ class Joint(Item):
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
-        """The sum over k of multipliers[k] d^2 Phi_k / du^2.
+        """Hessian, the sum over k of multipliers[k] d^2 Phi_k / du^2.
 
         Returns
         -------
         rows, columns, values
-            Shapes (k,); or None if the derivative of Phi is constant.
+            Shapes (k,); or None if the Jacobian is constant.
         """
         return None
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        """The second derivative of Phi in a direction v, shape (m,)."""
+        """Second directional derivative of Phi along v, shape (m,)."""
         out = np.zeros(len(self.equations))
         for k, unit in enumerate(np.eye(len(out))):
             second = self.curvature(u, t, unit)
@@ -135,7 +131,7 @@ class Joint(Item):
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
 
-        By default that in the middle, which is one where Phi is quadratic.
+        By default the Jacobian in the middle, exact for quadratic Phi.
         """
         return self.entries(0.5 * (u0 + u1), t)
 
@@ -152,7 +148,7 @@ class Joint(Item):
         return -0.25 * np.bincount(rows, values * v[columns], len(v))
 
     def lost(self, u: Array) -> str:
-        """Why the joint cannot hold in a converged state, in words; "" if it can."""
+        """Reason why a converged state violates the joint; "" if it does not."""
         return ""
 
     def offset(self, times: Array, N: int) -> Array:
@@ -162,15 +158,15 @@ class Joint(Item):
 
     @property
     def turning(self) -> bool:
-        """True if the derivative of Phi in the reference configuration depends on time."""
+        """True if the Jacobian in the reference configuration depends on time."""
         return self.moving and not self.constant
 
     def moved(self, times: Array, N: int) -> Array:
-        """Those columns of :meth:`offset` that depend on time, shape (n, k)."""
+        """Time-dependent columns of :meth:`offset`, shape (n, k)."""
         return self.offset(times, N)
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        """The derivative of Phi in the reference configuration at several times.
+        """Jacobian in the reference configuration at several times.
 
         Returns
         -------
@@ -185,7 +181,7 @@ class Joint(Item):
         return rows, columns, values[None].repeat(len(times), axis=0)
 
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
-        """The second derivatives of Phi in the reference configuration.
+        """Second derivatives of Phi in the reference configuration.
 
         Returns
         -------
@@ -212,12 +208,12 @@ class Joint(Item):
 
 
 def bind_joint(joint: Joint, layout: Layout) -> Joint:
-    """A copy of a joint, bound to a scene and tried there; or InputError.
+    """A copy of a joint, bound to a scene and checked.
 
     Parameters
     ----------
     joint, layout
-        As it was given, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
+        The unbound joint, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
     """
     bound = joint._thawed()
     hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
@@ -242,13 +238,13 @@ def _try(joint: Joint, n: int) -> None:
 
 
 def require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
-    """Raise InputError unless jacobian and curvature of a joint of the user's fit its value."""
+    """Raise InputError unless jacobian and curvature of a user-defined joint fit its value."""
     multipliers = np.cos(np.arange(len(joint.equations)))
     try:
         value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
         J, *others = (joint.jacobian(u + s * d, 0.0) for s in (0.0, -1.0, 1.0))
         found = joint.curvature(u, 0.0, multipliers)
-    except Exception:  # it may be open too far there
+    except Exception:  # it may not be defined there
         return
     require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values[1] - values[0],
                   2.0 * (J @ d), 1e-13 * max(1.0, np.abs(value).max()) * np.abs(sizes).max())
@@ -270,28 +266,28 @@ def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
 
 
 def angle_to(d: ArrayLike, e: ArrayLike) -> float:
-    """The angle from a plane vector e to another one d, in (-2 pi, 2 pi)."""
+    """Angle from a plane vector e to another one d, in (-2 pi, 2 pi)."""
     return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
 
 
 class Aligned:
-    """``(Q e) x d``, zero where a vector d has the direction of another one e turned by Q."""
+    """``(Q e) x d``: zero if d is parallel to e rotated by Q."""
 
     def __init__(self, d: Vector, e: Vector, Q: Array) -> None:
         self.d, self.e, self.Q = d, e, Q
 
     def value(self, u: Array) -> float:
-        """The number at displacements u (N,) of the scene's coordinates."""
+        """The value at displacements u (N,) of the scene."""
         e, d = self.Q @ self.e(u), self.d(u)
         return e[0] * d[1] - e[1] * d[0]
 
     def terms(self, u: Array) -> list[Any]:
-        """Its derivative, as :func:`gradients` takes it."""
+        """Its derivative, for :func:`gradients`."""
         e, d = self.Q @ self.e(u), self.d(u)
         return [(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ self.Q)]
 
     def second(self, factor: float) -> tuple[Array, Array, Array]:
-        """Its second derivative times a number: rows, columns and values (k,), both halves."""
+        """A factor times its second derivative: rows, columns and values (k,), both halves."""
         J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ self.Q  # d x c = d^T [[0, 1], [-1, 0]] c
         values = np.einsum("ij,ik,jl->ikjl", J, self.d.weights, self.e.weights)
         rows = np.broadcast_to(self.d.dofs[:, :, None, None], values.shape).ravel()

@@ -1,4 +1,4 @@
-"""The director of a rigid body keeps its length."""
+"""Unit length of the director of a rigid body."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class UnitDirector(Joint):
         self.dofs, self.start = first + 2 + np.arange(2), body.q0[2:]
 
     def value(self, u: Array, t: float) -> Array:
-        du = u[self.dofs]  # of the start d . d is 1 but for round-off
+        du = u[self.dofs]  # d . d = 1 in the reference configuration
         return np.array([self.start @ du + 0.5 * (du @ du)])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:

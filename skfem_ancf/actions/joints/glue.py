@@ -1,4 +1,4 @@
-"""A boundary of a domain is glued to a beam, a rigid body, another domain or the ground."""
+"""Bond between a boundary of a domain and another member (mortar method)."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from ...mesh.places import facets_of, is_point
 from ..places import is_ground
 from .base import Joint
 
-#: Entries of an equation, over the largest, that are round-off.
+#: Round-off relative to the largest entry of an equation.
 ROUND_OFF = 1e-14
 
 
 class Glue(Joint):
-    """The boundary of a domain moves with the surface of another member: the mortar method.
+    """The boundary of a domain bonded to the surface of another member: the mortar method.
 
-    For each test function of the domain on the boundary the integral of it times the difference of
-    the displacements is zero: the trace of the domain is the L2 projection of the displacement of
-    the other one, which may be the end or the side of a beam with sections, anything of a rigid
-    body or another domain, and the ground. The equations are linear and do not change.
+    For each test function of the domain on the boundary, its integral times the difference of the
+    displacements is zero: the trace of the domain is the L2 projection of the other displacement.
+    The other member may be the end or a side of a beam with sections, a rigid body, another domain
+    or the ground. The equations are linear and constant.
 
     Parameters
     ----------
     domain, boundary
-        The :class:`~skfem_ancf.Domain`, its name or its number, and a boundary of its mesh.
+        The :class:`~skfem_ancf.Domain`, its name or number, and a boundary of its mesh.
     other, place
-        The other member, and of a beam its place, as "left" or "top".
+        The other member, and for a beam its place, as "left" or "top".
     name
-        What messages call the joint.
+        Name in messages.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class Glue(Joint):
         self.equations = tuple(f"force along {'xy'[c]}" for c in tests % 2)
 
     def _surface(self, layout: Layout, x: Array) -> tuple[Array, Array]:
-        """Numbers and weights of the DOFs in the displacement of points, (2, k, n) both."""
+        """DOFs and weights in the displacement of points, (2, k, n) both."""
         other, domain = layout.beam(self.other), layout.beam(self.domain)
         try:
             if isinstance(other, Domain):
@@ -114,7 +114,7 @@ class Glue(Joint):
 
 
 def _of_beam(beam: Beam, x: Array, place: Any) -> tuple[Array, Array]:
-    """As :meth:`Glue._surface`, of a beam with sections."""
+    """:meth:`Glue._surface` for a beam with sections."""
     e, X, _ = beam.finder.inside(x)
     if place is not None and not is_point(place):
         cells = np.unique(beam.mesh.f2t[:, facets_of(beam.mesh, place)])

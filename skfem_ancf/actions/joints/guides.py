@@ -1,4 +1,4 @@
-"""A point of a beam slides on a line or on a circle."""
+"""A material point on a fixed line or circle."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class OnLine(Joint):
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the reference configuration.
+        The material point (x, y) in the reference configuration.
     direction
         Direction of the line, shape (2,).
     through
-        A point of the line, shape (2,); the material point's stress-free place by default.
+        A point of the line, shape (2,); by default the material point's reference position.
     """
 
     equations = ("force normal to the line",)
@@ -54,11 +54,11 @@ class OnCircle(Joint):
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the reference configuration.
+        The material point (x, y) in the reference configuration.
     center
         Centre of the circle, shape (2,).
     radius
-        Its radius; the distance of the stress-free point by default.
+        Its radius; by default the distance of the point in the reference configuration.
     """
 
     equations = ("force away from the centre",)
@@ -75,7 +75,7 @@ class OnCircle(Joint):
         self.R = self.radius or require_positive(
             "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
         if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):
-            raise InputError(f"radius = {self.R!r} is nothing beside the distance of the point "
+            raise InputError(f"radius = {self.R!r} is negligible against the distance of the point "
                              "from the centre")
 
     def value(self, u: Array, t: float) -> Array:

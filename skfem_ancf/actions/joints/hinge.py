@@ -1,4 +1,4 @@
-"""Two beams or more share a point and turn freely about it."""
+"""Hinge between two or more beams."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .base import Joint, equations_of, gradients
 
 
 class Hinge(Joint):
-    """r_a = r_b for a material point of each of two beams, and of a third, and so on.
+    """r_a = r_b for a material point of two beams, and of further ones; rotations are free.
 
     Parameters
     ----------
     beams
-        Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
+        Two or more, each a Beam or a RigidBody, its name or number, or "ground".
     at
-        The point, its place (x, y) in the reference configuration; or one point for each beam, if
-        they are apart. None is the centre of mass of a rigid body.
+        The point (x, y) in the reference configuration; or one point for each beam, if they are
+        apart. None is the centre of mass of a rigid body.
     """
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:

@@ -1,4 +1,4 @@
-"""A motor turns a section or a rigid body."""
+"""A motor rotates a section or a rigid body."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from .prescribed import PrescribedAngle, PrescribedTurn, Turned
 
 
 class Motor(Item):
-    """Turn a rigid body or a section: by a given angle, at a given speed, or with a torque.
+    """Rotate a rigid body or a section by a given angle, at a given speed, or with a torque.
 
-    A torque that depends on the state is a :class:`~skfem_ancf.Control`.
+    For a torque that depends on the state use a :class:`~skfem_ancf.Control`.
 
     Parameters
     ----------
     at
         A RigidBody, or (beam, place) with a place that is one section, as (0, "left").
     angle
-        The angle from that of the start as a function of time, in radians.
+        Rotation from the start as a function of time, in radians.
     speed
-        Angular velocity, a number or a function of time: the angle is its integral from the time 0.
+        Angular velocity, a number or a function of time, integrated from time 0.
     torque
-        Moment, a number or a function of time; a function counts as one in statics, as every
-        amplitude.
+        Moment, a number or a function of time; a function is 1 in statics, as every amplitude.
     other
-        What the motor stands on, as ``at``: the angle is measured from it, and it takes the torque
-        with the opposite sign. The ground by default.
+        The base of the motor, as ``at``: the angle is relative to it, and it takes the opposite
+        torque. The ground by default.
     """
 
     def __init__(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,

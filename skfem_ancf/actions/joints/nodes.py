@@ -1,4 +1,4 @@
-"""The nodes of a frame: the ends of its lines that meet, all at once."""
+"""The nodes of a frame: all connections between the ends of its lines."""
 
 from __future__ import annotations
 
@@ -21,36 +21,35 @@ FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
 
 
 class Nodes(Joint):
-    """Ends that meet at a node share its position, and those that are rigid its rotation.
+    """Ends that meet at a node share its position; rigid ends share its rotation, too.
 
-    The ends are those of all chains of all beams: first the start and the end of the first chain of
-    the first beam. At each node the first rigid end, or else the first, leads the others: the
-    equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the direction g of a section,
-    seen from that of the reference configuration, as in :class:`~skfem_ancf.actions.joints.Weld`;
-    then those of what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader.
-    Unknowns of the nodes take the place of the multipliers where the linear systems are solved, see
-    :mod:`skfem_ancf.equations.condensation`.
+    The ends are those of all chains of all beams: start and end of the first chain of the first
+    beam come first. At each node the first rigid end, or else the first, is the leader. The
+    equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the section direction g
+    relative to the reference configuration, as in :class:`~skfem_ancf.actions.joints.Weld`; then
+    for supports of the leader ``r - r_0 = d`` and ``(cos a, sin a) x g = 0``. Linear solvers use
+    unknowns of the nodes instead of the multipliers, see :mod:`skfem_ancf.equations.condensation`.
 
     Parameters
     ----------
     nodes, hinged
-        The node of each end, and whether it may turn against that, shape (ends,).
+        The node of each end, and whether it is hinged, shape (ends,).
     held
-        Whether the positions along x and y and the rotation of each node are held, (number, 3).
+        Whether position x, y and rotation of each node are fixed, (number, 3).
     net, lines
-        The graph that has the nodes, and the number of the line of each chain, (ends / 2,).
+        The frame graph, and the number of the line of each chain, (ends / 2,).
     settled
-        What held nodes are displaced by.
+        Prescribed displacements of supports.
 
     Attributes
     ----------
     leader, followers, turned
-        The end that leads at the node of each end; ends that follow, and those that turn with it.
+        The leading end at the node of each end; following ends, and those with equal rotation.
     held_x, held_y, held_angle
-        Leading ends that are held.
+        Leading ends with supports.
     positions, directions, weights
-        DOFs of each end's position, (ends, 2), and of the direction of its section, (2, ends, n),
-        with weights, (ends, n): zero where a beam has less of them.
+        DOFs of each end's position, (ends, 2), and of its section direction, (2, ends, n), with
+        weights (ends, n), padded with zeros.
     """
 
     constant = False
@@ -62,7 +61,7 @@ class Nodes(Joint):
         #: functions of time of these
         self.functions = self.settled.functions
         self.net, self.lines = net, lines
-        # rigid ends before hinged ones: the first of each node leads
+        # rigid ends come before hinged ones: the first of each node is its leader
         order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
         _, first = np.unique(nodes[order], return_index=True)
         self.leaders = order[first]
@@ -80,7 +79,7 @@ class Nodes(Joint):
 
     @property
     def moving(self) -> bool:  # type: ignore[override]
-        """True if a node is given a displacement."""
+        """True if a node has a prescribed displacement."""
         return any(self.settled.moves(k) for k in range(len(HELD)))
 
     @property
@@ -88,12 +87,12 @@ class Nodes(Joint):
         return self.settled.moves(HELD.index("angle"))
 
     def _shifts(self, times: Array) -> list[Array]:
-        """What held ends are displaced by: along x and y, and angles, shapes (n, k) each."""
+        """Prescribed displacements along x and y, and rotations, shapes (n, k) each."""
         ends = self.held_x, self.held_y, self.held_angle
         return [self.settled.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
 
     def leading(self, nodes: Array) -> Array:
-        """The ends that lead at some nodes, shape (k,)."""
+        """Leading ends of nodes, shape (k,)."""
         return self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
 
     def bind(self, layout: Layout) -> None:
@@ -111,11 +110,11 @@ class Nodes(Joint):
             [d, np.repeat(d[..., :1], n - d.shape[2], axis=2)], axis=2) for d in directions], 1)
         self.weights = np.concatenate([np.pad(c, ((0, 0), (0, n - c.shape[1]))) for c in weights])
         self.positions, self.start = np.concatenate(positions), np.concatenate(start)
-        #: what takes directions to the frame of the reference configuration, as complex numbers
+        #: rotations to the frame of the reference configuration, as complex numbers
         self.frame = 1.0 / self.start
 
     def turns(self, u: Array) -> Array:
-        """The direction of each end's section, seen from that of the reference configuration."""
+        """Section direction of each end relative to the reference configuration."""
         d = u[self.directions]
         return 1.0 + self.frame * np.sum(self.weights * (d[0] + 1j * d[1]), axis=1)
 
@@ -140,7 +139,7 @@ class Nodes(Joint):
 
     @cached_property
     def _pattern(self) -> tuple[Array, Array, Array]:
-        """Rows and columns of all entries, and the values of the equations of positions."""
+        """Rows and columns of all entries, and the values of the position equations."""
         s, n, k = self.followers, len(self.followers), len(self.turned)
         m, row = self.leader[s], np.arange(len(self.followers))
         x, y = self.positions.T
@@ -170,7 +169,7 @@ class Nodes(Joint):
         return rows[keep], columns[keep], values[keep]
 
     def _values(self, u: Array, t: float) -> Array:
-        """Of :meth:`entries`, with those that are zero; turns of held ends are the last."""
+        """Values of :meth:`entries` with zeros; rotations of supports come last."""
         g, s = self.turns(u), self.turned
         m = self.leader[s]
         return np.concatenate([
@@ -179,12 +178,12 @@ class Nodes(Joint):
 
     @cached_property
     def _places(self) -> Any:
-        """Where the values go in :meth:`derivative`, whose data are their numbers."""
+        """Positions of the values in :meth:`derivative`."""
         rows, columns, _ = self._pattern
         return sparse.csr_array((np.arange(len(rows)), (rows, columns)))
 
     def derivative(self, u: Array, t: float) -> sparse.csr_array:
-        """The derivative of :meth:`value`, shape (m, N), of one pattern."""
+        """Derivative of :meth:`value`, shape (m, N), with constant sparsity."""
         at = self._places
         return sparse.csr_array((self._values(u, t)[at.data], at.indices, at.indptr),
                                 shape=(len(self.equations), len(u)))
@@ -222,14 +221,14 @@ class Nodes(Joint):
         return np.bincount(k, values * v[i] * v[j], len(self.equations))
 
     def split(self, multipliers: Array) -> tuple[Array, ...]:
-        """Forces (followers, 2) and moments (turned,) of followers, and those that hold nodes."""
+        """Forces (followers, 2) and moments (turned,) of followers, and support reactions."""
         n = len(self.followers)
         sizes = [n, n, len(self.turned), len(self.held_x), len(self.held_y)]
         x, y, *others = np.split(multipliers, np.cumsum(sizes))
         return np.stack([x, y], axis=1), *others
 
     def reaction(self, place: Any, u: Array, multipliers: Array) -> tuple[Array, float, dict]:
-        """What holds some nodes: force, moment about the first of them, and both by name."""
+        """Reaction of some nodes: force, moment about the first of them, and both by name."""
         out, nodes = np.zeros(self.held.shape), self.net.nodes_at(place)
         ends = self.held_x, self.held_y, self.held_angle
         for k, (at, part) in enumerate(zip(ends, self.split(multipliers)[2:])):
@@ -242,7 +241,7 @@ class Nodes(Joint):
         return np.array([x.sum(), y.sum()]), float(np.sum(moment + a * y - b * x)), total
 
     def parts(self) -> Array:
-        """Of each chain the number of the rigid part it is in: lines that are joined rigidly."""
+        """Number of the rigidly connected group of lines of each chain."""
         n = len(self.nodes) // 2
         links = sparse.coo_array((np.ones(len(self.turned)),
                                   (self.turned // 2, self.leader[self.turned] // 2)), (n, n))
@@ -250,7 +249,7 @@ class Nodes(Joint):
 
     def held_motions(self, parts: Array, origin: Array, size: float,
                      number: int) -> sparse.csr_array:
-        """What nodes and supports hold of the motions of rigid parts, one row each."""
+        """Constraints of nodes and supports on the rigid motions of groups, one row each."""
         part = np.repeat(parts, 2)
         x, y = (self.net.points[:, self.nodes] - origin[:, None]) / size
         one = np.ones(len(x))
@@ -271,7 +270,7 @@ class Nodes(Joint):
             shape=(count, 3 * number))
 
     def describe(self, parts: Array) -> list[str]:
-        """Which rigid parts are meant, for messages."""
+        """Names of rigid groups, for messages."""
         _, first = np.unique(parts, return_index=True)
         if len(first) == 1:
             return [""]
@@ -282,13 +281,13 @@ class Nodes(Joint):
 
 
 def chain_ends(beam: Beam) -> Array:
-    """The first and the last node of each chain of a beam's mesh, shape (chains, 2)."""
+    """First and last node of each chain of a beam's mesh, shape (chains, 2)."""
     left, right = beam.mesh.t
     return np.stack([np.setdiff1d(left, right), np.setdiff1d(right, left)], axis=1)
 
 
 def _directions(beam: Beam, nodes: Array) -> tuple[Any, Array]:
-    """Coordinates (2, nodes, n) and weights (nodes, n) of the directions of sections."""
+    """DOFs (2, nodes, n) and weights (nodes, n) of section directions."""
     if beam.mesh.heights is None:
         dofs, c = direction(beam, int(nodes[0]))
         shift = beam.nd * (nodes - nodes[0])

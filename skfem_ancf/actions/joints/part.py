@@ -1,4 +1,4 @@
-"""Some of the equations of a joint."""
+"""Independent equations of a joint."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .base import Joint
 
 
 class Part(Joint):
-    """Those equations of a bound joint, by increasing numbers, that do not repeat others."""
+    """The independent equations of a bound joint, by increasing numbers."""
 
     def __init__(self, joint: Joint, kept: Array) -> None:
         self.joint, self.kept = joint, kept
@@ -27,17 +27,17 @@ class Part(Joint):
     def __repr__(self) -> str:
         return repr(self.joint)
 
-    def bind(self, layout: Layout) -> None:
-        """The joint is bound already."""
+    def bind(self, layout: Layout) -> None:  # the joint is bound already
+        pass
 
     def _of(self, rows: Array, *others: Array) -> tuple[Any, ...]:
-        """Entries of the equations kept; of arrays (n, k) columns."""
+        """Entries of the remaining equations; for arrays (n, k) columns."""
         rows = self._number[rows]
         keep = rows >= 0
         return (rows[keep], *(x[..., keep] for x in others))
 
     def _all(self, multipliers: Array) -> Array:
-        """Multipliers of all equations, zero for those that are left out."""
+        """Multipliers of all equations, zero for the omitted ones."""
         out = np.zeros(len(self._number))
         out[self.kept] = multipliers
         return out

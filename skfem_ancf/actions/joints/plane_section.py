@@ -1,4 +1,4 @@
-"""An end section keeps its direction as a plane, and may change its thickness."""
+"""An end section with fixed direction and free thickness."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .base import Joint, gradients
 
 
 class PlaneSection(Joint):
-    """t . r_Y = 0 at every section point: no section slope leaves the stress-free plane.
+    """t . r_Y = 0 at every section point: section slopes stay in the reference plane.
 
-    For a cable, n . r_X = 0. On a beam along a coordinate axis it only fixes coordinates.
+    For a cable, n . r_X = 0. On a beam along a coordinate axis it only fixes degrees of freedom.
 
     Parameters
     ----------

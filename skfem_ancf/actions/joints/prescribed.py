@@ -1,4 +1,4 @@
-"""A point or a section follows a given motion."""
+"""Prescribed motion of a point or a section."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from ...core.types import Array
 from ..places import both_of, point, section
 from .base import Aligned, Joint, angle_to, gradients, rotation
 
-#: Pieces of an integral over time, at most.
+#: Largest number of intervals of an integral over time.
 PIECES = 500
 
 
 class PrescribedPosition(Joint):
-    """r = r(t) for a material point. At a node of the axis it only fixes coordinates.
+    """r = r(t) for a material point. At a node of the axis it only fixes degrees of freedom.
 
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the reference configuration, or the name of an end;
-        of a RigidBody, which may stand here too, its centre of mass if no point is given.
+        The material point (x, y) in the reference configuration, or the name of an end; or a
+        RigidBody, for its centre of mass unless a point is given.
     r
-        The motion: a function of time that returns the position (2,).
+        Function of time that returns the position (2,).
     """
 
     equations = ("force along x", "force along y")
@@ -58,18 +58,18 @@ class PrescribedPosition(Joint):
 
 
 class PrescribedAngle(Joint):
-    """The direction of a section or a rigid body has turned by angle(t): e(t) x d = 0.
+    """Prescribed rotation of a section or a rigid body: e(t) x d = 0.
 
     Parameters
     ----------
     at
-        The section, as "left" or "right" or a point through which it goes; a RigidBody. Not asked
-        for where ``beam`` is a RigidBody.
+        The section, as "left" or "right" or a point on it; a RigidBody. Not needed if ``beam`` is a
+        RigidBody.
     angle
-        The angle in radians as a function of time, from the reference configuration,
+        Rotation from the reference configuration as a function of time, in radians,
         counterclockwise.
     beam
-        The beam, by Beam, name or number; None where there is only one. Or a RigidBody.
+        Beam, name or number; None where there is only one. Or a RigidBody.
     """
 
     equations = ("moment",)
@@ -105,7 +105,7 @@ class PrescribedAngle(Joint):
 
 
 class Turned:
-    """The integral of an angular velocity, a number or a function, from the time 0."""
+    """The integral of an angular velocity, a number or a function, from time 0."""
 
     def __init__(self, speed: float | Callable[[float], float]) -> None:
         self.speed = require_function("speed", speed, "of time that returns radians per time") if (
@@ -120,15 +120,15 @@ class Turned:
 
 
 class PrescribedTurn(Joint):
-    """The angle between two sections or rigid bodies grows by angle(t): d x (R(t) e) = 0.
+    """Prescribed relative rotation of two sections or rigid bodies: d x (R(t) e) = 0.
 
     Parameters
     ----------
     at, other
         Each (beam, place) with a Beam, a RigidBody, a name or a number, and a place as for
-        :class:`PrescribedAngle`. What turns, and from what its angle is measured.
+        :class:`PrescribedAngle`: the rotated section, and the reference.
     angle
-        The angle in radians as a function of time, from the reference configuration,
+        Relative rotation from the reference configuration as a function of time, in radians,
         counterclockwise.
     """
 

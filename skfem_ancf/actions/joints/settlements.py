@@ -1,4 +1,4 @@
-"""Displacements and rotations that the nodes of a frame are given."""
+"""Prescribed displacements and rotations of the nodes of a frame."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 from ...core.sampling import sample
 from ...core.types import Array
 
-#: What may be held of a node.
+#: Components of a node's motion that can be fixed.
 HELD = "x", "y", "angle"
 
 
 class Settlements:
-    """What held nodes are displaced by: along x, along y, and in radians.
+    """Prescribed displacements of supports along x and y, and rotations in radians.
 
-    ``numbers``, (n, 3), are in proportion to the load of a static solution; ``functions`` of time,
-    in statics of the load factor, take the place of those at the node and the number in
-    :data:`HELD` that ``at`` says.
+    ``numbers``, (n, 3), are proportional to the load factor of a static solution. ``functions`` of
+    time, in statics of the load factor, replace those of the node and the component of :data:`HELD`
+    in ``at``.
     """
 
     def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),
@@ -29,7 +29,7 @@ class Settlements:
                          for f, (_, k) in zip(self.functions, self.at)]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
-        """The same with nodes displaced by a number or a function of time."""
+        """A copy with nodes displaced by a number or a function of time."""
         numbers, new = self.numbers.copy(), {(int(node), k) for node in nodes}
         kept = [(f, at) for f, at in zip(self.functions, self.at) if at not in new]
         if callable(by):
@@ -40,11 +40,11 @@ class Settlements:
         return Settlements(numbers, [f for f, _ in kept], [at for _, at in kept])
 
     def moves(self, k: int) -> bool:
-        """True if a node is displaced in the way number k."""
+        """True if a node is displaced in component k."""
         return bool(np.any(self.numbers[:, k])) or any(way == k for _, way in self.at)
 
     def by(self, nodes: Array, k: int, times: Array) -> Array:
-        """What nodes are displaced by at some times, shape (n, m)."""
+        """Displacements of nodes at some times, shape (n, m)."""
         out = np.multiply.outer(times, self.numbers[nodes, k])
         for sampled, (node, way) in zip(self._sampled, self.at):
             if way == k:

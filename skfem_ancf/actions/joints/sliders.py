@@ -1,4 +1,4 @@
-"""A point slides along the axis of a beam, or along a straight line of a rigid body."""
+"""Sliders: a point on the axis of a beam, or on a straight line of a rigid body."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from .axis import Axis
 from .base import Aligned, Joint, angle_to, gradients, rotation
 from .spans import Family, Product, Span
 
-#: How far beyond an end of a beam a sleeve may be, in elements.
+#: Tolerance beyond an end of a beam, in elements.
 BEYOND = 1e-6
-#: Displacements whose nearest points are cached, of all sleeves.
+#: Size of the cache of closest points, for all sleeves.
 KNOWN = 64
 
 
 def _pairs(A: Array, B: Array) -> Array:
-    """a_i x b_j of the columns of two matrices, made symmetric."""
+    """a_i x b_j of the columns of two matrices, symmetrised."""
     M = np.outer(A[0], B[1]) - np.outer(A[1], B[0])
     return M + M.T
 
 
 def _dots(A: Array, B: Array) -> Array:
-    """a_i . b_j of the columns of two matrices, made symmetric."""
+    """a_i . b_j of the columns of two matrices, symmetrised."""
     M = A.T @ B
     return M + M.T
 
 
 def _placed(*dofs: Array) -> tuple[Array, Any]:
-    """All DOFs of vectors, (n,), and what makes rows (..., 2, n) of the weights of one of them."""
+    """All DOFs of vectors, (n,), and a function from weights of one to rows (..., 2, n)."""
     columns = np.concatenate([x.ravel() for x in dofs])
     first = np.cumsum([0, *(x.size for x in dofs)])
 
@@ -55,10 +55,10 @@ def _placed(*dofs: Array) -> tuple[Array, Any]:
 class Sleeve(Joint):
     """A material point slides along the axis of a beam.
 
-    With the point p and the point c(s) of the axis that is nearest to it, ``c'(s) . (p - c(s)) =
-    0``, the equation is ``c'(s) x (p - c(s)) = 0``, c' the derivative by the length of the
-    stress-free axis. So s is no coordinate, and the multiplier is the force normal to the axis over
-    its stretch. With ``angle`` the direction of the point's section keeps its angle with c'.
+    With the point p and its closest point c(s) on the axis, ``c'(s) . (p - c(s)) = 0``, the
+    equation is ``c'(s) x (p - c(s)) = 0``, with the derivative c' by the reference length. Thus s
+    is not an unknown, and the multiplier is the normal force over the stretch of the axis. With
+    ``angle`` the section of the point keeps its angle to c'.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ class Sleeve(Joint):
         The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, or
         ("ground", (x, y)); a RigidBody for its centre of mass.
     on
-        The beam along which it slides, its name or its number.
+        The beam along which it slides, its name or number.
     angle
-        Keep the angle: a sleeve that carries a moment.
+        Keep the angle: the sleeve transmits a moment.
 
     References
     ----------
     Hong, Ren: "Modeling of sliding joint on one-dimensional flexible medium", Multibody System
-    Dynamics 26 (2011), who have s as a coordinate.
+    Dynamics 26 (2011), with s as an unknown.
     """
 
     constant = tabled = False
@@ -107,7 +107,7 @@ class Sleeve(Joint):
         return not -BEYOND <= s <= self.axis.beam.mesh.nelements + BEYOND
 
     def distance(self, u: Array) -> float:
-        """Where the point is: the length of the stress-free axis from its left end."""
+        """Location of the point: reference length of the axis from its left end."""
         return self.axis.length(self._parameter(np.asarray(u)))
 
     def lost(self, u: Array) -> str:
@@ -134,9 +134,9 @@ class Sleeve(Joint):
 
     @array_cache(KNOWN)
     def _slopes(self, u: Array) -> tuple[Any, ...]:
-        """The derivatives of the equations and of s, and what they are made of.
+        """Derivatives of the equations and of s, and intermediate results.
 
-        Derivatives c and C of the axis and of its weights are by the length of the reference axis.
+        Derivatives c and C of the axis and of its weights are by the reference length.
         """
         s = self._parameter(u)
         dofs, weights = self.axis.weights(s)
@@ -183,7 +183,7 @@ class Sleeve(Joint):
 
     @array_cache(KNOWN)
     def _span(self, u0: Array, u1: Array) -> Span:
-        """The :class:`~skfem_ancf.actions.joints.spans.Span` from one displacement to another."""
+        """The :class:`~skfem_ancf.actions.joints.spans.Span` between two displacements."""
         ends = u0, u1
         s = [self._parameter(u) for u in ends]
         dofs, weights, quotients = self.axis.between(*s)
@@ -226,7 +226,7 @@ class Sleeve(Joint):
 class Slot(Joint):
     """A material point slides along a straight line of a rigid body, or of the ground.
 
-    ``e x (p - b) = 0``, with a point b of the body and a direction e that turns with it.
+    ``e x (p - b) = 0``, with a point b of the body and a direction e that rotates with it.
 
     Parameters
     ----------
@@ -234,14 +234,14 @@ class Slot(Joint):
         The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number; a RigidBody for its
         centre of mass.
     on
-        The body, its name or its number, or "ground"; a Beam for a line that is carried by the
-        section at ``through``.
+        The body, its name or number, or "ground"; a Beam for a line fixed to the section at
+        ``through``.
     direction
-        Direction of the line in the state of the start, shape (2,).
+        Initial direction of the line, shape (2,).
     through
-        A point of the line there, shape (2,); the material point by default.
+        A point of the initial line, shape (2,); the material point by default.
     angle
-        Keep the angle between the point's section and the line: a moment is carried.
+        Keep the angle between the point's section and the line: a moment is transmitted.
     """
 
     constant = False

@@ -1,18 +1,18 @@
-"""What the equations of a sleeve do between two displacements, exactly.
+"""Discrete gradients of the equations of a sleeve between two displacements.
 
-At a fixed parameter s of the axis they are products of two vectors that are affine in the
-coordinates, ``f(u, s) = x(u, s) . y(u, s)`` or ``x x y``, and s is where one of them, G, is zero.
-From (u_0, s_0) to (u_1, s_1) such a product changes by ::
+At fixed s the equations are products of two vectors that are affine in the degrees of freedom,
+``f(u, s) = x(u, s) . y(u, s)`` or ``x x y``, and s is the zero of one of them, G. From (u_0, s_0)
+to (u_1, s_1) such a product changes by ::
 
     f_1 - f_0 = f_u . (u_1 - u_0) + f_s (s_1 - s_0)
     f_u = (f_u(u_m, s_0) + f_u(u_m, s_1)) / 2,   u_m = (u_0 + u_1) / 2
-    f_s = (f[u_0; s_0, s_1] + f[u_1; s_0, s_1]) / 2,   f[u; s_0, s_1] a quotient of differences
+    f_s = (f[u_0; s_0, s_1] + f[u_1; s_0, s_1]) / 2,   f[u; s_0, s_1] a divided difference
 
-without a remainder, over boundaries of elements too. With ``0 = G_1 - G_0`` the row
-``D = f_u - (f_s / G_s) G_u`` meets ``D . (u_1 - u_0) = f_1 - f_0``: a discrete gradient (Gonzalez:
-"Time integration and discrete Hamiltonian systems", Journal of Nonlinear Science 6, 1996). Moving
-and turning the whole scene about its middle changes neither products nor quotients: D keeps both
-momenta.
+exactly, also across element boundaries. With ``0 = G_1 - G_0`` the row
+``D = f_u - (f_s / G_s) G_u`` satisfies ``D . (u_1 - u_0) = f_1 - f_0``: a discrete gradient
+(Gonzalez: "Time integration and discrete Hamiltonian systems", Journal of Nonlinear Science 6,
+1996). Products and divided differences are invariant under rigid motions of the scene, so D
+conserves both momenta.
 """
 
 from __future__ import annotations
@@ -24,21 +24,20 @@ import numpy as np
 
 from ...core.types import Array
 
-#: Lengths of a way, in elements, below which nothing is divided by it.
+#: Least ``way``, in elements, by which is divided.
 TINY = 1e-9
 
 
 def _mean(pair: Any) -> Array:
-    """The mean of two."""
     return 0.5 * (pair[0] + pair[1])
 
 
 class Family(NamedTuple):
-    """A vector, affine in the DOFs, at both parameters, and its quotient between them.
+    """A vector, affine in the DOFs, at both parameters, and its divided difference.
 
     ``rows`` are derivatives by the DOFs at both parameters, (2, 2, n), ``values`` those at
-    parameter k and displacement j, (2, 2, 2), ``quotient`` the derivative of the quotient, (2, n),
-    and ``slopes`` the quotient at both displacements, (2, 2).
+    parameter k and displacement j, (2, 2, 2), ``quotient`` the derivative of the divided
+    difference, (2, n), and ``slopes`` the divided difference at both displacements, (2, 2).
     """
 
     rows: Array
@@ -51,12 +50,12 @@ class Family(NamedTuple):
         return Family(Q @ self.rows, self.values @ Q.T, Q @ self.quotient, self.slopes @ Q.T)
 
     def minus(self, other: Family) -> Family:
-        """The family of the difference."""
+        """The difference of two families."""
         return Family(*(a - b for a, b in zip(self, other)))
 
 
 class Product:
-    """A product of two families between two displacements, ``times`` being that of two vectors."""
+    """A product of two families between two displacements; ``times`` is that of two vectors."""
 
     def __init__(self, times: Callable[[Array, Array], Array], x: Family, y: Family) -> None:
         self._times, self._x, self._y = times, x, y
@@ -76,7 +75,7 @@ class Product:
         return float(self._row(x.values[j, j], y.values[j, j], j) @ v)
 
     def second(self, v: Array) -> Array:
-        """The mean over s of the second derivative by u, times v (n,)."""
+        """Mean over s of the second derivative by u, times v (n,)."""
         return _mean([self._row(self._x.rows[k] @ v, self._y.rows[k] @ v, k) for k in range(2)])
 
     def mixed(self) -> Array:
@@ -91,8 +90,8 @@ class Span(NamedTuple):
     """The equations of a sleeve between two displacements.
 
     ``columns`` are numbers of DOFs, ``change`` is ``u_1 - u_0`` of these, (n,), ``way`` is
-    ``s_1 - s_0`` in elements, ``place`` the Product G, zero at both ends, ``equations`` those of
-    the equations, and ``shares`` ``f_s / G_s`` of each at both ends, (m, 2).
+    ``s_1 - s_0`` in elements, ``place`` the Product G, zero at both ends, ``equations`` the other
+    products, and ``shares`` ``f_s / G_s`` of each at both ends, (m, 2).
     """
 
     columns: Array
@@ -110,9 +109,9 @@ class Span(NamedTuple):
     def force(self, multipliers: Array, v0: Array, v1: Array) -> Array:
         """X with ``X . (u_1 - u_0) = multipliers . D (v_1 - v_0) / 2``.
 
-        Both velocities are such that the joint stays closed. X is what ``-(multipliers . Phi'')
-        (v_0 + v_1) / 4`` is where Phi is quadratic. What is linear in ``u_1 - u_0`` is written as
-        such; the rest has ``s_1 - s_0`` as a factor, which is ``-G_u . (u_1 - u_0) / G_s``.
+        Both velocities satisfy the constraint. For quadratic Phi, X is ``-(multipliers . Phi'')
+        (v_0 + v_1) / 4``. The part linear in ``u_1 - u_0`` is written as such; the rest has the
+        factor ``s_1 - s_0``, which is ``-G_u . (u_1 - u_0) / G_s``.
         """
         place, v = self.place, v0 + v1
         passing = [place.rate(0, v0), place.rate(1, v1)]

@@ -1,4 +1,4 @@
-"""Sections of two beams or more are welded at the angles of the reference configuration."""
+"""Weld between sections of two or more beams."""
 
 from __future__ import annotations
 
@@ -19,21 +19,20 @@ from .glue import Glue
 
 
 class Weld(Joint):
-    """The points coincide, and the directions of the sections through them keep their angles.
+    """Sections that coincide and keep their relative angles of the reference configuration.
 
-    The direction of a section is the best straight line through it, so it may still warp and change
-    its thickness; that of a cable is its tangent.
+    The direction of a section is its best-fit line, so it may warp and change its thickness; for a
+    cable it is the tangent.
 
     Parameters
     ----------
     beams
-        Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
+        Two or more, each a Beam or a RigidBody, its name or number, or "ground".
     at
-        The section of each beam, as ``("right", "left")``, or a material point (x, y), inside of an
-        element too; or one place for all, as the point ``(1, 0)`` that they share.
+        The section of each beam, as ``("right", "left")``, or a material point (x, y), also inside
+        an element; or one place for all, as a common point ``(1, 0)``.
     apart
-        Allow that the points are apart in the reference configuration: the weld draws them
-        together.
+        Allow a distance between the points in the reference configuration, which the weld closes.
     """
 
     constant = False
@@ -47,7 +46,7 @@ class Weld(Joint):
                                       len(self.beams))
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        """Itself, or where a boundary of a domain is welded to what is no cable, a Glue."""
+        """The weld, or a Glue between a boundary of a domain and a member that is not a cable."""
         members = [None if is_ground(beam) else layout.beam(beam) for beam in self.beams]
         which = [k for k, one in enumerate(members) if isinstance(one, Domain)]
         if not which or any(isinstance(one, Beam) and not one.has_sections for one in members):
