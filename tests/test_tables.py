@@ -69,6 +69,10 @@ def test_a_motion_has_the_time_first(history):
     assert_allclose(data.displacement.sel(time=0.01)[0], history.displacement((1, 0))[2])
     assert history.to_xarray("displacement", subdivide=(1, 1)).sizes == {
         "time": 5, "point": 8 * 4, "component": 2}
+    for name in ("strain_energy", "kinetic_energy", "potential_energy", "total_energy",
+                 "dissipated"):
+        assert data[name].dims == ("time",)
+        assert_allclose(data[name], getattr(history, name))
     read = history.sensors.to_xarray()
     assert read.tip.sizes == {"time": 5, "tip_1": 2}
     assert_allclose(read.root, history.sensors["root"])

@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 from test_io import affine, bent, turn
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, Frame, InputError,
-                        MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
-                        Train)
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, Frame, InputError, Line,
+                        MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene, Section,
+                        StVenantKirchhoff, Train)
 from skfem_ancf.recovery.fields import DRAWN, FIELDS
 from skfem_ancf.visuals.matplotlib import plot_state
 
@@ -331,6 +331,75 @@ def test_scale_magnifies_displacements_and_says_so():
 def test_zero_is_seen_on_white():
     image = drawn(Scene(line()).state().plot("S_xx"))
     assert np.dot(image.to_rgba(0.0)[:3], [0.3, 0.6, 0.1]) < 0.85
+
+
+def test_layers_have_the_colours_of_their_materials():
+    brass = StVenantKirchhoff(E=2e6, nu=0.3)
+    strip = Beam(MeshBeam.init_line(np.linspace(0, 2, 5), height=0.3), ElementBeamANCF(2),
+                 section=Section.layers((0.1, STEEL), (0.2, brass), width=0.1))
+    ax = Scene(strip).clamp("left").plot(thickness=1)
+    below, above = (np.concatenate([p.vertices for p in c.get_paths()])[:, 1]
+                    for c in marked(ax, "layer"))
+    assert_allclose([below.min(), below.max(), above.min(), above.max()],
+                    [-0.15, -0.05, -0.05, 0.15], atol=1e-8)
+    assert [t.get_text().split("\n")[1] for t in ax.get_legend().get_texts()] == [
+        "E = 1e+06, ν = 0.3", "E = 2e+06, ν = 0.3"]
+    colours = {tuple(c.get_facecolor()[0]) for c in marked(ax, "layer")}
+    assert colours == {p.get_facecolor() for p in ax.get_legend().get_patches()}
+    assert len(colours) == 2 and Scene(line()).plot().get_legend() is None
+
+
+def test_what_acts_along_a_body_is_written_beside_it():
+    warm = StVenantKirchhoff(E=1e6, nu=0.3, density=1.0, thermal_expansion=1e-5)
+    scene = Scene(Beam(line().mesh, ElementBeamANCF(2), warm, width=0.1, name="arm")).clamp("left")
+    scene.temperature(20.0).eigenstrain(xx=lambda x, y: 1e-4 * x).drag(1.2, 1.0)
+    scene.control(lambda t: 3.0 * t, at=(0, "right"), kind="moment")
+    ax = scene.plot()
+    assert texts(ax, "eigenstrain") == ["ΔT = 20, eps_xx(x, y)"] and texts(ax, "drag") == ["drag"]
+    assert texts(ax, "control") == ["moment(t, ...)"]
+    state = scene.state(load=0.5)
+    assert texts(state.plot(loads=True), "eigenstrain") == ["ΔT = 10, eps_xx(x, y)"]
+    assert not texts(state.plot(loads=True), "drag")
+    places = [a.xy for a in scene.plot().texts if a.get_gid() in ("eigenstrain", "drag")]
+    assert np.hypot(*np.subtract(*places)) > 0.05  # they do not lie over each other
+
+
+def test_a_motor_is_not_a_clamp():
+    scene = Scene(line()).pin("left")
+    scene.motor((0, "left"), speed=-2.0)
+    ax = scene.plot()
+    arc, = arrows(ax, "motor")
+    turned = np.unwrap(np.arctan2(*arc.T[::-1]))
+    assert turned[-1] < turned[0] - np.pi and len(marked(ax, "support")) == 8
+    still = Scene(line()).pin("left")
+    still.joint("angle", at="left", angle=lambda t: 0.0)
+    ax = still.plot()
+    assert not arrows(ax, "motor") and len(marked(ax, "support")) == 7  # a clamp
+
+
+def test_supports_within_a_beam_are_small():
+    ax = Scene(line()).clamp((1, 0)).plot()
+    wide = np.ptp(np.vstack([a.get_xydata() for a in marked(ax, "support")])[:, 0])
+    assert wide < 0.2
+    scene = Scene(line())
+    scene.joint("position", at=(2, 0), r=lambda t: (2, 0))
+    scene.joint("angle", at=(2, 0), angle=lambda t: 0.0)
+    assert np.vstack([a.get_xydata() for a in marked(scene.plot(), "support")])[:, 0].min() > 1.999
+
+
+def test_values_are_not_written_over_arrows():
+    ax = (Scene(line()).clamp("left").point_force((0, -5), at=(1, 0)).pressure("top", 3)).plot()
+    at = {a.get_text(): a.xy for a in ax.texts}
+    assert abs(at["p = 3"][0] - 1) > 0.2 and abs(at["5"][0] - 1) < 1e-9
+
+
+def test_obstacles_beside_the_body_are_seen():
+    ax = Scene(line()).clamp("left").obstacle(Line((0, -0.7))).obstacle(
+        Circle((1, 0.7), 0.2)).plot()
+    low, high = ax.get_ylim()
+    assert low < -0.7 and high > 0.9
+    far = Scene(line()).clamp("left").obstacle(Line((0, -50))).plot()
+    assert far.get_ylim()[0] > -1
 
 
 def test_what_is_wrong_with_a_plot_of_a_scene_is_said():

@@ -18,14 +18,14 @@ from ..core.types import Array
 from ..mesh.places import facets_of
 from .axial import FollowerForce, LineLoad, of_place_and_time
 from .eigenstrain import EigenStrain
-from .forces import Foundation, PointMass, Spring, TorsionalSpring
+from .forces import Control, Drag, Foundation, PointMass, Spring, TorsionalSpring
 from .forces.springs import end_of
 from .joints import Hinge, Weld
 from .joints.glue import Glue
 from .joints.guides import OnCircle, OnLine
 from .joints.nodes import Nodes
 from .joints.plane_section import PlaneSection
-from .joints.prescribed import PrescribedAngle, PrescribedPosition
+from .joints.prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
 from .joints.settlements import HELD
 from .joints.sliders import Sleeve, Slot
 from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
@@ -37,9 +37,9 @@ from .supports import Support
 #: Largest number of arrows of a distributed load on one chain or side, and on one beam.
 ARROWS, MOST = 9, 200
 
-#: Kinds of symbols that are loads; "support", "joint", "slider", "spring", "foundation",
-#: "torsional spring" and "mass" are not.
-LOADS = "force", "moment", "weight"
+#: Kinds of symbols that are loads; "support", "joint", "slider", "motor", "spring", "foundation",
+#: "torsional spring", "mass", "drag" and "control" are not.
+LOADS = "force", "moment", "weight", "eigenstrain"
 
 
 class Symbol(NamedTuple):
@@ -48,8 +48,8 @@ class Symbol(NamedTuple):
     Attributes
     ----------
     kind
-        "force", "moment", "weight", "support", "joint", "slider", "spring", "torsional spring",
-        "foundation" or "mass".
+        "force", "moment", "weight", "eigenstrain", "support", "joint", "slider", "motor", "spring",
+        "torsional spring", "foundation", "mass", "drag" or "control".
     at
         Positions as n vectors: two ends of a spring, several arrows of a distributed load, else
         one.
@@ -199,7 +199,7 @@ def _values(function, at):
 @symbols.register(Load)
 def _(load, layout):
     beam = layout.beam(load.beam)  # user-defined loads and forms: nodal forces
-    if isinstance(beam, Beam) and not isinstance(load, EigenStrain):
+    if isinstance(beam, Beam):
         given = load if isinstance(load, DeadLoad) else load.bind(beam)
         force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]
         loaded = np.flatnonzero(np.hypot(*force.T) > 1e-9 * np.abs(force).max())
@@ -268,6 +268,24 @@ def _(load, layout):
     yield Symbol("moment", (section(layout, load.beam, load.boundary)[0],), value=load.M, show=True)
 
 
+@symbols.register(EigenStrain)
+def _(strain, layout):
+    for name, given in ((name, getattr(strain, name)) for name in strain.given):
+        what = "ΔT" if name == "change" else f"eps_{name}"
+        number = given is not None and not callable(given)
+        if given is not None:
+            yield Symbol("eigenstrain", (_middle(layout, strain.beam),), show=number,
+                         text=f"{what} = " if number else f"{what}(x, y)",
+                         value=given if number else 1.0)
+
+
+def _middle(layout, beam):
+    """The middle of the axis of a beam, in that of several chains of elements."""
+    beam = layout.beam(beam)
+    e = np.flatnonzero(beam.mesh.chains == beam.mesh.chains[beam.mesh.nelements // 2])
+    return _inside(layout, beam, *_along(e, 1)[ARROWS // 2])
+
+
 # supports and joints
 
 def _outward(beam: Beam, node: int) -> Array:
@@ -309,14 +327,34 @@ def _support(at, held, direction=(0.0, -1.0)):
     return Symbol("support", tuple(at), (tuple(direction),), text=held)
 
 
+def _held(layout, beam, at, held):
+    """What holds a point: of a beam at a node, away from it, else from below."""
+    member, direction = layout.beam(beam), (0.0, -1.0)
+    if isinstance(member, Beam):
+        off = np.hypot(*(member.mesh.p - at.start[:, None]))
+        if np.min(off) < 1e-9 * member.mesh.height:
+            direction = _outward(member, int(np.argmin(off)))
+    return _support([at], held, direction)
+
+
 @symbols.register(PlaneSection)
-@symbols.register(PrescribedAngle)
 @symbols.register(PrescribedPosition)
 def _(joint, layout):
     if isinstance(joint, PrescribedPosition):
-        yield _support([point(layout, joint.beam, joint.at)], "x y")
+        yield _held(layout, joint.beam, point(layout, joint.beam, joint.at), "x y")
     else:
-        yield _support([section(layout, joint.beam, joint.at)[0]], "angle")
+        yield _held(layout, joint.beam, section(layout, joint.beam, joint.at)[0], "angle")
+
+
+@symbols.register(PrescribedAngle)
+@symbols.register(PrescribedTurn)
+def _(joint, layout):
+    beam, at = (joint.at if isinstance(joint, PrescribedTurn) else (joint.beam, joint.at))
+    place = section(layout, beam, at)[0]
+    if any(joint.angle(t) for t in (0.5, 1.0)) or isinstance(joint, PrescribedTurn):
+        yield Symbol("motor", (place,), value=float(joint.angle(1.0)) or 1.0)
+    else:
+        yield _held(layout, beam, place, "angle")
 
 
 @symbols.register(Hinge)
@@ -326,7 +364,8 @@ def _(joint, layout):
     at = [(section(layout, b, a)[0] if weld else point(layout, b, a))
           for b, a in zip(joint.beams, joint.at) if not is_ground(b)]
     if any(map(is_ground, joint.beams)):
-        yield _support(at[:1], "x y angle" if weld else "x y")
+        member = next(b for b in joint.beams if not is_ground(b))
+        yield _held(layout, member, at[0], "x y angle" if weld else "x y")
     else:
         yield Symbol("joint", tuple(at[:1]), text="weld" if weld else "hinge")
 
@@ -410,3 +449,14 @@ def _(foundation, layout):
         for k, (place, normal) in enumerate(zip(at, normals)):
             yield Symbol("foundation", (place,), (normal,),
                          text=_stiffness(foundation.k) if k == len(at) // 2 else "")
+
+
+@symbols.register(Drag)
+def _(drag, layout):
+    yield Symbol("drag", (_middle(layout, drag.beam),), text="drag")
+
+
+@symbols.register(Control)
+def _(control, layout):
+    at = control._point(layout, control.at)
+    yield Symbol("control", (at,), text=f"{control.kind}(t, ...)")

@@ -20,6 +20,8 @@ from ..recovery.grids import grids
 #: The dimension and the labels of the components of vectors and tensors, and their columns in
 #: arrays of VTK.
 PARTS = {2: ("component", ("x", "y"), (0, 1)), 3: ("tensor", ("xx", "yy", "xy"), (0, 1, 3))}
+#: Of a History, arrays (nt,).
+ENERGIES = "strain_energy", "kinetic_energy", "potential_energy", "total_energy", "dissipated"
 
 
 def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = None,
@@ -84,6 +86,9 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
             dims, values[0], _about(field, units))
     places, length = tables[0][0], {} if units is None else {"units": units[1]}
     coords = {name: (*entry, length if name in "xy" else {}) for name, entry in places.items()}
+    if motion:
+        about = {} if units is None else {"units": " ".join(units)}
+        arrays |= {name: ("time", getattr(solution, name), about) for name in ENERGIES}
     facts = {} if motion else {"load_factor": states[0].load}
     return xarray.Dataset(arrays, coords | parts | ({"time": solution.t} if motion else {}), facts)
 

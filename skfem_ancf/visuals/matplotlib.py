@@ -14,7 +14,7 @@ from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text)
 from ..core.types import StrPath
-from .scenery import BODY, GHOST, INK, MUTED, RIGID, WALL, Scenery
+from .scenery import BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, layers_of
 from .symbols import Sketch, symbols_of
 
 #: Largest resolution of a file, in dots per inch.
@@ -98,6 +98,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     symbols = symbols_of(states[-1], loads, supports)
     scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover, scale)
     drawn, values = scenery.field, scenery.found
+    if symbols:
+        scenery.margin = WIDE
     if ax is None:
         ax = Figure(figsize=_figsize(scenery.every[:, :2], colorbar),
                     layout="constrained").add_subplot()
@@ -118,16 +120,19 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
                title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
     """Draw the bodies of a scene as they are at the start, and what acts on them.
 
+    Where there are several materials, each has a colour and an entry of the legend.
+
     Parameters
     ----------
     state
         The reference configuration, a :class:`~skfem_ancf.results.State`.
     loads
-        Draw forces as straight arrows and moments as curved ones, with their values.
+        Draw forces as straight arrows and moments as curved ones, with their values, and write
+        temperature changes and eigenstrains beside the bodies.
     supports
-        Draw supports, joints, springs, foundations and masses. A clamp is a line with hatching, a
-        pin a triangle, a support of one direction a triangle on a line, or two lines if the section
-        cannot turn, a hinge a circle, a weld a square.
+        Draw supports, joints, motors, springs, foundations, masses, drag and controllers. A clamp
+        is a line with hatching, a pin a triangle, a support of one direction a triangle on a line,
+        or two lines if the section cannot turn, a hinge a circle, a weld a square.
     nodes
         Draw the nodes of the meshes.
     names
@@ -144,10 +149,12 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
         ("loads", loads), ("supports", supports), ("nodes", nodes), ("names", names)))
     filename, dpi = page(ax, title, filename, dpi)
     scenery = Scenery([state], "displacement", thickness, True, None, (8, 2), False)
+    scenery.margin, inside = WIDE, ax is not None
     if ax is None:
-        ax = Figure(figsize=_figsize(scenery.every[:, :2], False),
+        ax = Figure(figsize=_figsize(scenery.every[:, :2], len(_laws(state.beams)) > 1),
                     layout="constrained").add_subplot()
-    paint(ax, scenery, [0], None, BODY)
+    paint(ax, scenery, [0], None, BODIES[0])
+    _materials(ax, scenery, state.beams, (8, 2), inside)
     drawn = sketch(ax, scenery, state)
     drawn.draw(symbols_of(state, loads, supports, True))
     if nodes:
@@ -161,6 +168,39 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
     return ax
 
 
+def _laws(beams):
+    """What a legend says of each material of beams, and its colour."""
+    every = dict.fromkeys(layer.material for beam in beams for layer in beam.across.layers)
+    said = dict.fromkeys(map(_law, every))
+    return {text: BODIES[k % len(BODIES)] for k, text in enumerate(said)}
+
+
+def _law(material):
+    E = "E(x, y)" if callable(material.E) else f"E = {material.E:g}"
+    return f"{type(material).__name__}\n{E}, ν = {material.nu:g}"
+
+
+def _materials(ax, scenery, beams, subdivide, inside):
+    """Fill layers by their materials, where there are several, and say which is which."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import Patch
+
+    colours = _laws(beams)
+    if len(colours) == 1:
+        return
+    for body, beam in zip(scenery.frames[0], beams):
+        which, layers = layers_of(beam, subdivide), beam.across.layers
+        for k, layer in enumerate(layers):
+            colour = colours[_law(layer.material)]
+            ax.add_collection(PolyCollection(
+                body.cells_of(which == k, scenery.factor), facecolor=colour, edgecolor=colour,
+                linewidth=0.3, zorder=1.2, gid="layer"))
+    ax.legend(handles=[Patch(facecolor=colour, edgecolor=INK, linewidth=0.5, label=text)
+                       for text, colour in list(colours.items())[:len(BODIES)]],
+              fontsize=8, frameon=False, **({} if inside else {
+                  "loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}))
+
+
 def sketch(ax: Any, scenery: Scenery, state: Any) -> Sketch:
     """What draws symbols at a state as it is drawn, the last of a scenery."""
     return Sketch(ax, scenery.scale * state.u, scenery.points(-1)[:, :2])
@@ -169,10 +209,9 @@ def sketch(ax: Any, scenery: Scenery, state: Any) -> Sketch:
 def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
     """Limits of a picture: wide ones have room for symbols, and show obstacles beside the body."""
     if wide:
-        box, walls = around(scenery.every[:, :2].T), scenery.walls[-1].reshape(-1, 2)
-        near = np.all((walls.T >= box[:, :1]) & (walls.T <= box[:, 1:]), axis=0)
+        box = around(scenery.every[:, :2].T)
         room = 0.1 * np.max(np.ptp(box, axis=1)) * np.array([[-1.0], [1.0]])
-        ax.update_datalim(np.vstack([box.mean(axis=1) + room, walls[near]]))
+        ax.update_datalim(np.vstack([box.mean(axis=1) + room, scenery.near_walls]))
     ax.set_aspect("equal")
     ax.margins(AROUND if len(scenery.walls[0]) and not wide else 0.04)
     ax.autoscale_view()

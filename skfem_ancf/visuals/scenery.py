@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.obstacles.outlines import around, outlines
+from ..actions.obstacles.outlines import AROUND, around, outlines
 from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
                            require_positive, require_unmasked, shown)
 from ..core.types import Array
 from ..recovery.fields import (DRAWN, Field, find_field, unit_of, units_of,
                                values_on_grid)
-from ..recovery.grids import Grid, grids, in_space
+from ..recovery.grids import Grid, grids, in_space, layout
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
@@ -22,14 +22,17 @@ READABLE = 1 / 25
 #: ``scale="auto"`` draws the largest displacement at most this part of the body.
 VISIBLE = 0.12
 
+#: Obstacles are seen that are at most this part of the picture of a scene away from it.
+WIDE = 0.6
+
 #: Colours of signed fields; a body without any is seen on white.
 SIGNED = "#313695", "#5a91c4", "#ecd27a", "#ee6a41", "#a50026"
 
 #: Colours of lines, of what is less important, of the reference configuration, of bodies and
 #: obstacles.
 INK, MUTED, GHOST, RIGID, WALL = "#222222", "#666666", "#d9d9d9", "#bbbbbb", "#7a5230"
-#: Of bodies in the picture of a scene.
-BODY = "#cfdbe6"
+#: Of bodies in the picture of a scene, one for each material.
+BODIES = "#cfdbe6", "#e8d3a8", "#bcd9b4", "#e3bfc3", "#c9bfe0", "#b5dcd8", "#dcc7b2", "#d5d59e"
 
 
 class _Body:
@@ -62,6 +65,18 @@ class _Body:
             out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
                                   run[:, 0, -2:0:-1]]).T)
         return out
+
+
+    def cells_of(self, which, factor):
+        """Corners (n, 4, 2) of the quads that ``which`` names, of the reference configuration."""
+        return self.points(self.reference, factor).reshape(2, -1).T[self.cells[which]]
+
+
+def layers_of(beam: Any, subdivide: tuple[int, int]) -> Array:
+    """The number of the layer of each quad of a beam, shape (nc,)."""
+    X, cells = layout(beam, *subdivide)
+    which = beam.across.which(np.mean(X[..., cells], axis=-1))
+    return np.broadcast_to(which, (beam.mesh.nelements, len(cells))).ravel()
 
 
 class _Solid:
@@ -156,6 +171,9 @@ class Scenery:
     domains on which the field is not known; ``found`` (n,) values of all that is coloured.
     """
 
+    #: How far around the bodies obstacles are drawn.
+    margin = AROUND
+
     def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
                  limits: Any, subdivide: tuple[int, int], recover: bool,
                  scale: Any = 1.0) -> None:
@@ -182,9 +200,13 @@ class Scenery:
     def names(self) -> list[tuple[str, Array]]:
         """Names of the members of the first frame, and a place (2,) of each, of beams on the axis.
         """
-        return [(grid.name, np.mean(grid.x if grid.rows == 1 else grid.x.reshape(
-            2, -1, grid.rows)[:, grid.x.shape[1] // grid.rows // 4], axis=1))
-            for grid in self._grids[0]]
+        def place(grid):
+            if grid.rows == 1:
+                return grid.x
+            columns = grid.x.reshape(2, grid.elements[-1] + 1, -1, grid.rows)
+            return columns[:, columns.shape[1] // 4, columns.shape[2] // 2]
+
+        return [(grid.name, np.mean(place(grid), axis=1)) for grid in self._grids[0]]
 
     @cached_property
     def every(self) -> Array:
@@ -195,9 +217,21 @@ class Scenery:
     @cached_property
     def walls(self) -> list[Any]:
         """The outlines of obstacles in each frame, shapes (n, 2, 2)."""
-        box = around(self.every[:, :2].T)
+        box = around(self.every[:, :2].T, self.margin)
         return [np.concatenate([np.zeros((0, 2, 2)), *outlines(state, box)])
                 for state in self._states]
+
+    @property
+    def near_walls(self) -> Array:
+        """Points of obstacles of the last frame beside, above or below the bodies, (n, 2)."""
+        points, walls = self.every[:, :2].T, self.walls[-1]
+        a, along = walls[:, 0], walls[:, 1] - walls[:, 0]
+        off = np.sum((around(points).mean(axis=1) - a) * along, axis=1)
+        part = np.clip(off / np.maximum(np.sum(along**2, axis=1), 1e-300), 0.0, 1.0)
+        walls = np.concatenate([walls.reshape(-1, 2), a + part[:, None] * along])
+        wide, narrow = ((box[:, 0] <= walls) & (walls <= box[:, 1])
+                        for box in (around(points, WIDE), around(points)))
+        return walls[np.all(wide, axis=1) & np.any(narrow, axis=1)]
 
     def beam_points(self, frames: Iterable[int], undeformed: bool = False) -> Array:
         """Points of the beams of frames, shape (2, n), deformed or not."""

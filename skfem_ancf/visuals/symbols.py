@@ -18,6 +18,8 @@ from .scenery import INK, MUTED
 LOAD, HOLD = "#b3261e", "#1f5f8b"
 #: Sizes of symbols relative to the picture: arrows, those of distributed loads, others.
 ARROW, SPREAD, SIZE = 0.13, 0.07, 0.03
+#: Kinds that are texts beside a body.
+NOTES = "eigenstrain", "drag"
 
 
 def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> list[Symbol]:
@@ -52,6 +54,8 @@ class Sketch:
     def __init__(self, ax: Any, u: Array, points: Array) -> None:
         self.ax, self.u, self.points = ax, u, points
         self.size = float(np.max(np.ptp(points, axis=0)))
+        #: Where arrows and texts are.
+        self.taken = np.full((1, 2), np.inf)
 
     def draw(self, symbols: Iterable[Symbol]) -> None:
         """Draw symbols: one for all that holds a place, and for all weights of one gravity."""
@@ -60,15 +64,19 @@ class Sketch:
             key: Any = number
             if s.kind == "weight":
                 key = s.kind, *s.direction[0], s.value
-            elif s.kind in ("support", "joint"):
+            elif s.kind in ("support", "joint", "eigenstrain"):
                 key = s.kind, *(np.round(s.at[0].start / self.size, 6) + 0.0)
             before = one.get(key)
             if s.kind == "support" and before is not None:
                 s = max(before, s, key=_ends)._replace(text=f"{before.text} {s.text}")
-            one[key] = s
+            elif s.kind == "eigenstrain" and s.value:
+                texts = [] if before is None else before.text.split(", ")
+                texts.append(s.text + (f"{s.value:.6g}" if s.show else ""))
+                s = s._replace(text=", ".join(dict.fromkeys(texts)), show=False)
+            one[key] = s if s.value or before is None else before
         largest = max((abs(s.value) for s in one.values() if s.kind == "force" and len(s.at) == 1),
                       default=0.0) or 1.0
-        for s in one.values():
+        for s in sorted(one.values(), key=lambda s: s.kind in NOTES or len(s.at) > 1):
             if s.value or s.kind not in LOADS:
                 getattr(self, "_" + s.kind.replace(" ", "_"))(
                     s, np.array([place(self.u) for place in s.at]), largest)
@@ -89,16 +97,19 @@ class Sketch:
             SPREAD if len(at) > 1 else ARROW * (0.5 + 0.5 * abs(s.value) / largest))
         tips, tails = at, at - length * d
         out = at + length * d
-        if len(at) == 1 and self._room(out[0]) > 1.2 * self._room(tails[0]):
+        if len(at) == 1 and self._room(out[0], self.points) > 1.2 * self._room(
+                tails[0], self.points):
             tips, tails = out, at
+        sizes, order = np.hypot(*d.T), np.argsort(np.abs(np.arange(len(at)) - len(at) // 2))
+        clear = [i for i in order if self._room(tails[i], self.taken) > 0.1 * self.size]
+        k = [*clear, *order][0] if np.ptp(sizes) < 1e-9 else int(np.argmax(sizes))
         for tip, tail in zip(tips, tails):
             if np.hypot(*(tip - tail)) > 0.005 * self.size:
                 self._arrow(tail, tip, kind=s.kind)
         if len(at) > 1:
             self._line(tails, s.kind, LOAD, 0.8)
+            self.taken = np.vstack([self.taken, 0.5 * (tails[1:] + tails[:-1])])
         if s.show:
-            sizes = np.hypot(*d.T)
-            k = len(at) // 2 if np.ptp(sizes) < 1e-9 else int(np.argmax(sizes))
             free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
             self._text(f"{s.text}{abs(s.value):.6g}", free, free - other, LOAD, s.kind)
 
@@ -109,21 +120,38 @@ class Sketch:
         self._arrow(foot, tip, kind=s.kind, color=MUTED)
         self._text(f"{s.text}{abs(s.value):.6g}", tip, tip - foot, MUTED, s.kind)
 
-    def _moment(self, s, at, largest):
+    def _moment(self, s, at, largest, color=LOAD):
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
         arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
-        self._arrow(*arc, kind=s.kind)
-        self._beside(f"{abs(s.value):.6g}", at[0], LOAD, s.kind)
+        self._arrow(*arc, kind=s.kind, color=color)
+        self._beside(s.text or f"{abs(s.value):.6g}", at[0], color, s.kind)
+
+    def _eigenstrain(self, s, at, largest):
+        self._beside(s.text, at[0], LOAD, s.kind)
 
     def _beside(self, text, at, color, kind):
-        """Write in that corner about a place that is farthest from the bodies."""
+        """Write in a corner about a place that is far from bodies and other texts."""
         r = 1.1 * SIZE * self.size
-        away = max([(1, 1), (-1, 1), (1, -1), (-1, -1)],
-                   key=lambda d: round(self._room(at + 3 * r * np.array(d)) / r, 3))
-        self._text(text, at + r * np.array(away), away, color, kind)
 
-    def _room(self, point):
-        return float(np.min(np.hypot(*(self.points - point).T)))
+        def room(one):
+            far, away = one
+            box = self._box(text, at + far * r * np.array(away), away)
+            return min(0.7, *(round(self._room(point, others) / r, 3) for point in box
+                              for others in (self.points, self.taken)))
+
+        far, away = max([(k, (x, y)) for k in (1, 2, 3) for y in (1, -1) for x in (1, -1)],
+                        key=room)
+        self._text(text, at + far * r * np.array(away), away, color, kind)
+
+    def _box(self, text, at, away):
+        """Points along a text that is written beside a place, about, shape (3, 2)."""
+        x, y = np.array(away) / (np.hypot(*away) or 1.0)
+        width = (0.5 + 0.4 * len(text)) * (np.sign(x) if abs(x) > 0.4 else 0.0)
+        return at + self.size * SIZE * np.outer([0.0, 0.5, 1.0], [width, y])
+
+    def _room(self, point, others):
+        """How far a point is from others (n, 2)."""
+        return float(np.min(np.hypot(*(others - point).T)))
 
     # what holds
 
@@ -147,7 +175,7 @@ class Sketch:
         """A line across d with hatching behind it."""
         across, r = np.array([-d[1], d[0]]), SIZE * self.size
         self._line([foot - wide * across, foot + wide * across], kind)
-        for k in np.linspace(-wide, 0.8 * wide, 6):
+        for k in np.linspace(-wide, wide - 0.4 * r, max(6, round(2 * wide / r))):
             at = foot + k * across
             self._line([at, at + 0.45 * r * (d - across)], kind, HOLD, 0.8)
 
@@ -156,7 +184,8 @@ class Sketch:
         off = self.points - p
         near = np.abs(off @ [-across[1], across[0]]) < 0.002 * self.size
         far = np.abs(off[near] @ across)
-        return float(np.max(far[far < 0.2 * self.size], initial=0.0))
+        half = float(np.max(far[far < 0.2 * self.size], initial=0.0))
+        return half if half < 0.15 * self.size else 0.0  # along a body
 
     def _joint(self, s, at, largest):
         self._mark("o" if s.text == "hinge" else "s", at[0], s.kind)
@@ -185,7 +214,9 @@ class Sketch:
 
     def _foundation(self, s, at, largest):
         foot = at[0] + 2 * SIZE * self.size * np.array(s.direction[0])
-        self._spring(s._replace(at=(s.at[0], Vector(foot))), [at[0], foot], largest)
+        self._spring(s._replace(at=(s.at[0], Vector(foot)), text=""), [at[0], foot], largest)
+        if s.text:
+            self._text(s.text, foot, s.direction[0], HOLD, s.kind, 8)
 
     def _torsional_spring(self, s, at, largest):
         angle = np.linspace(0, 4 * np.pi, 60)
@@ -197,6 +228,16 @@ class Sketch:
         self._mark("o", at[0], s.kind, INK)
         self._beside(f"{s.text}{s.value:.6g}", at[0], INK, s.kind)
 
+    def _motor(self, s, at, largest):
+        self._moment(s._replace(text="angle(t)"), at, largest, HOLD)
+
+    def _drag(self, s, at, largest):
+        self._beside(s.text, at[0], HOLD, s.kind)
+
+    def _control(self, s, at, largest):
+        self._mark("D", at[0], s.kind)
+        self._beside(s.text, at[0], HOLD, s.kind)
+
     # artists
 
     def _arrow(self, *points, kind, color=LOAD):
@@ -207,6 +248,7 @@ class Sketch:
             path=Path(points), arrowstyle="-|>", mutation_scale=9, color=color, lw=1.2, zorder=5,
             gid=kind))
         self.ax.update_datalim(points)
+        self.taken = np.vstack([self.taken, points, 0.5 * np.add(points[0], points[-1])])
 
     def _line(self, points, kind, color=HOLD, lw=1.2):
         self.ax.plot(*np.transpose(points), color=color, lw=lw, zorder=4, gid=kind,
@@ -219,8 +261,9 @@ class Sketch:
         from matplotlib.patheffects import withStroke
 
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
-        width = SIZE * (0.5 + 0.4 * len(text))  # of the text, about
-        self.ax.update_datalim([at + self.size * np.array([width * x, SIZE * y])])
+        box = self._box(text, at, away)
+        self.ax.update_datalim(box)
+        self.taken = np.vstack([self.taken, box])
         self.ax.annotate(
             text, at, (far * x, far * y), textcoords="offset points", fontsize=8, color=color,
             gid=kind, zorder=7, path_effects=[withStroke(linewidth=2, foreground="white")],

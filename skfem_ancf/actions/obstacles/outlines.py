@@ -54,10 +54,10 @@ def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Arra
     return np.concatenate(ends, axis=1), np.column_stack([rows, rows + len(rows)])
 
 
-def around(points: Array) -> Array:
-    """A box about points, with a margin."""
+def around(points: Array, part: float = AROUND) -> Array:
+    """A box about points, with a margin that is a part of their size."""
     low, high = points.min(axis=1), points.max(axis=1)
-    margin = AROUND * float(np.max(high - low))
+    margin = part * float(np.max(high - low))
     return np.array([low - margin, high + margin]).T
 
 
