@@ -136,7 +136,7 @@ class Sketch:
         def room(one):
             far, away = one
             box = self._box(text, at + far * r * np.array(away), away)
-            return min(0.7, *(round(self._room(point, others) / r, 3) for point in box
+            return min(1.0, *(round(self._room(point, others) / r, 3) for point in box
                               for others in (self.points, self.taken)))
 
         far, away = max([(k, (x, y)) for k in (1, 2, 3) for y in (1, -1) for x in (1, -1)],
