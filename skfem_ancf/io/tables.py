@@ -88,7 +88,7 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
     coords = {name: (*entry, length if name in "xy" else {}) for name, entry in places.items()}
     if motion:
         about = {} if units is None else {"units": " ".join(units)}
-        arrays |= {name: ("time", getattr(solution, name), about) for name in ENERGIES}
+        arrays |= {name: (("time",), getattr(solution, name), about) for name in ENERGIES}
     facts = {} if motion else {"load_factor": states[0].load}
     return xarray.Dataset(arrays, coords | parts | ({"time": solution.t} if motion else {}), facts)
 
