@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 
-from skfem_ancf import (Beam, Circle, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, Line, MeshBeam, NameUnknown, Ramp, Scene,
-                        Section, StepHistory, Steps, StVenantKirchhoff, SupportError)
+from skfem_ancf import (Beam, CallbackError, Circle, ConvergenceError, ElementBeamANCF,
+                        ElementBeamANCFCubic, ElementBeamCable, InputError, Line, MeshBeam,
+                        NameUnknown, Ramp, Scene, Section, StepHistory, Steps, StVenantKirchhoff,
+                        SupportError)
 
 SOFT = StVenantKirchhoff(2e8, 0.3, 7800)
 
@@ -330,3 +331,33 @@ def test_curves_of_sensors_are_drawn():
         history.plot_curve("t", "forse")
     with pytest.raises(InputError, match="same instants"):
         history.plot_curve("t", [1.0, 2.0])
+
+
+# prescribed displacements
+
+
+def test_one_component_follows_a_function_of_time():
+    """The tip of a cantilever goes down and back: the force is 3 EI d / L^3, to d^2 / L^2."""
+    beam, d = cantilever(), 0.01
+    steps = Steps(down=1.0, up=1.0)
+    scene = Scene(beam).clamp("left").fix("right", "r^2", displacement=steps.ramp(down=-d, up=0.0))
+    scene.sensor("force", lambda state: state.reactions("right").force[1])
+    history = scene.run(steps, increments=4)
+    ramp, found = steps.ramp(down=-d, up=0.0)(history.t), history.displacement("right")
+    assert np.allclose(found[:, 1], ramp, atol=1e-12)
+    forced = Scene(beam).clamp("left").point_force((0, -1.0), at="right").solve_linear()
+    stiffness = 1.0 / -forced.displacement("right")[1]
+    assert np.allclose(history.sensors["force"], stiffness * ramp, atol=1e-3 * stiffness * d)
+    assert history.reactions("right").force[-1] == pytest.approx([0, 0], abs=1e-8 * stiffness * d)
+
+
+def test_statics_takes_the_function_at_the_load_factor_and_motions_at_the_time():
+    beam = cantilever()
+    scene = Scene(beam).clamp("left").fix("right", "r^2", displacement=lambda t: -0.01 * t)
+    assert scene.solve_static().displacement("right")[1] == pytest.approx(-0.01, abs=1e-12)
+    shaken = Scene(beam).fix("left", "r_Y0").pin("left").fix(
+        "right", "r^2", displacement=lambda t: 0.01 * np.sin(t) ** 2)
+    history = shaken.integrate(0.2, 0.01)
+    assert np.allclose(history.displacement("right")[:, 1], 0.01 * np.sin(history.t) ** 2)
+    with pytest.raises(CallbackError, match="displacement"):
+        Scene(beam).clamp("left").fix("right", "r^2", displacement=lambda t: (t, t)).solve_static()

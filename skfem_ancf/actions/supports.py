@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from ..mesh.places import is_point, node_of
 from .item import Item
 from .joints.hinge import Hinge
 from .joints.plane_section import PlaneSection
+from .joints.prescribed import PrescribedDisplacement
 
 
 class Support(Item):
@@ -31,8 +32,8 @@ class Support(Item):
     names
         As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
     displacement
-        Their displacement at full load, in the unit of the degree of freedom, proportional to the
-        load factor.
+        Displacement at full load, in the unit of the degree of freedom, proportional to the load
+        factor; or a function of time that returns it, in statics of the load factor.
     beam
         Beam, name or number, in a scene of several.
     """
@@ -42,15 +43,18 @@ class Support(Item):
     _words: Any
 
     def __init__(self, boundary: Place, names: str | Sequence[str] | None = None,
-                 displacement: float = 0.0, beam: WhichBeam = None) -> None:
-        if callable(displacement):
-            raise InputError("displacement must be a number, got a function: what moves by a "
-                             'function of time is scene.joint("position", at=..., r=...), or '
-                             '"angle"')
+                 displacement: float | Callable[[float], float] = 0.0,
+                 beam: WhichBeam = None) -> None:
         self.boundary, self.beam = on_body(boundary, beam)
         several = isinstance(names, (list, set, frozenset, np.ndarray))
         self.names = tuple(names) if several else names  # type: ignore[arg-type]
-        self.displacement = require_finite_scalar("displacement", displacement)
+        self.displacement = displacement if callable(displacement) else (
+            require_finite_scalar("displacement", displacement))
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        if not callable(self.displacement):
+            return (self,)
+        return (PrescribedDisplacement(self.boundary, self.names, self.displacement, self.beam),)
 
     def bind(self, layout: Layout) -> Support:
         beam = layout.beam(self.beam)
@@ -60,10 +64,11 @@ class Support(Item):
 
     def hold(self, fixed: dict[int, float]) -> None:
         """Add its prescribed DOFs to ``fixed``; SupportError where two displacements conflict."""
+        value: Any = self.displacement  # a number: functions are joints
         for d, words in zip(self.dofs.tolist(), self._words):
-            if fixed.setdefault(d, self.displacement) != self.displacement:
+            if fixed.setdefault(d, value) != value:
                 raise SupportError(f"degree of freedom {words} is fixed twice, with displacements "
-                                   f"{fixed[d]!r} and {self.displacement!r}")
+                                   f"{fixed[d]!r} and {value!r}")
 
     def __repr__(self) -> str:
         names = "all" if self.names is None else self.names

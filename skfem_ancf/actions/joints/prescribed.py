@@ -57,6 +57,44 @@ class PrescribedPosition(Joint):
         return self.found
 
 
+class PrescribedDisplacement(Joint):
+    """Degrees of freedom of a place follow a function of time: ``u[dofs] = displacement(t)``.
+
+    Parameters
+    ----------
+    boundary, names, beam
+        As for a support, see :class:`~skfem_ancf.actions.supports.Support`.
+    displacement
+        A function of time, in statics of the load factor, that returns a number in the unit of the
+        degrees of freedom.
+    """
+
+    moving = True
+
+    def __init__(self, boundary: Any, names: Any, displacement: Callable[[float], float],
+                 beam: WhichMember = None, name: str | None = None) -> None:
+        self.displacement = require_function("displacement", displacement,
+                                             "of time that returns a number")
+        self.at, self.names, self.beam, self.name = boundary, names, beam, name
+
+    def bind(self, layout: Layout) -> None:
+        member = layout.beam(self.beam)
+        dofs = member.dofs(self.at, self.names)
+        self.equations = tuple(f"force on {member.dofnames[d % member.nd]}" for d in dofs)
+        self.dofs = dofs + layout.offset(member)
+
+    def value(self, u: Array, t: float) -> Array:
+        return u[self.dofs] + self.offset(np.array([t]), len(u))[0]
+
+    def offset(self, times: Array, N: int) -> Array:
+        values = sample(self.displacement, times, "displacement", ())
+        return np.repeat(-values[:, None], len(self.dofs), axis=1)
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        n = len(self.dofs)
+        return np.arange(n), self.dofs, np.ones(n)
+
+
 class PrescribedAngle(Joint):
     """Prescribed rotation of a section or a rigid body: e(t) x d = 0.
 
