@@ -10,9 +10,6 @@ from matplotlib.transforms import Bbox
 #: Pixels of a thumbnail.
 SIZE = 460, 300
 FOLDER = Path(__file__).resolve().parent / "generated" / "thumbnails"
-#: Characters of a sentence, beyond which it ends at its colon; and what is not shown as written.
-LONGEST = 130
-MARKS = {"``": "", " [1]_": "", "\\pi": "π", "\\mu": "μ", "\\alpha": "α", "{": "", "}": ""}
 #: The size of the largest drawing of each example so far.
 largest: dict[str, float] = {}
 
@@ -81,13 +78,9 @@ def replace(app):
 
 
 def sentence(example):
-    """The first sentence of an example."""
-    text = " ".join(ast.get_docstring(ast.parse(example.read_text())).split("\n\n")[1].split())
-    text = re.sub(r":\w+:`([^`]*)`", r"\1", text)
-    for written, shown in MARKS.items():
-        text = text.replace(written, shown)
-    first = re.match(r".*?[.?!](?= [A-Z]|$)", text)[0]
-    return first if len(first) <= LONGEST else first.partition(": ")[0].rstrip(".") + "."
+    """The first paragraph of an example, which is a sentence (tests/test_demos.py)."""
+    text = ast.get_docstring(ast.parse(example.read_text(encoding="utf-8")))
+    return " ".join(text.split("\n\n")[1].replace("``", "").split())
 
 
 def captions(app, docname, source):
