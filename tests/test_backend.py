@@ -97,7 +97,7 @@ def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
     s.integrate(**STEPS, t_eval=[1.0])
     assert loads == ["steps"]
     said = capsys.readouterr().err.splitlines()
-    assert said[0].startswith("skfem_ancf: compiling once, about ") and " s, kept in " in said[0]
+    assert said[0].startswith("skfem_ancf: compiling once, about ") and " s, cached in " in said[0]
     assert said[-1].endswith("100%") and len(said) == 3  # the kernel, and the steps
     assert s.plan("dynamic")["compiled loop"].reason.endswith("compiled code is loaded")
     s.system.internal_force(np.full(s.layout.N, 1e-3))  # as energies of the motion ask for them
@@ -129,7 +129,7 @@ def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_pat
     for function in code_cache.folder, code_cache.can_keep, code_cache._warn_of:
         function.cache_clear()
     try:
-        with pytest.warns(CompilationWarning, match="each process compiles anew.*NUMBA_CACHE_DIR"):
+        with pytest.warns(CompilationWarning, match="each process compiles again.*NUMBA_CACHE_DIR"):
             s.integrate(**STEPS, t_eval=[1.0])
         assert not loads  # it would not pay
         assert backend.Backend(s.system).choose("steps").way == "plain"

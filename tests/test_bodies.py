@@ -305,7 +305,7 @@ def test_a_motor_between_two_bodies(options):
     scene = Scene(beam_of(2), a, b).clamp("left")
     scene.hinge(a, b)
     scene.motor(a, other=b, **options)
-    assert scene.system.backend.tables.plain.joints.own  # it turns with time and with the other
+    assert scene.system.backend.tables.plain.joints.custom  # it turns with time and with the other
     history = scene.integrate(0.8, 4e-3, scheme="generalized-alpha")
     relative = 2 * history.t**2
     assert_allclose(history.angle(a) - history.angle(b), relative, atol=1e-8)
@@ -399,7 +399,7 @@ def test_a_body_that_is_held_by_all_of_its_coordinates():
     state = scene.solve_static()
     assert state.iterations <= 1 and state.stability == "stable"
     assert_allclose(state.reactions(None, body).force, (0.0, 2.0 * G))
-    with pytest.raises(InputError, match="no modes, as supports and joints hold all"):
+    with pytest.raises(InputError, match="no modes: supports and joints fix all"):
         scene.modes(1)
 
 

@@ -114,7 +114,7 @@ def test_an_unfinished_run_is_not_overwritten(unfinished):
         swinging(False).integrate(0.02, 2.5e-3, checkpoint=unfinished)
     foreign = unfinished.with_name("mine.npz")
     np.savez(foreign, a=np.zeros(3))
-    with pytest.raises(CheckpointError, match="no checkpoint.*not overwritten"):
+    with pytest.raises(CheckpointError, match="not a checkpoint.*not overwritten"):
         swinging(False).integrate(0.02, 2.5e-3, checkpoint=foreign)
     assert np.load(foreign)["a"].shape == (3,)
 
@@ -147,7 +147,7 @@ def test_other_scenes_are_refused(tmp_path, monkeypatch):
                          ({"g": -9.82}, "load 0"), ({"at": (0.6, 0)}, "load 1"),
                          ({"joint": (1, 1)}, "joint 0"), ({"f": np.sin}, "amplitude of load 1"),
                          ({"f": None}, "amplitude of load 1"), ({"hold": "clamp"}, "supports")):
-        with pytest.raises(CheckpointError, match=f"of another scene, .*{part}"):
+        with pytest.raises(CheckpointError, match=f"from another scene, .*{part}"):
             build(**change).resume(copies[1])
 
 

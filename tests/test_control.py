@@ -99,7 +99,7 @@ def test_a_force_between_two_points_and_a_moment_between_two_sections():
 
 def test_a_loop_that_drives_vibrations_says_what_to_do():
     """A rate that is held, and nothing that damps: the scheme that conserves goes on."""
-    with pytest.raises(ConvergenceError, match="Sample more often, add damping"):
+    with pytest.raises(ConvergenceError, match="sample more often, add damping"):
         arm(dt=4e-3).integrate(0.03, 1e-3, scheme="generalized-alpha")
     assert arm(dt=4e-3).integrate(0.03, 1e-3).steps == 30
 

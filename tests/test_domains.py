@@ -450,7 +450,7 @@ def test_rubber_on_a_graded_mesh():
 
 def test_bases_that_are_no_domain():
     quads = MeshQuad().refined(1)
-    with pytest.raises(InputError, match="wrap the element"):
+    with pytest.raises(InputError, match="use an ElementVector"):
         Domain(Basis(quads, ElementQuad2()), *forms())
     with pytest.raises(InputError, match="plane"):
         Domain(Basis(MeshTet(), ElementVector(ElementTetP1())), *forms())
@@ -464,7 +464,7 @@ def test_bases_that_are_no_domain():
     with pytest.raises(CallbackError, match="w.'u'."):
         Domain(Basis(quads, ElementVector(ElementQuad1())),
                LinearForm(lambda v, w: ddot(w["prev"].grad, grad(v))), forms()[1])
-    with pytest.raises(InputError, match="no\n?.*cell"):
+    with pytest.raises(InputError, match="whole mesh"):
         Domain(Basis(quads, ElementVector(ElementQuad1()), elements=[0]), *forms())
 
 
@@ -481,7 +481,7 @@ def test_places_and_loads_that_are_not_of_a_domain():
         scene.pressure("right", 1.0, solid)
     with pytest.raises(MeshError, match="outside"):
         scene.state().displacement((1.5, 0), solid)
-    with pytest.raises(InputError, match="its own forms"):
+    with pytest.raises(InputError, match="depend on its forms"):
         scene.state().strain((0.5, 0), solid)
     with pytest.raises(InputError, match="has no mass"):
         Scene(Domain(solid.basis, *forms())).clamp("left").gravity((0, -9.81))

@@ -198,7 +198,7 @@ def test_items_through_all_solvers(name):
         try:
             history = scene.integrate(2e-3, 1e-3, scheme=scheme)
         except InputError as error:  # of damping, of joints that move
-            assert scheme in ("energy-momentum-4", "gauss") and ": take '" in str(error)
+            assert scheme in ("energy-momentum-4", "gauss") and ": use '" in str(error)
             continue
         assert len(history) == 3 and np.all(np.isfinite(history.total_energy))
     again = scene.integrate(2e-3, 1e-3, scheme=scheme, start=history.state(1), t_start=1e-3)

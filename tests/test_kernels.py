@@ -9,7 +9,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.beam.kernels import CableKernel, SectionKernel, arrays, law, loops, strain
 from skfem_ancf.core.switch import compiled_off
-from skfem_ancf.equations.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
+from skfem_ancf.equations.evaluation import FORCE, LINEARISED, MEAN, STRESS, TANGENT, evaluate
 from skfem_ancf.formulations import get_formulation
 from skfem_ancf.materials import Material
 from skfem_ancf.sections import Across, Rectangle
@@ -140,9 +140,9 @@ def test_loops_are_arrays(kind, mesh, monkeypatch):
             for t in k.tables:
                 ns = len(t.start) * t.rows.shape[1]
                 given = np.sin(np.arange(1.0, ns + 1.0))
-                if what >= strain.PUSH and t.law.kind != law.LINEAR:
+                if what >= strain.EIGENSTRAIN and t.law.kind != law.LINEAR:
                     given = 1e-3 * np.cos(np.arange(3.0 * t.weights.shape[1] * len(t.start)))
-                elif what < strain.PUSH and what not in (strain.CARRY, strain.GIVEN):
+                elif what < strain.EIGENSTRAIN and what not in (strain.LINEARISED, strain.GIVEN):
                     given = none
                 gradients = what == strain.GRADIENTS
                 written.append(np.zeros(4 * ns * k.nd if gradients else ns))
@@ -164,14 +164,14 @@ def test_compiled_is_plain(kind, mesh):
     tables, n = system.backend.tables, len(system.backend.tables.stresses)
     u, v = states(system)
     before, rng = np.zeros((2, n)), np.random.default_rng(2)
-    for what in (FORCE, TANGENT, CARRY, STRESS, MEAN):
-        for use_carried in (False, True):
-            stresses, carried = before + rng.standard_normal((2, n))
+    for what in (FORCE, TANGENT, LINEARISED, STRESS, MEAN):
+        for use_independent in (False, True):
+            stresses, independent = before + rng.standard_normal((2, n))
             found = []
             for run in (partial(evaluate, tables.plain), system.backend.of(evaluate)):
                 tables.plain.K.flat[:] = 0.0
-                f, S, C = np.zeros(system.N), stresses.copy(), carried.copy()
-                args = (what, u, v, tables.static_factors(1.0), np.nan, 1.0, use_carried, S, C,
+                f, S, C = np.zeros(system.N), stresses.copy(), independent.copy()
+                args = (what, u, v, tables.static_factors(1.0), np.nan, 1.0, use_independent, S, C,
                         f)
                 run(*args)
                 found.append((f, S, C, tables.plain.K.flat.copy()))

@@ -168,5 +168,5 @@ def test_a_force_finds_the_beam_that_has_its_point():
         scene.follower_force((0, -1), at=(3.5, 0.0), **where)
     assert_array_equal(found.solve_linear().u, named.solve_linear().u)
     for at in ((2.0, 0.0), (9.0, 0.0), "right"):  # of both, of none, no point
-        with pytest.raises(AncfError, match="say which with beam="):
+        with pytest.raises(AncfError, match="choose one with beam="):
             found.point_force((0, -1), at=at)

@@ -132,7 +132,7 @@ def test_frame_with_a_hinge():
     assert abs(ra.M[-1]) < 1e-9 and abs(rb.M[0]) < 1e-9
     assert ra.Q[0] == pytest.approx(-0.05, rel=1e-3) and rb.Q[-1] == pytest.approx(0.05, rel=1e-3)
     assert ra.M[0] == pytest.approx(-state.reactions("left", beam="a").moment, abs=1e-9)
-    with pytest.raises(InputError, match="say which with beam="):
+    with pytest.raises(InputError, match="choose one with beam="):
         state.resultants()
     with pytest.raises(InputError, match="with beam="):
         state.resultants([(0.5, 0), (1.7, 0)])

@@ -205,7 +205,7 @@ def test_a_slot_in_a_body(beams):
     assert_allclose(history.position((0.0, 0.3), crank), pin.T, atol=1e-8)
     expected = np.arctan2(pin[1] + 0.7, pin[0])
     assert_allclose(history.angle(rocker), np.unwrap(expected), atol=1e-8)
-    assert not scene.system.backend.tables.plain.joints.own  # quadratic: a table
+    assert not scene.system.backend.tables.plain.joints.custom  # quadratic: a table
     assert history.joint_force(slot).shape == (201, 1)
 
 

@@ -100,7 +100,7 @@ def test_the_difference_from_half_steps_is_about_the_error(scheme, name, dt):
 
 
 def test_a_check_that_cannot_be_says_so(tmp_path):
-    for options, text in (({"checkpoint": tmp_path / "b.npz"}, "a checkpoint cannot keep"),
+    for options, text in (({"checkpoint": tmp_path / "b.npz"}, "a checkpoint cannot store"),
                           ({"check": 1}, "True or False")):
         with pytest.raises(InputError, match=text):
             swinging().integrate(**{"t_end": 0.02, "dt": 0.01, "check": True, **options})
@@ -110,7 +110,7 @@ def test_schemes_without_an_estimate_say_so():
     class Mine(GeneralizedAlpha):
         adaptive = False
 
-    with pytest.raises(InputError, match="give the step size dt, or take one of the package's"):
+    with pytest.raises(InputError, match="give a step size dt, or use a scheme of the package"):
         swinging().integrate(0.5, "auto", scheme=Mine())
 
 
@@ -121,7 +121,7 @@ def blow(t, at=0.7, width=0.002):
     return np.where(np.abs(t - at) < width, np.cos(0.5 * np.pi * (t - at) / width) ** 2, 0.0)
 
 
-@pytest.mark.filterwarnings("ignore:the body is turned inside out")
+@pytest.mark.filterwarnings("ignore:elements are turned inside out")
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
 def test_a_blow_after_rest_is_seen(scheme):
     scene = Scene(soft(2, 1, E=1e4))

@@ -82,7 +82,7 @@ def iteration(about, watch):
             _, stresses = system.assemble(u)
             system.solver.factorize(u)
             du, _ = system.solver.solve(residual, np.zeros(0))
-            system.carried_stress(u, stresses, du)
+            system.linearised_stress(u, stresses, du)
 
         state = s.solve_static()
         solve = seconds(s.solve_static)

@@ -114,11 +114,11 @@ class EigenStrain(Load):
             bound.at_rest = function(1.0)
         kernel = beam.kernel
         if not beam.has_sections:
-            bound.pushes = [_resultants(beam, self)]
+            bound.eigen_stresses = [_resultants(beam, self)]
             return bound
         bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
         bound._stresses = list(map(stresses_of, kernel.tables, bound._strains))
-        bound.pushes = list(map(pushed_at, kernel.tables, bound._strains, bound._stresses))
+        bound.eigen_stresses = list(map(pushed_at, kernel.tables, bound._strains, bound._stresses))
         bound.grows = not kernel.linear
         bound._size = bound.at_rest if bound.grows else 1.0
         return bound
@@ -132,7 +132,7 @@ class EigenStrain(Load):
 
     def element_forces(self, u: Array, factor: float = 1.0) -> Array:
         """Element forces (nelements, nb, 2) at u (N,)."""
-        return -self.beam.kernel.pushed_forces(self._pushed(factor), u)
+        return -self.beam.kernel.eigenstrain_forces(self._scaled_stresses(factor), u)
 
     def small_forces(self, factor: float = 1.0) -> Array:
         """As :meth:`element_forces` at u = 0, linear in the strain."""
@@ -141,20 +141,20 @@ class EigenStrain(Load):
         return self.beam.kernel.forces_of([factor * T for T in self._stresses],
                                           np.zeros(self.beam.N))
 
-    def _pushed(self, factor):
+    def _scaled_stresses(self, factor):
         """The kernel's arguments."""
-        return [-factor * given for given in self.pushes]
+        return [-factor * given for given in self.eigen_stresses]
 
     def force(self, u: Array) -> Array:
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         kernel = self.beam.kernel
-        return -kernel.scatter(kernel.pushed_forces(self._pushed(self._size), u0, u1))
+        return -kernel.scatter(kernel.eigenstrain_forces(self._scaled_stresses(self._size), u0, u1))
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         beam = self.beam
-        K = beam.kernel.pushed_tangents(self._pushed(self._size), u)
+        K = beam.kernel.eigenstrain_tangents(self._scaled_stresses(self._size), u)
         return *entries_of(element_dofs(beam)), -K.ravel()
 
     def potential(self, u: Array) -> float:
@@ -162,7 +162,7 @@ class EigenStrain(Load):
             return energy_lost(self.beam, 0.0 * u, self._strains, self._size) - energy_lost(
                 self.beam, u, self._strains, self._size)
         strain = self.beam.kernel.strain(u)
-        return -float(np.sum(self.pushes[0].T * strain.reshape(-1, strain.shape[2])))
+        return -float(np.sum(self.eigen_stresses[0].T * strain.reshape(-1, strain.shape[2])))
 
     def spread(self, u: Array) -> Spread:
         return self._spread

@@ -123,8 +123,8 @@ class Load(Item):
     #: Its derivative belongs to a stress that it causes, which the initial tangent lacks.
     prestress = False
     #: Of an eigenstrain: for each element table of the beam an array (components, points,
-    #: elements), see :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`.
-    pushes: Sequence[Array] = ()
+    #: elements), see :func:`~skfem_ancf.beam.strain_energy.eigenstrain_body_of`.
+    eigen_stresses: Sequence[Array] = ()
     for_bodies = for_domains = False
 
     @property

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..core.band import clear, copy, mirror
 from ..beam.strain_energy import FlatBody, evaluate_body
-from ..beam.kernels.strain import PUSH, PUSH_MEAN, PUSH_TANGENT
+from ..beam.kernels.strain import EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
-from ..core.callbacks import own_force, own_joints, own_load_stiffness, own_mean_force
+from ..core.callbacks import custom_force, custom_joints, custom_load_stiffness, custom_mean_force
 from ..core.source import F1, F2, I1, indices, primitive, source
 
 
@@ -19,7 +19,7 @@ class JointTables(NamedTuple):
     """The joints of a scene.
 
     ``hk, hi, hj, hv`` are H by equation, row, column and value, both halves; ``gk, gi`` equation
-    and column of each entry of g; ``sizes`` scale the residual of each equation; ``own`` is the
+    and column of each entry of g; ``sizes`` scale the residual of each equation; ``custom`` is the
     handle of joints that are not quadratic, 0 for none.
     """
 
@@ -30,17 +30,17 @@ class JointTables(NamedTuple):
     gk: I1
     gi: I1
     sizes: F1
-    own: int
+    custom: int
 
 
 class LoadTables(NamedTuple):
     """The loads of a scene; a row of factors is the concatenation of those of all kinds.
 
     ``vectors`` are dead forces (k, N); ``rows, columns, values, which`` forces linear in the
-    displacement and the numbers of their factors; ``pushed, pushes`` beams with eigenstrains, and
-    for each such load its stresses or, for nonlinear laws, its strains, (k, n), see
-    :func:`~skfem_ancf.beam.strain_energy.pushed_body_of`; ``own`` is the handle of user-defined
-    loads.
+    displacement and the numbers of their factors; ``eigenstrained`` beams with eigenstrains, and
+    ``eigenstrains`` (k, n) for each such load its stresses or, for nonlinear laws, its strains, see
+    :func:`~skfem_ancf.beam.strain_energy.eigenstrain_body_of`; ``custom`` is the handle of
+    user-defined loads.
     """
 
     vectors: F2
@@ -49,9 +49,9 @@ class LoadTables(NamedTuple):
     columns: I1
     values: F1
     which: I1
-    pushed: FlatBody
-    pushes: F2
-    own: int
+    eigenstrained: FlatBody
+    eigenstrains: F2
+    custom: int
 
 
 @primitive("skfem_ancf.core.loops")
@@ -97,9 +97,9 @@ def subtract_from_band(A, i, j, v, x, k):
 @source
 def constraint(joints, c, g, t, u, phi):
     """Phi at u."""
-    if joints.own > 0:
+    if joints.custom > 0:
         copy(c, phi)
-        own_joints(joints.own, np.int64(0), t, u, u, phi)
+        custom_joints(joints.custom, np.int64(0), t, u, u, phi)
         return
     clear(phi)
     add_triples(phi, joints.hk, joints.hv, u, joints.hi, u, joints.hj)
@@ -111,8 +111,8 @@ def constraint(joints, c, g, t, u, phi):
 @source
 def add_constraint_rate(joints, g, t, u, v, out):
     """out += J(u) v."""
-    if joints.own > 0:
-        own_joints(joints.own, np.int64(1), t, u, v, out)
+    if joints.custom > 0:
+        custom_joints(joints.custom, np.int64(1), t, u, v, out)
         return
     add_products(out, joints.gk, g, v, joints.gi)
     add_triples(out, joints.hk, joints.hv, v, joints.hi, u, joints.hj)
@@ -121,8 +121,8 @@ def add_constraint_rate(joints, g, t, u, v, out):
 @source
 def add_joint_force(joints, g, t, u, multipliers, out):
     """out += J(u)^T multipliers."""
-    if joints.own > 0:
-        own_joints(joints.own, np.int64(2), t, u, multipliers, out)
+    if joints.custom > 0:
+        custom_joints(joints.custom, np.int64(2), t, u, multipliers, out)
         return
     add_products(out, joints.gi, g, multipliers, joints.gk)
     add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, u, joints.hj)
@@ -139,8 +139,8 @@ def joint_directions(joints, g, t, u, J):
     """J(u), dense, shape (m, N)."""
     flat = J.reshape(J.size)
     clear(flat)
-    if joints.own > 0:
-        own_joints(joints.own, np.int64(3), t, u, u, flat)
+    if joints.custom > 0:
+        custom_joints(joints.custom, np.int64(3), t, u, u, flat)
         return
     add_entries(J, joints.gk, joints.gi, g)
     add_weighted_entries(J, joints.hk, joints.hi, joints.hv, u, joints.hj)
@@ -167,21 +167,22 @@ def _of_moments(loads, factors):
 
 
 @source
-def push(loads, what, factors, u, v, out, flat, ld):
+def add_eigenstrains(loads, what, factors, u, v, out, flat, ld):
     """Subtract the internal forces, or their tangent, of eigenstrains.
 
-    ``what`` is PUSH: the force at u; PUSH_MEAN: the mean force with exact work from u to v;
-    PUSH_TANGENT: the derivative at u, added to ``flat``. Forces are added to ``out``.
+    ``what`` is EIGENSTRAIN: the force at u; EIGENSTRAIN_MEAN: the mean force with exact work
+    from u to v; EIGENSTRAIN_TANGENT: the derivative at u, added to ``flat``. Forces are added to
+    ``out``.
     """
-    given, f = np.empty(loads.pushes.shape[1]), np.empty(u.size)
+    given, f = np.empty(loads.eigenstrains.shape[1]), np.empty(u.size)
     clear(given)
     clear(f)
-    first = factors.size - loads.pushes.shape[0]
-    for k in range(loads.pushes.shape[0]):
-        c, one = factors[first + k], loads.pushes[k]
+    first = factors.size - loads.eigenstrains.shape[0]
+    for k in range(loads.eigenstrains.shape[0]):
+        c, one = factors[first + k], loads.eigenstrains[k]
         for i in indices(given.size):
             given[i] -= c * one[i]
-    evaluate_body(loads.pushed, what, u, v, f, given, given[:0], flat, ld)
+    evaluate_body(loads.eigenstrained, what, u, v, f, given, given[:0], flat, ld)
     for i in indices(out.size):
         out[i] -= f[i]
 
@@ -193,10 +194,10 @@ def external_force(loads, factors, t, scale, u, out):
     add_moments(loads.moments, _of_moments(loads, factors), u, out)
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
-    if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(PUSH), factors, u, u, out, out[:0], np.int64(0))
-    if loads.own > 0:
-        own_force(loads.own, t, scale, u, out)
+    if loads.eigenstrains.shape[0] > 0:
+        add_eigenstrains(loads, np.int64(EIGENSTRAIN), factors, u, u, out, out[:0], np.int64(0))
+    if loads.custom > 0:
+        custom_force(loads.custom, t, scale, u, out)
 
 
 @source
@@ -209,10 +210,11 @@ def mean_external_force(loads, factors, t, u0, u1, out):
         for i in indices(out.size):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
-    if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(PUSH_MEAN), factors, u0, u1, out, out[:0], np.int64(0))
-    if loads.own > 0:
-        own_mean_force(loads.own, t, u0, u1, out)
+    if loads.eigenstrains.shape[0] > 0:
+        add_eigenstrains(loads, np.int64(EIGENSTRAIN_MEAN), factors, u0, u1, out, out[:0],
+                         np.int64(0))
+    if loads.custom > 0:
+        custom_mean_force(loads.custom, t, u0, u1, out)
 
 
 @source
@@ -223,10 +225,10 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
     """
     lower = A.flat[A.top:]
     add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
-    if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(PUSH_TANGENT), factors, u, u, u[:0], lower, A.ld)
+    if loads.eigenstrains.shape[0] > 0:
+        add_eigenstrains(loads, np.int64(EIGENSTRAIN_TANGENT), factors, u, u, u[:0], lower, A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)
-    if loads.own > 0:
-        own_load_stiffness(loads.own, t, scale, u, A.flat)
+    if loads.custom > 0:
+        custom_load_stiffness(loads.custom, t, scale, u, A.flat)

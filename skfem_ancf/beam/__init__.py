@@ -1,4 +1,4 @@
-"""Beams and rigid bodies: their strain energy and inertia."""
+"""Beams, rigid bodies and domains: strain energy and inertia."""
 
 from .beam import Beam, reference_coordinates
 from .rigid import RigidBody

@@ -32,7 +32,7 @@ from .strains import BeamLayer, Interpolation, on_grid, strain_at, stress_at
 
 
 def reference_coordinates(basis: Basis) -> Array:
-    """Degrees of freedom of the reference configuration, shape (basis.N,).
+    """DOFs of the reference configuration, shape (basis.N,).
 
     Parameters
     ----------
@@ -62,19 +62,19 @@ def _coordinates(mesh, element, p):
 
 
 class Beam(Immutable):
-    """A planar beam. It does not change; :meth:`replace` returns a changed copy.
+    """A planar beam. It is immutable; :meth:`replace` returns a changed copy.
 
     Parameters
     ----------
     mesh
         A :class:`~skfem_ancf.MeshBeam`.
     element
-        A beam element, for example ``ElementBeamANCF(3)``, or "auto": the one of lowest order that
-        carries ``fields`` within ``tolerance``, see
+        A beam element, such as ``ElementBeamANCF(3)``, or "auto": the element of lowest order that
+        represents ``fields`` within ``tolerance``, see
         :func:`skfem_ancf.elements.choose.choose_element`.
     material
-        A material, for example :class:`~skfem_ancf.StVenantKirchhoff`; None if the section has
-        materials of its own.
+        A material, such as :class:`~skfem_ancf.StVenantKirchhoff`; None if the section has its own
+        materials.
     width
         Width of a full section: a positive number, or a function of material coordinates x, the
         parameter of the axis, and y, the distance from it, arrays of one shape.
@@ -82,24 +82,24 @@ class Beam(Immutable):
         How the strain is sampled and integrated: a name from
         :data:`skfem_ancf.formulations.FORMULATIONS`, or a formulation.
     name
-        What messages and multi-beam scenes call the beam.
+        Name of the beam in messages and scenes.
     compiled
-        Use the kernels compiled by Numba, if it is installed and they apply; the results agree to
-        round-off. ``SKFEM_ANCF_COMPILED=0`` in the environment leaves Numba out everywhere.
+        Use compiled kernels where Numba supports them; results agree to round-off.
+        ``SKFEM_ANCF_COMPILED=0`` in the environment disables Numba.
     fields, tolerance
-        For the element "auto": names of section fields that will be looked at, and the relative
-        error that the beam theory may have.
+        For the element "auto": names of section fields of interest, and the relative error that the
+        beam theory may have.
     damping
-        :class:`~skfem_ancf.KelvinVoigt` for a stress that resists the rate of the strain, or None.
+        :class:`~skfem_ancf.KelvinVoigt`, or None.
     section
-        A :class:`~skfem_ancf.Section` in place of the width.
+        A :class:`~skfem_ancf.Section` instead of the width.
 
     Other Parameters
     ----------------
     u
         Displacement of the degrees of freedom, shape (N,).
     X
-        Reference points, (2, npoints) or (2, nelements, npoints).
+        Points of the reference cell, (2, npoints) or (2, nelements, npoints).
     tind
         Elements, shape (nelements,), or None for all.
 
@@ -134,7 +134,7 @@ class Beam(Immutable):
         self.mesh, self.element, self.damping = element.fitted(mesh), element, damping
         self.formulation: Formulation = get_formulation(formulation)
         self.name, self.compiled = require_label("name", name), require_flag("compiled", compiled)
-        #: Points off the axis are linear in the degrees of freedom: not of a cable.
+        #: Positions off the axis are linear in the DOFs, unlike those of a cable.
         self.has_sections = element.kinematics == "sections"
         self.nd = 2 * element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
@@ -148,7 +148,7 @@ class Beam(Immutable):
                 f"{self.element.order}, {self.N} degrees of freedom, {self.formulation.name}>")
 
     def replace(self, **changes: Any) -> Beam:
-        """The same beam with some arguments of its constructor changed, as ``width=...``.
+        """A copy with some arguments of the constructor changed.
 
         Examples
         --------
@@ -173,16 +173,13 @@ class Beam(Immutable):
 
     @cached_property
     def basis(self) -> Basis:
-        """A scikit-fem ``Basis`` of the position field with the formulation's quadrature."""
+        """``Basis`` of the position field with the quadrature of the formulation."""
         if len(self.across.layers) > 1:
             return self.exact_basis()
         return Basis(self.mesh, ElementVector(self.element), quadrature=self.terms[0].quadrature)
 
     def exact_basis(self) -> Basis:
-        """A ``Basis`` whose quadrature is exact for products of two degrees of freedom, as mass.
-
-        Its ``dx`` are volumes as of the mass: sections have their height between nodes too.
-        """
+        """``Basis`` whose quadrature integrates products of two DOFs exactly, as for the mass."""
         X, W = exact_rule(self)
         basis = Basis(self.mesh, ElementVector(self.element), quadrature=(X, W))
         if not self.mesh.is_straight:
@@ -190,15 +187,15 @@ class Beam(Immutable):
         return basis
 
     def facet_basis(self, facets: Place, intorder: int | None = None) -> FacetBasis:
-        """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`.
+        """``FacetBasis`` of the position field at a place, see :meth:`dofs`.
 
         Parameters
         ----------
         facets
             A place, see :func:`skfem_ancf.mesh.places.facets_of`.
         intorder
-            Degree of polynomials along the facets that the quadrature integrates exactly, 0 to
-            200; by default that of products of two degrees of freedom.
+            Degree of exactness of the quadrature, 0 to 200; by default that of products of two
+            DOFs.
         """
         if intorder is not None:
             intorder = require_integer("intorder", intorder, 0, 200)
@@ -209,17 +206,17 @@ class Beam(Immutable):
 
     @cached_property
     def kernel(self) -> Any:
-        """The evaluation of the strain energy; see :mod:`skfem_ancf.beam.kernels`."""
+        """Evaluates the strain energy; see :mod:`skfem_ancf.beam.kernels`."""
         return kinematics.KERNELS[self.element.kinematics](self.across, self.formulation)
 
     @cached_property
     def terms(self) -> list[Term]:
-        """The terms of the strain energy, of the formulation for each material of the section."""
+        """Terms of the strain energy, for each material of the section."""
         return [term for layer in self.layers for term in layer.terms]
 
     @cached_property
     def layers(self) -> list[BeamLayer]:
-        """The layers of the section with their terms, :class:`~.strains.BeamLayer`."""
+        """Layers of the section with their terms, :class:`~.strains.BeamLayer`."""
         return [BeamLayer(self, layer, terms)
                 for layer, terms in self.across.terms(self.formulation)]
 
@@ -227,38 +224,38 @@ class Beam(Immutable):
 
     @cached_property
     def q0(self) -> Array:
-        """Degrees of freedom of the reference configuration, shape (N,)."""
+        """DOFs of the reference configuration, shape (N,)."""
         return read_only(_coordinates(self.mesh, self.element, self.mesh.p))
 
     @cached_property
     def origin(self) -> Array:
-        """A point near the beam, from which positions are measured inside the package."""
+        """A point near the beam, origin of the local coordinates."""
         return read_only(self.mesh.p.mean(axis=1))
 
     @cached_property
     def q0_local(self) -> Array:
-        """As :attr:`q0`, with positions measured from :attr:`origin`."""
+        """:attr:`q0` with positions relative to :attr:`origin`."""
         return read_only(_coordinates(self.mesh, self.element,
                                       self.mesh.p - self.origin[:, None]))
 
     @property
     def dofnames(self) -> list[str]:
-        """Names of the degrees of freedom of a node: r^1, r^2, r_X^1, ..."""
+        """Names of the DOFs of a node: r^1, r^2, r_X^1, ..."""
         return [f"{name}^{k}" for name in self.element.dofnames for k in (1, 2)]
 
     def dofs(self, boundary: Place, names: str | Sequence[str] | None = None) -> Array:
-        """Numbers of the degrees of freedom at a place.
+        """Numbers of the DOFs at a place.
 
         Parameters
         ----------
         boundary
-            A place, as the name of a boundary or a point (x, y) in the section of a node; see
+            A place, such as the name of a boundary or a point (x, y) in the section of a node; see
             :func:`skfem_ancf.mesh.places.facets_of`.
         names
             Their names, as ``"r^1"``, or without component, as ``"r"``; None for all.
         """
         facets = np.unique(facets_of(self.mesh, boundary))
-        if facets[-1] >= self.mesh.p.shape[1]:  # sections have the numbers of their nodes
+        if facets[-1] >= self.mesh.p.shape[1]:  # facets below that number are sections at nodes
             facets = np.unique(self.mesh.facets[:, facets])
         known, both = self.dofnames, self.element.dofnames
         names = known if names is None else require_names(
@@ -269,27 +266,24 @@ class Beam(Immutable):
 
     @cached_property
     def finder(self) -> Finder:
-        """What finds the elements that hold points, a :class:`~skfem_ancf.mesh.location.Finder`."""
+        """Locates points in elements, a :class:`~skfem_ancf.mesh.location.Finder`."""
         return Finder(self.mesh)
 
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:
-        """Numbers and weights of the degrees of freedom in the position of a material point.
+        """Numbers (2, n) and weights (n,) of the DOFs in the position of a material point.
 
-        Returns
-        -------
-        dofs, weights
-            Shapes (2, n) and (n,): ``q[dofs] @ weights`` is the position.
+        The position is ``q[dofs] @ weights``.
         """
         return kinematics.probe(self, point)
 
     @cached_property
     def size(self) -> float:
-        """What tolerances of its places are relative to: of one line its length, see `reach`."""
+        """Length scale of tolerances: for a single line its length, see `reach`."""
         return reach([self.mesh])
 
     @cached_property
     def sizes(self) -> Array:
-        """Changes of the degrees of freedom where it moves by its size and bends, shape (N,)."""
+        """Typical changes of the DOFs when the beam moves by its size, shape (N,)."""
         length, h = float(self.mesh.lengths.mean()), self.mesh.height
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
@@ -305,7 +299,7 @@ class Beam(Immutable):
     # fields
 
     def gradients(self, u: Array, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-        """Displacement gradient in the beam's frame and the frame.
+        """Displacement gradient in the beam frame, and this frame.
 
         Returns
         -------
@@ -315,22 +309,16 @@ class Beam(Immutable):
         return kinematics.gradients(self, *self._checked(u, X, tind))
 
     def displacements(self, u: Array, X: Array, tind: Array | None = None) -> Array:
-        """Displacement at reference points, shape (2, nelements, npoints)."""
+        """Displacement, shape (2, nelements, npoints)."""
         return kinematics.displacements(self, *self._checked(u, X, tind))
 
     def strain(self, u: Array, X: Array, tind: Array | None = None) -> Array:
-        """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) of the formulation.
-
-        Shape (3, nelements, npoints).
-        """
+        """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), (3, nelements, npoints)."""
         u, X, tind = self._checked(u, X, tind)
         return on_grid(strain_at, self, u, X, tind)
 
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:
-        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), force per undeformed area.
-
-        Shape (3, nelements, npoints).
-        """
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), (3, nelements, npoints)."""
         u, X, tind = self._checked(u, X, tind)
         return on_grid(stress_at, self, u, X, tind)
 
@@ -343,7 +331,7 @@ class Beam(Immutable):
             require_unmasked("tind", tind)
             tind = self.mesh.normalize_elements(tind)
         if X.ndim == 3 and X.shape[1] != (self.mesh.nelements if tind is None else len(tind)):
-            raise InputError(f"X must hold points for each element, got shape {X.shape}")
+            raise InputError(f"X must have points for each element, got shape {X.shape}")
         return u, X, tind
 
     @cached_property
@@ -361,11 +349,11 @@ class Beam(Immutable):
 
     @cached_property
     def masses(self) -> Masses:
-        """Local functions and masses at points, :class:`~skfem_ancf.beam.masses.Masses`."""
+        """Shape functions and masses at points, :class:`~skfem_ancf.beam.masses.Masses`."""
         return masses_of(self)
 
     def mass_elements(self, elements: slice = slice(None)) -> Array:
-        """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
+        """Mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
         if not self.across.uniform:
             return self.masses.matrices(elements)
         n = len(range(*elements.indices(self.mesh.nelements)))
@@ -378,7 +366,7 @@ class Beam(Immutable):
             load, (self.mesh.nelements,) + load.shape[1:]).copy())
 
     def mass(self) -> csr_matrix:
-        """The mass matrix, constant, sparse, shape (N, N)."""
+        """The constant mass matrix, sparse, shape (N, N)."""
         entries = kinematics.entries_of(self.basis.element_dofs.T)
         M = sparse.coo_matrix((self.mass_elements().ravel(), entries),
                               shape=(self.N, self.N)).tocsr()
@@ -387,7 +375,7 @@ class Beam(Immutable):
 
 
 def _section(section, width):
-    """What was given as a section, or a rectangle of a width."""
+    """The section, or a rectangle of the given width."""
     if section is None:
         return Rectangle(width)
     if width is not None:
@@ -399,10 +387,10 @@ def _section(section, width):
 
 
 def _material(section, material, mesh):
-    """The material of a beam: what was given, or the first of a section that has its own."""
+    """The material, or the first one of the section."""
     if (material is None) != section.has_materials or not isinstance(
             material, (Material, type(None))):
-        raise InputError(f"material must be None, for {section!r} has its own, got "
+        raise InputError(f"material must be None, since {section!r} has its own, got "
                          f"{shown(material)}" if section.has_materials else
                          f"material must be a Material, got {shown(material)}")
     return material or section.layers_on(mesh, None)[0].material

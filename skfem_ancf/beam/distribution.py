@@ -1,4 +1,4 @@
-"""Where forces act on a beam: distributed over its body and faces, or on sections and points."""
+"""Distribution of forces over a beam: on its volume, faces, sections and points."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from ..sections.jumps import jumps
 from .beam import Beam
 from .kinematics import probe_reference
 
-#: Places nearer than this part of an element to a node are at the node.
+#: Points closer to a node than this fraction of an element are at the node.
 SNAP = 1e-5
 
-#: A function of ``r`` that differs from 0 or 1 by less is that at a node, where it is flat.
+#: Tolerance of a shape function of ``r``, which is flat at the nodes.
 FLAT = 1e-11
 
 
-#: Where a :class:`Sampled` density acts; the first two are also numbers of faces.
+#: Where a :class:`Sampled` density acts; the first two are numbers of faces.
 BOTTOM, TOP, AXIS, BODY = range(4)
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """A density of force, by its values at points of elements: a polynomial between them.
+    """A force density given by values at points of elements, with polynomials between them.
 
-    It acts ``where`` says (BOTTOM, TOP, AXIS or BODY) on ``elements`` (n,). ``values`` at the
-    points ``xi`` (p,) along an element are force per xi, (2, ..., n, p); of a body, with points
-    ``eta`` (q,) across, per volume, (2, ..., n, p, q).
+    It acts on ``where`` (BOTTOM, TOP, AXIS or BODY) of ``elements`` (n,). ``values`` at the points
+    ``xi`` (p,) are force per xi, (2, ..., n, p); for a body, with points ``eta`` (q,) across, force
+    per volume, (2, ..., n, p, q).
     """
 
     where: int
@@ -45,15 +45,12 @@ class Sampled:
     eta: Array | None = None
 
     def times(self, factor: Any) -> Sampled:
-        """The density times a number, or each of several, shape (...)."""
+        """The density times a factor or several, shape (...)."""
         return replace(self, values=np.moveaxis(np.multiply.outer(factor, self.values),
                                                 np.ndim(factor), 0))
 
     def at(self, e: Array, xi: Array, eta: Array, nelements: int) -> Array:
-        """The density (2, ..., n, k) on sections e, xi (n,) at points eta (n, k) across them.
-
-        Of a face or the axis k = 1.
-        """
+        """The density (2, ..., n, k) on sections e, xi (n,) at points eta (n, k) across them."""
         row = np.full(nelements, -1)
         row[self.elements] = np.arange(len(self.elements))
         along = lagrange(self.xi, xi) * (row[e] >= 0)[:, None]
@@ -66,14 +63,14 @@ class Sampled:
         return np.einsum("...nq,nkq->...nk", here, across)
 
     def changes(self, nelements: int) -> Array:
-        """Stations between elements on which it acts and those on which it does not."""
+        """Axial coordinates at which it begins or ends."""
         on = np.isin(np.arange(nelements), self.elements)
         return np.nonzero(on[1:] != on[:-1])[0] + 1.0
 
     def jumps(self, nelements: int) -> Array:
-        """Stations at which it is another one on both sides, by a tenth of its largest value.
+        """Axial coordinates of jumps by more than a tenth of the largest value.
 
-        Less is from element to element what polynomials miss of a smooth density.
+        Smaller jumps are interpolation errors of a smooth density.
         """
         eta = np.array([0.0]) if self.eta is None else self.eta
         return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
@@ -81,7 +78,7 @@ class Sampled:
 
 
 class Facets(NamedTuple):
-    """Numbers (n,) of facets of one kind, their elements (n,), and points xi (p,) along each."""
+    """Numbers (n,) of facets of one side, their elements (n,), and points xi (p,) on each."""
 
     where: int
     chosen: Array
@@ -90,7 +87,7 @@ class Facets(NamedTuple):
 
 
 def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float, ...]]:
-    """The facets of a FacetBasis along a beam, and the stations of those across it."""
+    """Facets of a FacetBasis along a beam, and axial coordinates of those across it."""
     n, ne, find = mesh.p.shape[1], mesh.nelements, np.asarray(basis.find)
     found = []
     for side in (BOTTOM, TOP):
@@ -103,39 +100,21 @@ def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float,
 
 @dataclass(frozen=True)
 class Spread:
-    """How a load is distributed over a beam.
+    """The distribution of a load over a beam, in the reference configuration."""
 
-    Attributes
-    ----------
-    body, gravity
-        Force per volume of the reference configuration, and per mass, shape (2,), or None.
-    faces
-        Which elements' bottom and top are loaded, two arrays (nelements,) of truth values, or None.
-    traction, pressure
-        Force per undeformed area of the faces, (2,), or a function of the points x (2, ...); force
-        per deformed area, normal to them; or None.
-    stations, sampled
-        Where it acts on a section or a point: element + xi; densities that are known at points.
-    points
-        Those of the stations at which its force is known: element, xi, and the force on the degrees
-        of freedom of the element, (nb, 2).
-    eigen
-        A stress-free strain in place of a force, or None.
-    """
-
-    body: Array | None = None
-    gravity: Array | None = None
-    faces: tuple[Array, ...] | None = None
-    traction: Array | Callable[[Array], Array] | None = None
-    pressure: float | None = None
-    stations: tuple[float, ...] = ()
+    body: Array | None = None  # force per volume, (2,)
+    gravity: Array | None = None  # force per mass, (2,)
+    faces: tuple[Array, ...] | None = None  # loaded elements at bottom and top, bool (nelements,)
+    traction: Array | Callable[[Array], Array] | None = None  # per area of faces; function of x
+    pressure: float | None = None  # normal force per deformed area
+    stations: tuple[float, ...] = ()  # element + xi of loaded sections and points
     sampled: tuple[Sampled, ...] = ()
-    points: tuple[tuple[int, float, Array], ...] = ()
-    eigen: Any = None
+    points: tuple[tuple[int, float, Array], ...] = ()  # element, xi, nodal force (nb, 2)
+    eigen: Any = None  # an eigenstrain instead of a force
 
 
 def on_points(beam: Beam, places: Sequence[tuple[Array, int, Array]]) -> tuple[Array, Spread]:
-    """The force (N,) of forces (2,), each with its element and reference point, and its Spread."""
+    """The force (N,) of forces (2,) with element and reference point, and its Spread."""
     vector, points = np.zeros(beam.N), []
     for force, e, X in places:
         dofs, weights = probe_reference(beam, e, X)
@@ -145,7 +124,7 @@ def on_points(beam: Beam, places: Sequence[tuple[Array, int, Array]]) -> tuple[A
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
-    """The Spread of a ``traction`` or ``pressure`` on facets (n,), faces or sections."""
+    """The Spread of a ``traction`` or ``pressure`` on facets (n,)."""
     n, ne = mesh.p.shape[1], mesh.nelements
     on = np.zeros(n + 2 * ne, dtype=bool)
     on[np.asarray(facets)] = True
@@ -154,16 +133,16 @@ def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
 
 
 def station_of_node(mesh: MeshBeam, node: int) -> float:
-    """A node as element + xi: the end of the element on its left, if there is one."""
+    """Element + xi of a node, by preference at the end of an element."""
     right = np.nonzero(mesh.t[1] == node)[0]
     return float(right[0]) + 1.0 if len(right) else float(np.nonzero(mesh.t[0] == node)[0][0])
 
 
 def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | None:
-    """Where a force on few degrees of freedom acts: element + xi; None if it is distributed.
+    """Element + xi of a nodal force that acts on sections or points; None if it is distributed.
 
-    A force on a point inside an element acts on the ``r`` of its two nodes as the Hermite functions
-    of xi say, whose values are found again.
+    A force at a point inside an element acts on ``r`` of both nodes; its point follows from the
+    ratio.
     """
     rows = np.asarray(vector).reshape(-1, beam.nd)
     loaded = np.nonzero(np.any(rows != 0, axis=1))[0]
@@ -181,7 +160,7 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
 
 
 def _where(element: ElementBeam, value: float) -> float | None:
-    """Where the function of ``r`` at the right node has a value; it rises from 0 to 1."""
+    """Solve for xi at which the shape function of ``r`` at the right node has a value."""
     if not -FLAT <= value <= 1.0 + FLAT:
         return None
     if min(value, 1.0 - value) < FLAT:

@@ -1,4 +1,4 @@
-"""A body of somebody's own: a stock basis of scikit-fem with its forms."""
+"""Two-dimensional bodies: a basis of scikit-fem with its forms."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ from ..core.quadrature import gauss
 from ..core.types import Array
 from ..mesh.places import as_point, is_point
 
-#: Gauss points of the way from rest along which the residual works, and of that in a time step.
+#: Gauss points for the work of the residual from the reference configuration, and in a time step.
 WORK, STEP = 6, 3
-#: How far a point may be outside of the reference cell, and iterations that find it there.
+#: Tolerance of points outside of the reference cell, and iterations for local coordinates.
 OUTSIDE, ITERATIONS = 1e-6, 12
 
 
 class Domain(Immutable):
-    """A plane body by a basis and forms of scikit-fem, a member of a Scene beside beams.
+    """A two-dimensional body given by a basis and forms of scikit-fem, a member of a Scene.
 
-    Its degrees of freedom (DOFs) are those of the basis, its unknown is the displacement from the
-    reference configuration: in the forms ``w["u"]``, with ``w["u"].grad``. The forms contain the
-    thickness. ``scene.weld((domain, "right"), (beam, "left"))`` glues a boundary of its mesh to the
-    end or a side of a beam.
+    The unknown is the displacement from the reference configuration, ``w["u"]`` in the forms, with
+    the DOFs of the basis. The forms include the thickness. ``scene.weld((domain, "right"), (beam,
+    "left"))`` connects a boundary to a beam.
 
     Parameters
     ----------
@@ -40,30 +39,29 @@ class Domain(Immutable):
         A ``Basis`` of a plane mesh and an ``ElementVector``, as ``Basis(MeshQuad(),
         ElementVector(ElementQuad2()))``.
     residual
-        ``LinearForm`` of the internal virtual work: what resists the displacement ``w["u"]``.
+        ``LinearForm`` of the internal virtual work at the displacement ``w["u"]``.
     tangent
         ``BilinearForm``: its derivative by the displacement.
     mass
         ``BilinearForm`` of the mass, ``rho * dot(u, v)``, for weight, modes and motion.
     name
-        What messages call it.
+        Name in messages.
 
     Raises
     ------
     InputError
-        If the basis is not one of plane vectors, or the tangent not the derivative of the residual.
+        If the basis has no plane vectors, or if the tangent is not the derivative of the residual.
 
     Notes
     -----
-    In the scene the DOFs are renumbered, by reverse Cuthill-McKee or along x or y, so that matrices
-    are narrow bands; :meth:`of_basis` puts them into the order of the basis.
+    In the scene the DOFs are renumbered to reduce the bandwidth; :meth:`of_basis` restores the
+    order of the basis.
 
-    The energy is the work of the residual on the straight way from the reference configuration, by
-    Gauss points: exact for polynomials, as of St. Venant-Kirchhoff. The mean of the residual over a
-    time step, by which the energy-momentum scheme keeps the energy, is found in the same way (the
-    averaged vector field). Linear momentum is kept, too; the error of the angular momentum of a
-    domain is of second order in the step. A tangent that is not symmetric has no energy, and that
-    scheme refuses it.
+    The energy is the work of the residual along a straight path from the reference configuration,
+    by Gauss quadrature; it is exact for polynomials, as of St. Venant-Kirchhoff. The
+    energy-momentum scheme uses the mean of the residual over a step (averaged vector field): it
+    conserves energy and linear momentum; the error of the angular momentum is of second order. It
+    rejects domains with an unsymmetric tangent, which have no energy.
 
     References
     ----------
@@ -72,7 +70,7 @@ class Domain(Immutable):
 
     Examples
     --------
-    A cantilever of linear elasticity that carries a beam:
+    A cantilever of linear elasticity with a beam at its end:
 
     >>> import numpy as np
     >>> from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, MeshQuad
@@ -117,30 +115,24 @@ class Domain(Immutable):
         return f"<Domain {who}of {mesh.nelements} {type(mesh).__name__} cells, {self.N} DOFs>"
 
     def of_basis(self, u: Array) -> Array:
-        """Degrees of freedom of the scene (..., N) in the order of the basis.
-
-        Parameters
-        ----------
-        u
-            As ``state.u_of(domain)`` has them.
-        """
+        """DOFs of the scene (..., N), as of ``state.u_of(domain)``, in the order of the basis."""
         return np.asarray(u)[..., self._rank]
 
     def numbers(self, dofs: Array) -> Array:
-        """Numbers in the scene, from the first of the domain, of DOFs (...) of the basis."""
+        """Numbers in the scene, relative to the first of the domain, of DOFs (...) of the basis."""
         return self._rank[dofs]
 
     # forms
 
     def load(self, form: LinearForm, boundary: Any = None) -> Array:
-        """The force (N,) of a form on all of it, or on a boundary.
+        """The force (N,) of a form on the domain or a boundary.
 
         Parameters
         ----------
         form
-            It knows ``w.x``, ``w.h`` and, on a boundary, ``w.n``.
+            Knows ``w.x``, ``w.h`` and, on a boundary, ``w.n``.
         boundary
-            What scikit-fem takes for facets; None for the body.
+            Facets in a form that scikit-fem accepts; None for the domain.
         """
         basis = self.basis if boundary is None else self.trace(boundary)
         return self._ask("load", form.assemble, basis)[self._order]
@@ -152,16 +144,16 @@ class Domain(Immutable):
         hint = ("residual and tangent know w['u'], the displacement, w['u'].grad, w.x and w.h; "
                 "mass and loads w.x, w.h and, on a boundary, w.n")
         with explained("the {} of {!r} fails", hint, CallbackError, name, self), np.errstate(
-                all="ignore"):  # an iterate may be turned inside out
+                all="ignore"):  # iterates may be inverted
             return function(*args, **options)
 
     def force(self, u: Array) -> Array:
-        """The internal force at a displacement of the scene's DOFs, (N,) both."""
+        """The internal force at a displacement, (N,) both."""
         return self._ask("residual", self.residual.assemble, self.basis,
                          **self._with(u))[self._order]
 
     def stiffness(self, u: Array) -> Array:
-        """The values (k,) of the tangent at the entries :attr:`pattern`."""
+        """Values (k,) of the tangent at the entries :attr:`pattern`."""
         data = self._ask("tangent", self.tangent.coo_data, self.basis, **self._with(u)).data
         return np.bincount(self._entries[2], data, len(self._entries[0]))
 
@@ -173,31 +165,31 @@ class Domain(Immutable):
 
     @property
     def pattern(self) -> tuple[Array, Array]:
-        """Rows and columns (k,) of the tangent's entries."""
+        """Rows and columns (k,) of the tangent."""
         return self._entries[0], self._entries[1]
 
     def matrix(self, u: Array | None = None) -> sparse.csr_array:
-        """The tangent at a displacement (N,), by default at rest, sparse."""
+        """The sparse tangent at a displacement (N,), zero by default."""
         values = self.stiffness(np.zeros(self.N) if u is None else u)
         return sparse.csr_array((values, self.pattern), shape=(self.N, self.N))
 
     def energy(self, u: Array) -> float:
-        """The work of the residual from rest to a displacement (N,)."""
+        """Work of the residual from rest to a displacement (N,)."""
         return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(WORK))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        """The mean of the internal force on a straight way.
+        """Mean of the internal force on a straight path between two displacements.
 
         Parameters
         ----------
         u0, u1
-            Displacements of the DOFs from which and to which, shape (N,).
+            Displacements at the start and the end, shape (N,).
         """
         d = u1 - u0
         return sum((w * self.force(u0 + s * d) for s, w in zip(*gauss(STEP))), np.zeros(self.N))
 
     def inverted(self, u: Array) -> bool:
-        """True if a cell is turned inside out by a displacement (N,)."""
+        """True if a cell is turned inside out at a displacement (N,)."""
         (a, b), (c, d) = self._with(u)["u"].grad
         return bool(np.any((1.0 + a) * (1.0 + d) <= b * c))
 
@@ -212,7 +204,7 @@ class Domain(Immutable):
                       1e-12 * np.abs(now).max())
         self.symmetric = bool(abs(K - K.T).max() <= 1e-10 * abs(K).max())
 
-    # what a scene asks of a beam, too
+    # the interface of a beam
 
     @property
     def dofnames(self) -> list[str]:
@@ -221,42 +213,42 @@ class Domain(Immutable):
 
     @property
     def bandwidth(self) -> int:
-        """Subdiagonals of its matrices."""
+        """Number of subdiagonals."""
         return int(np.max(np.ptp(self.numbers(self.basis.element_dofs), axis=0)))
 
     @cached_property
     def q0_local(self) -> Array:
-        """The DOFs of the place of the points, from :attr:`origin`, (N,)."""
+        """DOFs of the position relative to :attr:`origin`, (N,)."""
         return self.velocity_of(lambda x: x - self.origin[:, None])
 
     @property
     def q0(self) -> Array:
-        """The DOFs of the place of the points, (N,)."""
+        """DOFs of the position, (N,)."""
         return self.q0_local + self.rigid_motions()[:, :2] @ self.origin
 
     @property
     def origin(self) -> Array:
-        """The mean of the vertices, shape (2,)."""
+        """Mean of the vertices, shape (2,)."""
         return np.asarray(self.basis.mesh.p.mean(axis=1))
 
     @property
     def size(self) -> float:
-        """The larger one of width and height."""
+        """The larger of width and height."""
         return float(np.max(np.ptp(self.basis.mesh.p, axis=1)))
 
     @property
     def sizes(self) -> Array:
-        """Changes of the DOFs where it moves by its size, (N,)."""
+        """Typical changes of the DOFs when the domain moves by its size, (N,)."""
         return np.full(self.N, self.size)
 
     @cached_property
     def scale(self) -> float:
-        """The energy of a strain of one, about: modulus times volume."""
+        """Energy of a unit strain, about: modulus times volume."""
         return float(abs(self.q0_local @ (self.matrix() @ self.q0_local)))
 
     @cached_property
     def held(self) -> bool:
-        """True if its forms resist a rigid motion, as bedding does."""
+        """True if the forms resist a rigid motion, as elastic bedding does."""
         K, motions = self.matrix(), self.rigid_motions()
         return bool(np.any(np.abs(K @ motions) > 1e-9 * (abs(K) @ np.abs(motions))))
 
@@ -275,7 +267,7 @@ class Domain(Immutable):
         return float(along @ (self._mass @ along))
 
     def mass_entries(self) -> tuple[Array, Array, Array]:
-        """The mass matrix: rows, columns and values, shapes (k,)."""
+        """Rows, columns and values (k,) of the mass matrix."""
         M = self._mass.tocoo()
         return M.row, M.col, M.data
 
@@ -284,7 +276,7 @@ class Domain(Immutable):
         return self._mass @ (self.rigid_motions()[:, :2] @ require_finite("g", g, (2,)))
 
     def velocity_of(self, field: Callable[[Array], Array]) -> Array:
-        """The DOFs (N,) of a field of vectors, a function of points (2, n), by L2 projection."""
+        """L2 projection (N,) of a vector field, a function of points (2, n)."""
         def at_points(x):
             return np.reshape(field(np.reshape(x, (2, -1))), x.shape)
 
@@ -305,28 +297,28 @@ class Domain(Immutable):
     # boundaries
 
     def _facets(self, boundary: Any) -> Array:
-        """Numbers of facets, of what scikit-fem takes for a boundary: a name, a function of x."""
+        """Facet numbers of a boundary in a form that scikit-fem accepts."""
         mesh = self.basis.mesh
         if isinstance(boundary, str) and boundary not in (mesh.boundaries or {}):
             raise NameUnknown("boundary", boundary, list(mesh.boundaries or {}))
         if is_point(boundary):
-            raise InputError(f"this is asked of a boundary of {self!r}, got the point "
+            raise InputError(f"a boundary of {self!r} is needed here, got the point "
                              f"{shown(boundary)}; scene.pin supports a point, and "
-                             "scene.hinge joins it to another one")
+                             "scene.hinge connects it to another one")
         found = mesh.normalize_facets(boundary)
         if not len(found):
             raise MeshError(f"no facet of the boundary of {self!r} is at {shown(boundary)}")
         return np.asarray(found)
 
     def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
-        """Numbers of degrees of freedom, shape (n,).
+        """Numbers of DOFs, shape (n,).
 
         Parameters
         ----------
         boundary
-            What ``basis.get_dofs`` takes, or what it returns; None for all.
+            An argument or result of ``basis.get_dofs``; None for all.
         names
-            Of :attr:`dofnames`, or without component, as ``"u"``; None for all.
+            From :attr:`dofnames`, or without component, as ``"u"``; None for all.
         """
         if boundary is None or boundary is self:
             found = np.arange(self.N)
@@ -351,7 +343,7 @@ class Domain(Immutable):
         Returns
         -------
         x, d
-            Place (2,) of the mean, and the line from one end to the other, (2,).
+            Position (2,) of the mean, and the line from one end to the other, (2,).
         mean, line
             Weights (N / 2,) of the DOFs of one component.
         """
@@ -361,8 +353,8 @@ class Domain(Immutable):
         off = x - centre[:, None, None]
         values, axes = np.linalg.eigh(np.einsum("iep,jep,ep->ij", off, off, dx) / length)
         if values[0] > 1e-9 * values[1]:
-            raise InputError(f"the boundary {shown(boundary)} of {self!r} is not straight: it is "
-                             "no section to weld a cable to")
+            raise InputError(f"the boundary {shown(boundary)} of {self!r} is not straight: a "
+                             "cable cannot be welded to it")
         along = axes[:, 1]
         s = np.einsum("i,iep->ep", along, off)
         weights = [LinearForm(lambda v, w: w["f"] * v[0]).assemble(basis, f=f)[self._order][::2]
@@ -372,11 +364,11 @@ class Domain(Immutable):
     # points
 
     def place(self, at: Any) -> Array:
-        """A point (x, y) of the reference configuration as an array (2,)."""
+        """A point (x, y) as an array (2,)."""
         return as_point(at)
 
     def locate(self, x: Array) -> tuple[Array, Array]:
-        """Cells (n,) and coordinates (2, n) in them of points (2, n); -1 for those outside."""
+        """Cells (n,), -1 if outside, and local coordinates (2, n) of points (2, n)."""
         mesh, mapping = self.basis.mesh, self.basis.mapping
         nodes = mesh.p[:, mesh.t] if mesh.doflocs.shape[1] == mesh.p.shape[1] else (
             mesh.doflocs[:, mesh.dofs.element_dofs])
@@ -397,11 +389,11 @@ class Domain(Immutable):
         return cells, local
 
     def contains(self, x: ArrayLike) -> Array:
-        """Whether points (2, n) of the reference configuration are in it or on it, shape (n,)."""
+        """Whether points (2, n) of the reference configuration are in the domain, shape (n,)."""
         return self.locate(require_finite("x", x, (2, None)))[0] >= 0
 
     def probe(self, at: Any) -> tuple[Array, Array]:
-        """Numbers and weights, shape (2, k) both, of the DOFs in the displacement of a point."""
+        """Numbers and weights (2, k) of the DOFs in the displacement of a point."""
         dofs, weights = self.probes(self.place(at)[:, None])
         return dofs[..., 0], np.tile(weights[:, 0], (2, 1))
 
@@ -415,26 +407,26 @@ class Domain(Immutable):
         return dofs.swapaxes(0, 1), self._functions(X[:, :, None], cells)[..., 0]
 
     def _functions(self, X, cells=None):
-        """The scalar local functions (k, n, points) at points of the reference cell."""
+        """Scalar shape functions (k, n, points) at points of the reference cell."""
         basis = self.basis
         return np.array([np.asarray(basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0])[0]
                          for k in range(0, basis.Nbfun, 2)])
 
     def drawn(self, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:
-        """What pictures show of a displacement of the DOFs, shape (N,).
+        """Points and cells for plots.
 
         Parameters
         ----------
         u
-            The displacement.
+            Displacement, shape (N,).
         parts
-            Times that a cell is halved.
+            Number of refinements of each cell.
 
         Returns
         -------
         x, moved, gradient, cells
-            Points of each cell, (2, n), their displacement and its gradient, (2, 2, n), and
-            triangles or quads as rows of point numbers.
+            Points, (2, n), their displacement and its gradient, (2, 2, n), and triangles or quads
+            as rows of point numbers.
         """
         mesh, basis = self.basis.mesh, self.basis
         cell = mesh.init_refdom().refined(parts)
@@ -459,40 +451,37 @@ class DomainPoints:
         self._dofs, self._weights = domain.probes(start)
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
+        """Displacements (..., 2, n) for DOFs ``u`` (..., N) of the scene."""
         return np.sum(u[..., self.slice][..., self._dofs] * self._weights, axis=-2)
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
+        """Velocities (..., 2, n) for DOFs and their rates, (..., N)."""
         return self.displacement(v)
 
     @property
     def number(self) -> int:
-        """Raises InputError: fields of a domain are a matter of its basis."""
-        raise InputError(f"the strain and stress of {self.body!r} are those of its own forms: "
+        """Raises InputError: fields of a domain follow from its basis."""
+        raise InputError(f"the strain and stress of {self.body!r} depend on its forms: "
                          "basis.interpolate(domain.of_basis(state.u_of(domain))) has the gradient")
 
 
 def _require_plane(basis):
-    """Raise InputError unless a basis is one of plane vectors on all cells of a mesh."""
+    """Raise InputError unless a basis has plane vectors on all cells."""
     if not isinstance(basis, Basis):
-        raise InputError(f"a Domain is made of a Basis of scikit-fem, got {shown(basis)}")
+        raise InputError(f"a Domain needs a Basis of scikit-fem, got {shown(basis)}")
     if basis.mesh.dim() != 2:
         raise InputError(f"a Domain is plane, as beams are, got a mesh of dimension "
                          f"{basis.mesh.dim()}: {shown(basis.mesh)}")
     if not isinstance(basis.elem, ElementVector) or basis.elem.dim != 2:
-        raise InputError("the unknown of a Domain is a displacement with two components: wrap the "
-                         f"element, as ElementVector(ElementQuad2()), got {shown(basis.elem)}")
+        raise InputError("the unknown of a Domain is a displacement with two components: use an "
+                         f"ElementVector(ElementQuad2()), got {shown(basis.elem)}")
     if len(np.unique(basis.element_dofs)) < basis.N:
-        raise InputError("a Domain is all of its mesh, and the basis has degrees of freedom in no "
-                         "cell: for a part of it take mesh.restrict(elements)")
+        raise InputError("the basis of a Domain must cover its whole mesh: for a part of it use "
+                         "mesh.restrict(elements)")
 
 
 def _narrow(basis):
-    """Numbers of the DOFs in an order in which those of one cell are near to each other.
-
-    By reverse Cuthill-McKee, or along x or y: in cells of many nodes that may be narrower.
-    """
+    """A numbering of the DOFs with a small bandwidth: reverse Cuthill-McKee, or along x or y."""
     pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
     k = len(pairs)
     i, j = np.repeat(pairs, k, axis=0).ravel(), np.tile(pairs, (k, 1)).ravel()
@@ -505,7 +494,7 @@ def _narrow(basis):
 
 
 def _local(mapping, point, cells):
-    """The coordinates (2, n) of a point in cells (n,), by Newton's method; not of far ones."""
+    """Local coordinates (2, n) of a point in cells (n,), by Newton's method."""
     X = np.full((2, len(cells), 1), 1.0 / 3.0)
     with np.errstate(all="ignore"):
         for _ in range(ITERATIONS):

@@ -1,7 +1,7 @@
-"""How the points of a section follow the degrees of freedom: of elements with sections, of cables.
+"""Kinematics of sections.
 
-The position is linear in the degrees of freedom of elements with sections. Sections of a cable stay
-normal to the axis, and get thinner so that S_yy = 0.
+With sections, positions are linear in the DOFs. Sections of a cable stay normal to the axis and
+contract so that S_yy = 0.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from ..mesh.places import as_point
 from .kernels import CableKernel, SectionKernel
 from .strains import cable_axis, fibres
 
-#: Part of the deflection of a cantilever, by a force at its end, that is not left out silently.
+#: Relative deflection of a cantilever by shear that gives a warning if neglected.
 SHEARED = 1e-3
 
-#: Kernels of the strain energy by the kinds that elements name.
+#: Kernels of the strain energy by the kinematics of elements.
 KERNELS: dict[str, Any] = {"sections": SectionKernel, "cable": CableKernel}
 
 
 def require_cable(beam: Any) -> None:
-    """Raise InputError for a law that is not Hooke's; warn of a shear stiffness that is ignored."""
+    """Raise InputError unless the law is Hooke's; warn about a neglected shear stiffness."""
     for layer in beam.across.layers:
         if not layer.material.is_hooke:
             raise InputError(
-                "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
+                "a cable has Hooke's law along its axis and the bending stiffness E I: it cannot "
                 f"have the law of {layer.material!r}. Use StVenantKirchhoff, or an element with "
                 "sections, as ElementBeamANCFCubic(2)")
     section, GA = beam.section, getattr(beam.section, "GA", None)
@@ -44,49 +44,48 @@ def require_cable(beam: Any) -> None:
 
 
 def locate(beam: Any, point: Any) -> tuple[int, Array]:
-    """The element of a material point, and its point (xi, eta) of the reference cell.
+    """The element of a material point (x, y) or named end, and its point (xi, eta) of the cell.
 
-    The point is its place (x, y) in the reference configuration, or the name of an end; raises
-    MeshError outside the body.
+    Raises MeshError outside of the beam.
     """
     e, X, _ = beam.finder.inside(as_point(point, beam.mesh)[:, None])
     return int(e[0]), X[:, 0]
 
 
 def probe(beam: Any, point: Any, at: tuple[int, Array] | None = None) -> tuple[Array, Array]:
-    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`, of a point that :func:`locate` may know."""
+    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`; ``at`` is the result of :func:`locate`."""
     e, X = locate(beam, point) if at is None else at
     if not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed:
         raise InputError(
-            f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
-            "position there is no linear function of its degrees of freedom: name a point of the "
-            "axis, and put a moment on an end section with scene.moment")
+            f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, where "
+            "the position is not linear in the degrees of freedom: use a point of the axis, and "
+            "scene.moment for a moment on an end section")
     return probe_reference(beam, e, X)
 
 
 def probe_reference(beam: Any, e: int, X: Array) -> tuple[Array, Array]:
-    """As :func:`probe`, for a point (2,) of the reference cell of an element."""
+    """As :func:`probe`, for a point (2,) of the reference cell."""
     dofs = beam.mesh.t[0, e] * beam.nd + np.arange(2 * beam.nd).reshape(-1, 2).T
     X = np.reshape(X, (2, 1, 1))
     return dofs, beam.element.of_mesh(beam.mesh.mapping(), X, np.array([e]))[0].ravel()
 
 
 def element_dofs(beam: Any, elements: Array | None = None) -> Array:
-    """Degrees of freedom (n, 2 nd) of elements (n,), by default of all."""
+    """DOFs (n, 2 nd) of elements (n,), by default of all."""
     first = beam.nd * (beam.mesh.t[0] if elements is None else beam.mesh.t[0, elements])
     return np.asarray(first[:, None] + np.arange(2 * beam.nd))
 
 
 def entries_of(dofs: Array) -> tuple[Array, Array]:
-    """Rows and columns of the entries of square matrices with these DOFs (n, k), (n k k,) both."""
+    """Rows and columns (n k k,) of element matrices with these DOFs (n, k)."""
     rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
     return rows.ravel(), columns.ravel()
 
 
 def direction(beam: Any, node: int) -> tuple[Array, Array]:
-    """Degrees of freedom (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section.
+    """DOFs (2, n) and weights (n,) of ``12 / h^3 int Y r dY`` of a section.
 
-    Of a cable those of the tangent, which turns with the section.
+    For a cable, those of the tangent.
     """
     if not beam.has_sections:
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
@@ -100,7 +99,7 @@ def direction(beam: Any, node: int) -> tuple[Array, Array]:
 
 
 def direction_weights(beam: Any, e: int, xi: float) -> Array:
-    """Weights (nb,) of an element's local functions in the :func:`direction` inside it."""
+    """Weights (nb,) of the shape functions in the :func:`direction` inside an element."""
     if not beam.has_sections:
         rows = beam.element.local(np.array([[xi], [0.5]]), beam.mesh.height)
         return rows[1][:, 0] * beam.mesh.lengths[e] ** (rows[3] - 1.0)
@@ -111,7 +110,7 @@ def direction_weights(beam: Any, e: int, xi: float) -> Array:
 
 
 def plane(beam: Any, tangent: Array) -> tuple[Array, list[int]]:
-    """The normal (2,) of the plane of a section, and the derivatives that stay in the plane."""
+    """The normal (2,) of a section's plane, and the numbers of the derivatives within the plane."""
     if not beam.has_sections:
         return np.array([-tangent[1], tangent[0]]), [1]
     return tangent, [k for k, (_, along, across) in enumerate(beam.element.functionals)
@@ -128,7 +127,7 @@ def gradients(beam: Any, u: Array, X: Array, tind: Array | None) -> tuple[Array,
     e, P, shape = _flat(beam, X, tind)
     (_, tangent), *axis = cable_axis(beam, u, e, P[0])
     longer, ratio = fibres(beam, e, P, *axis)
-    with np.errstate(invalid="ignore"):  # where the strain leaves no width
+    with np.errstate(invalid="ignore"):  # a section may vanish
         across = np.sqrt(1.0 + 2.0 * ratio * (longer + 0.5 * longer * longer))
     F = np.stack([(1.0 + longer) * tangent, across * np.array([-tangent[1], tangent[0]])], axis=1)
     frame = mapping.frame(X, tind)
@@ -149,7 +148,7 @@ def displacements(beam: Any, u: Array, X: Array, tind: Array | None) -> Array:
 
 
 def _flat(beam, X, tind):
-    """Elements (n,) and points (2, n) of points of elements, and the shape (nelements, npoints)."""
+    """Elements (n,), points (2, n), and the shape (nelements, npoints)."""
     tind = np.arange(beam.mesh.nelements) if tind is None else tind
     shape = len(tind), X.shape[-1]
     return (np.repeat(tind, shape[1]), X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0]),
@@ -157,7 +156,7 @@ def _flat(beam, X, tind):
 
 
 def shortest(beam: Any, u: Array) -> float:
-    """Smallest stretch of the fibres along the axis at the integration points."""
+    """The smallest axial stretch at the integration points."""
     return float(beam.kernel.shortest(u) if beam.has_sections else
                  np.min(beam.kernel.outer_stretches(u)))
 
@@ -165,7 +164,7 @@ def shortest(beam: Any, u: Array) -> float:
 def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
     """det F and principal stretches at the integration points.
 
-    Of a :func:`~skfem_ancf.core.linear.step` both are linear in the displacement.
+    They are linear in a :func:`~skfem_ancf.core.linear.step`.
     """
     if not beam.has_sections:
         along = beam.kernel.outer_stretches(u)
@@ -188,10 +187,7 @@ def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
 
 
 def folded(beam: Any, u: Array) -> bool:
-    """True if the axis of an element turns back: its ends lie against a tangent of the axis.
-
-    An axis that does so turns by more than pi over the element, or has no length in it.
-    """
+    """True if the axis folds back within an element: a chord is opposite to an end tangent."""
     nodes = u.reshape(-1, beam.nd)[:, :4].T
     x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
     left, right = beam.mesh.t

@@ -1,4 +1,4 @@
-"""The degrees of freedom of a scene, as what acts in it sees them when it is bound."""
+"""The degrees of freedom of a scene."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ from ..core.errors import InputError, NameUnknown, shown
 from ..core.types import Array
 from .rigid import RigidBody
 
-#: What :func:`select_beam` takes: a Beam, its name or its number; None for the only one.
+#: Argument of :func:`select_beam`: a Beam, its name or number; None for the only one.
 WhichBeam: TypeAlias = Beam | str | int | None
 
-#: The same, of beams, rigid bodies and domains.
+#: The same for beams, rigid bodies and domains.
 WhichMember: TypeAlias = Beam | RigidBody | Domain | str | int | None
 
 
 class Layout:
     """Beams, rigid bodies and domains, their names, and the numbers of their DOFs.
 
-    What acts in a scene is bound to it. The N degrees of freedom (DOFs) of the beams come first,
-    beam after beam, then those of the bodies and of the domains; ``members`` are all in this order.
-    Raises InputError if there are none, or two are the same or have one name.
+    Actions are bound to a Layout. The N DOFs are in the order of ``members``: beams, bodies,
+    domains. Raises InputError if there are none, or if members or names are not unique.
     """
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
@@ -35,10 +34,10 @@ class Layout:
                 raise InputError("a scene is made of Beams, RigidBodies and Domains, got "
                                  f"{shown(one)}")
         if not members:
-            raise InputError("a scene needs a Beam, a RigidBody or a Domain at least, got none")
+            raise InputError("a scene needs at least a Beam, a RigidBody or a Domain, got none")
         names = [one.name for one in members if one.name is not None]
         if len(set(names)) < len(names) or len(set(map(id, members))) < len(members):
-            raise InputError(f"the beams of a scene must be different, and so must their names: "
+            raise InputError("the beams of a scene must be different, with different names, got "
                              f"{names}")
         self.beams = tuple(b for b in members if isinstance(b, Beam))
         self.bodies = tuple(b for b in members if isinstance(b, RigidBody))
@@ -51,8 +50,7 @@ class Layout:
         return Layout, self.members
 
     def number(self, which: WhichMember = None) -> int:
-        """The number of a member given by itself, its name, its number, or None for the only one.
-        """
+        """The number of a member (object, name or number); None for the only one."""
         if which is None and len(self.members) == 1:
             return 0
         found = self._numbers.get(id(which))
@@ -61,21 +59,21 @@ class Layout:
         return self._numbers[id(select_member(self.beams, self.members[len(self.beams):], which))]
 
     def beam(self, which: WhichMember = None) -> Any:
-        """The member meant by itself, a name, a number, or None for the only one."""
+        """A member by object, name or number; None for the only one."""
         return self.members[self.number(which)]
 
     def offset(self, which: WhichMember = None) -> int:
-        """Number of the first degree of freedom of a member."""
+        """The first DOF of a member."""
         return self._first[self.number(which)]
 
     @property
     def sizes(self) -> Array:
-        """What degrees of freedom change by where members move by their size, shape (N,)."""
+        """Typical changes of the DOFs when members move by their size, shape (N,)."""
         return np.concatenate([b.sizes for b in self.members])
 
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
-    """The beam meant by a Beam, a name, a number, or None where there is only one."""
+    """A beam by object, name or number; None for the only one."""
     if beam is None and len(beams) == 1:
         return beams[0]
     found: Sequence[Beam] = ()
@@ -89,21 +87,18 @@ def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
         return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
     if not beams:
-        raise InputError("this is asked of beams, and the scene has none: name one of its "
-                         f"members, by itself, its name or its number; got {shown(beam)}")
+        raise InputError("a beam is needed here, and the scene has none: give one of its members, "
+                         f"its name or its number; got {shown(beam)}")
     if beam is None:
-        raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
+        raise InputError(f"the scene has {len(beams)} beams: choose one with beam=, of {known}")
     if isinstance(beam, (RigidBody, Domain)):
-        raise InputError(f"this is asked of beams, got {shown(beam)}; beams are {known}")
+        raise InputError(f"a beam is needed here, got {shown(beam)}; beams are {known}")
     raise NameUnknown("beam", beam, known)
 
 
 def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody | Domain],
                   which: WhichMember) -> Beam | RigidBody | Domain:
-    """As :func:`select_beam`, of beams and of rigid bodies and domains, numbered behind them.
-
-    None is the only beam, without beams the only body.
-    """
+    """A beam, or a rigid body or domain, numbered after the beams; None for the only one."""
     if which is None and not beams and len(bodies) == 1:
         return bodies[0]
     if which is None or not bodies:

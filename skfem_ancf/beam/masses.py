@@ -1,4 +1,4 @@
-"""The mass of a beam: local functions and masses at points."""
+"""Mass of a beam: shape functions and masses at points."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ from ..core.types import Array, Rule
 from ..formulations.ecm import AXIS
 from ..mesh.mapping import cross
 
-#: Points along an element more, where the height is a cubic or something varies.
+#: Additional points along an element of variable section.
 MORE = 4
 
-#: Turns a vector by 90 degrees.
+#: Rotation by 90 degrees.
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 class Masses(NamedTuple):
-    """Masses at points of the elements, of one where all are equal.
+    """Masses at points of the elements, or of one element if all are equal.
 
-    ``functions`` are local functions at points, (nb, nelements, npoints), ``mass`` the masses,
-    (nelements, npoints). A cable may have more than the mass of its axis: its points off it move
-    with ``v + Y v_X``, the latter turned by 90 degrees, as long as the axis hardly stretches. Then
-    ``slopes`` are derivatives of the functions along the axis, and ``moments`` masses times Y and
+    ``functions`` are shape functions (nb, nelements, npoints), ``mass`` the masses, (nelements,
+    npoints). For cables with rotary inertia, with velocity ``v + Y v_X`` turned by 90 degrees off
+    the axis, ``slopes`` are axial derivatives of the functions, and ``moments`` masses times Y and
     Y^2, (2, nelements, npoints).
     """
 
@@ -52,7 +51,7 @@ class Masses(NamedTuple):
         return out
 
     def weights(self, g: Array) -> Array:
-        """Forces of an acceleration g (2,), shape (nelements, nb, 2)."""
+        """Nodal forces of an acceleration g (2,), shape (nelements, nb, 2)."""
         out = np.einsum("iep,ep->ei", self.functions, self.mass)[:, :, None] * g
         if self.slopes is not None:
             out = out + np.einsum("iep,ep->ei", self.slopes, self.moments[0])[:, :, None] * (
@@ -61,19 +60,19 @@ class Masses(NamedTuple):
 
 
 def exact_rule(beam: Any) -> Rule:
-    """Points (2, n) and weights (n,), exact for products of two degrees of freedom."""
+    """Points (2, n) and weights (n,), exact for products of two DOFs."""
     n = beam.element.axis_degree + 1 + (0 if beam.mesh.is_straight else 1)
     return tensor(gauss(n), gauss(beam.element.order + 1) if beam.has_sections else AXIS)
 
 
 def points_along(beam: Any) -> int:
-    """Gauss points along an element for products of two degrees of freedom."""
+    """Number of axial Gauss points for products of two DOFs."""
     more = (0 if beam.mesh.is_straight else 1) + (0 if beam.across.constant else MORE)
     return beam.element.axis_degree + 1 + more
 
 
 def masses_of(beam: Any) -> Masses:
-    """The Masses of a beam, of sections of their full height between nodes too."""
+    """The Masses of a beam."""
     if not beam.has_sections:
         return _of_cable(beam)
     across, axis = beam.across, gauss(points_along(beam))
@@ -87,7 +86,7 @@ def masses_of(beam: Any) -> Masses:
 
 
 def _of_cable(beam):
-    """The Masses of a cable; without that of turning if its section is a plain rectangle."""
+    """The Masses of a cable; without rotary inertia for a plain rectangle."""
     across, mapping = beam.across, beam.mesh.mapping()
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
@@ -95,22 +94,19 @@ def _of_cable(beam):
     N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
     eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
     J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
-    # the length of the axis: directors that are interpolated between nodes are shorter than one
+    # arc length, since the interpolated tangent is shorter than one
     speed = np.hypot(*J[:, 0, ..., :len(xi)])
     mass, first, second = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
         return Masses(N, mass)
-    # the volume of a curve is that of its axis times 1 - Y / R
+    # volume of a curved beam: that of its axis times 1 - Y / R
     middle, bottom, top = np.split(cross(J[:, 0], J[:, 1]), 3, axis=-1)
     bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])
     return Masses(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
 
 def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
-    """Rates (N,) of the degrees of freedom whose velocity is nearest to a field, in the mean.
-
-    The field takes points of the reference configuration, (2, nelements, npoints).
-    """
+    """L2 projection (N,) of a velocity field, a function of points (2, nelements, npoints)."""
     X, W = exact_rule(beam)
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
     N = element.of_mesh(mapping, X)[0].transpose(1, 0, 2)
@@ -118,7 +114,7 @@ def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
     gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
     gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])
     rest, v = field(mapping.F(X)).transpose(1, 2, 0), np.zeros((beam.N // 2, 2))
-    for _ in range(2):  # elements of high degree have ill-conditioned masses
+    for _ in range(2):  # refined, since masses of high degree are ill-conditioned
         parts = weighted @ rest
         dv = gram.solve(beam.kernel.scatter(parts).reshape(-1, 2))
         left, right = dv.reshape(-1, nd)[mesh.t]

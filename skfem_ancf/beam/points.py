@@ -1,7 +1,7 @@
-"""Material points: in which element of which beam they are.
+"""Material points and their location in elements.
 
-A point is named by its place (x, y) in the reference configuration. One is a tuple, a list or an
-array of two numbers; many are an array of shape (2, n), as in scikit-fem, or a list of points.
+A point is given by its position (x, y) in the reference configuration: a tuple, a list or an array
+of two numbers. Several points are an array (2, n), as in scikit-fem, or a list of points.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .strains import strain_at
 
 
 def is_many(points: Any) -> bool:
-    """True for an array of two dimensions, and for a list or tuple of points."""
+    """True for a two-dimensional array, or a list or tuple of points."""
     if isinstance(points, np.ndarray):
         return points.ndim == 2
     return isinstance(points, (list, tuple)) and len(points) > 0 and all(
@@ -32,10 +32,9 @@ def is_many(points: Any) -> bool:
 
 
 def as_points(points: Any) -> Array:
-    """Many points as an array (2, n), or one as an array (2,); raises MeshError for others.
+    """Several points as an array (2, n), or one as an array (2,); MeshError for others.
 
-    Two numbers are one point. Many are a list of pairs, or an array (2, n), whose columns are
-    points: those of an array of shape (2, 2) too, as of scikit-fem's ``mesh.p``.
+    A two-dimensional array has points in its columns, also with shape (2, 2).
     """
     if not is_many(points):
         return require_point(points)
@@ -43,28 +42,21 @@ def as_points(points: Any) -> Array:
         if len(points) == 2:
             return require_finite("points", points)
         hint = "; give its transpose, or a list" if points.shape[1] == 2 else ""
-        raise MeshError("an array of points has shape (2, n), the x in its first row and the y in "
-                        f"its second, got {points.shape}{hint}")
+        raise MeshError("an array of points has shape (2, n), with x in the first row and y in "
+                        f"the second, got {points.shape}{hint}")
     return np.array([require_point(p) for p in points]).T
 
 
-#: How far from the middle of the section, relative to its height, the axis of a cable reaches.
+#: Tolerance of points on the axis of a cable, relative to the height.
 ON_AXIS = 1e-12
 
 
 class BeamPoints:
     """Points of one beam.
 
-    Attributes
-    ----------
-    beam, number
-        The beam and its number.
-    slice : slice
-        Its degrees of freedom in the scene.
-    index
-        Which of the points asked for they are, (n,), or None for all.
-    e, X
-        Elements (n,) and reference points (2, n).
+    ``index`` (n,) are their numbers among the requested points, or None for all; ``e`` (n,) are
+    elements, ``X`` (2, n) points of the reference cell, ``slice`` the DOFs of the beam in the
+    scene.
     """
 
     def __init__(self, beam: Any, number: int, dofs: slice, index: Array | None,
@@ -74,7 +66,7 @@ class BeamPoints:
 
     @cached_property
     def at(self) -> Array:
-        """Reference points as the fields of a beam take them, (2, n, 1)."""
+        """Points of the reference cell in the shape (2, n, 1)."""
         return self.X[:, :, None]
 
     @cached_property
@@ -84,12 +76,12 @@ class BeamPoints:
 
     @cached_property
     def off_axis(self) -> bool:
-        """Points of a cable off its axis: their section turns with the tangent."""
+        """True if a point is off the axis of a cable, where positions are nonlinear."""
         return not self.beam.has_sections and bool(np.any(np.abs(self.X[1] - 0.5) > ON_AXIS))
 
     @cached_property
     def dofs(self) -> Array:
-        """Degrees of freedom of the scene that move each point, (nb, 2, n)."""
+        """DOFs of the element of each point, (nb, 2, n)."""
         first = self.slice.start + self.beam.mesh.t[0, self.e] * self.beam.nd
         return first + np.arange(2 * self.beam.nd).reshape(-1, 2, 1)
 
@@ -99,20 +91,20 @@ class BeamPoints:
 
     @property
     def weights(self) -> Array:
-        """Their weights in the position, (nb, n)."""
+        """Shape functions, (nb, n)."""
         return self._functions[0][..., 0]
 
     @property
     def slopes(self) -> Array:
-        """Their weights in the derivative of the position by xi, (nb, n)."""
+        """Derivatives of the shape functions by xi, (nb, n)."""
         return self._functions[1][..., 0]
 
     def combine(self, weights: Array, u: Array) -> Array:
-        """The sum (..., 2, n) of weighted degrees of freedom (..., N) at each point."""
+        """The sum (..., 2, n) of weighted DOFs (..., N) at each point."""
         return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
+        """Displacements (..., 2, n) for DOFs ``u`` (..., N) of the scene."""
         moved = self.combine(self.weights, u)
         if not self.off_axis:
             return moved
@@ -121,7 +113,7 @@ class BeamPoints:
         return moved + self._lever * np.stack([-turn[..., 1, :], turn[..., 0, :]], -2)
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
+        """Velocities (..., 2, n) for DOFs and their rates, (..., N)."""
         moved = self.combine(self.weights, v)
         if not self.off_axis:
             return moved
@@ -141,10 +133,7 @@ class BeamPoints:
         return (eta - 0.5) * basis.height * basis.height_at(self.e, xi)
 
     def strain(self, u: Array, recovery: Any = None) -> Array:
-        """Strain (eps_xx, eps_yy, 2 eps_xy), (3, n), for ``u`` (N,) of the scene.
-
-        The recovered one, where a :class:`~skfem_ancf.recovery.recovered.Recovery` is given.
-        """
+        """Strain (eps_xx, eps_yy, 2 eps_xy), (3, n), recovered if a Recovery is given."""
         if recovery is not None:
             return recovery.at(self.e, self.X, slice(0, 3))
         return strain_at(self.beam, u[self.slice], self.e, self.X)
@@ -155,9 +144,9 @@ def _length(a):
 
 
 class BodyPoints:
-    """Points of one rigid body; attributes as of :class:`BeamPoints`."""
+    """Points of a rigid body, with the interface of :class:`BeamPoints`."""
 
-    off_axis = False  # its points move linearly in its degrees of freedom
+    off_axis = False  # positions are linear in the DOFs
 
     def __init__(self, body: RigidBody, dofs: slice, index: Array | None,
                  start: Array) -> None:
@@ -165,40 +154,30 @@ class BodyPoints:
         self._frame = body.local(start)
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2, n) for degrees of freedom ``u`` (..., N) of the scene."""
+        """Displacements (..., 2, n) for DOFs ``u`` (..., N) of the scene."""
         x, y, c, s = np.moveaxis(u[..., self.slice, None], -2, 0)
         a, b = self._frame
         return np.stack([x + a * c - b * s, y + a * s + b * c], axis=-2)
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n) for degrees of freedom and their rates, (..., N)."""
+        """Velocities (..., 2, n) for DOFs and their rates, (..., N)."""
         return self.displacement(v)
 
     @property
     def number(self) -> int:
         """Raises InputError: a rigid body has no fields."""
-        raise InputError(f"{self.body!r} has no strain, stress or section forces: ask for points "
-                         "of beams")
+        raise InputError(f"{self.body!r} has no strain, stress or section forces: use points of "
+                         "beams")
 
 
 class Located:
-    """Points of a scene.
-
-    Attributes
-    ----------
-    one : bool
-        They were given as a single point.
-    n : int
-        How many.
-    parts : list of BeamPoints, BodyPoints and DomainPoints
-        Those of each beam and body that has some.
-    """
+    """Points of a scene: ``n`` points, or ``one``, in ``parts`` by beam and body."""
 
     def __init__(self, one: bool, n: int, parts: Sequence[Any]) -> None:
         self.one, self.n, self.parts = one, n, parts
 
     def gather(self, values: Sequence[Array]) -> Array:
-        """One array of those of the parts, (..., n) each; (...) for a single point."""
+        """Merge arrays (..., n) of the parts; (...) for a single point."""
         if len(self.parts) == 1 and self.parts[0].index is None:
             out = values[0]
         else:
@@ -208,11 +187,11 @@ class Located:
         return out[..., 0] if self.one else out
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2), or (..., 2, n) of many, for degrees of freedom (..., N)."""
+        """Displacements (..., 2), or (..., 2, n) of several, for DOFs (..., N)."""
         return self.gather([part.displacement(u) for part in self.parts])
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2), or (..., 2, n) of many, for degrees of freedom and their rates."""
+        """Velocities (..., 2), or (..., 2, n) of several, for DOFs and their rates."""
         return self.gather([part.velocity(u, v) for part in self.parts])
 
     @cached_property
@@ -222,10 +201,9 @@ class Located:
 
 
 class Points:
-    """Finds the points of a scene: of beams and bodies with their ``slices`` of degrees of freedom.
+    """Locates points in beams and bodies with their ``slices`` of DOFs.
 
-    Bodies are rigid bodies and domains. ``lines`` are of a frame the numbers of the line of each
-    chain of elements, beam after beam.
+    ``lines`` are the line numbers of the chains of elements of a frame.
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
@@ -235,18 +213,18 @@ class Points:
 
     def find(self, points: Any, beam: WhichMember = None, line: int | None = None,
              ask: bool = False) -> Located:
-        """Where points are: of several beams and lines in the one whose axis is nearest.
+        """Locate points; where beams or lines overlap, in the one with the nearest axis.
 
         Parameters
         ----------
         points
-            One or many, see :func:`as_points`; a RigidBody for its centre of mass; what was found.
+            One or several, see :func:`as_points`; a RigidBody for its centre of mass; or Located.
         beam
-            The beam or rigid body that they are in, its name or number; found for each if None.
+            The beam or rigid body, its name or number; searched for if None.
         line
-            The number of their line of a frame, or chain of elements of the beam.
+            The number of the line of a frame, or of the chain of elements of the beam.
         ask
-            Raise InputError where several axes are nearest, as at a node; if False it is the first.
+            Raise InputError if several axes are nearest, as at a node; else the first one is used.
 
         Raises
         ------
@@ -266,7 +244,7 @@ class Points:
             if found is not None:
                 return found
         if isinstance(points, (int, float)):
-            as_points(points)  # x and y as two arguments: y is no beam
+            as_points(points)  # raises: x and y were given as two arguments
         if beam is not None:
             beam = select_beam(self.beams, beam)
         elif len(self.beams) == 1 and not self.bodies:
@@ -278,19 +256,19 @@ class Points:
 
     @cached_property
     def _chains(self):
-        """How many chains of elements the beams before each have, and all, (beams + 1,)."""
+        """Numbers of the first chain of each beam, and of all chains, (beams + 1,)."""
         return np.cumsum([0] + [int(b.mesh.chains[-1]) + 1 for b in self.beams])
 
     def chain_of(self, line: int, beam: WhichMember = None) -> tuple[Beam, int]:
-        """The beam of a line, and its number among the chains of elements of that beam."""
+        """The beam of a line, and the number of its chain in that beam."""
         if self._lines is None:
             b = select_beam(self.beams, beam)
             return b, require_integer("line", line, 0, int(b.mesh.chains[-1]))
         number = require_integer("line", line, 0)
         at = np.flatnonzero(self._lines == number)
         if not len(at):
-            raise InputError(f"the frame has no line {number}: its lines are numbered 0 to "
-                             f"{np.max(self._lines)}, without those whose ends are one node")
+            raise InputError(f"the frame has no line {number}: lines are numbered 0 to "
+                             f"{np.max(self._lines)}, without those that begin and end at one node")
         k = int(np.searchsorted(self._chains, at[0], side="right")) - 1
         if beam is not None and select_beam(self.beams, beam) is not self.beams[k]:
             raise InputError(f"line {number} is in the beam {self.beams[k].name!r}, not in "
@@ -298,21 +276,21 @@ class Points:
         return self.beams[k], int(at[0] - self._chains[k])
 
     def _ask(self, x, beams):
-        """Raise InputError: the axes of several lines are nearest to a point, shape (2, 1)."""
-        held = [(off, b, chain) for b in beams for off, chain in b.finder.chains_at(x)]
-        least = min(off for off, *_ in held)
-        found = [(b, chain) for off, b, chain in held if off <= least + b.finder.equal]
-        where = f"the point {shown(tuple(map(float, x[:, 0])))} is as near to the axes of "
+        """Raise InputError: several axes are nearest to a point, shape (2, 1)."""
+        around = [(off, b, chain) for b in beams for off, chain in b.finder.chains_at(x)]
+        least = min(off for off, *_ in around)
+        found = [(b, chain) for off, b, chain in around if off <= least + b.finder.equal]
+        where = f"the point {shown(tuple(map(float, x[:, 0])))} is equally close to the axes of "
         if self._lines is None and len({id(b) for b, _ in found}) > 1:
             names = [k if b.name is None else b.name
                      for k, b in enumerate(self.beams) if any(b is other for other, _ in found)]
-            raise InputError(f"{where}the beams {names}: say which, as beam={names[0]!r}")
+            raise InputError(f"{where}the beams {names}: choose one, as beam={names[0]!r}")
         numbers = sorted(chain if self._lines is None else int(
             self._lines[self._chains[self.beams.index(b)] + chain]) for b, chain in found)
-        raise InputError(f"{where}lines {numbers}: say which, as line={numbers[0]}")
+        raise InputError(f"{where}lines {numbers}: choose one, as line={numbers[0]}")
 
     def _of_body(self, points, beam):
-        """Located of a body that is named; None if none is."""
+        """Located for a named body, or None."""
         if isinstance(points, RigidBody):
             points, beam = points.position, points
         elif beam is None and (self.beams or len(self.bodies) > 1):
@@ -340,7 +318,7 @@ class Points:
         return BeamPoints(beam, k, self.slices[k], None, e, X)
 
     def _in_all(self, x, ask):
-        """Points (2, n), each in the beam whose axis is nearest, or in a body."""
+        """Points (2, n), each in the beam with the nearest axis, or in a body."""
         which, least = np.full(x.shape[1], -1), np.full(x.shape[1], np.inf)
         elements, cells = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape)
         several, parts = np.zeros(x.shape[1], dtype=bool), list[Any]()
@@ -386,9 +364,9 @@ class Points:
 
 
 def require_body(system: Any, which: WhichMember) -> RigidBody:
-    """The rigid body of a System by itself, its name or number; InputError of a beam."""
+    """A rigid body of a System by object, name or number; InputError for a beam."""
     body = None if which is None else select_member(system.beams, system.bodies, which)
     if not isinstance(body, RigidBody):
-        raise InputError(f"this is asked of rigid bodies, got {shown(which)}; those of the scene "
+        raise InputError(f"a rigid body is needed here, got {shown(which)}; those of the scene "
                          f"are {system.bodies}")
     return body

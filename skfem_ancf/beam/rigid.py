@@ -15,21 +15,19 @@ from ..core.linear import angle_of
 from ..core.types import Array
 from ..mesh.places import as_point
 
-#: Components of the degrees of freedom: the position of the centre of mass, and the director.
+#: Names of the DOFs: position of the centre of mass, and director.
 NAMES = ("r^1", "r^2", "d^1", "d^2")
 
 
 class RigidBody(Immutable):
-    """A rigid body in the plane. It does not change; :meth:`replace` returns a changed copy.
+    """A planar rigid body. It is immutable; :meth:`replace` returns a changed copy.
 
-    Its degrees of freedom are the position r of the centre of mass and a unit vector d that turns
-    with it. The point (a, b) of its own frame is at ``r + a d + b d'``, d' the vector d turned by
-    a right angle, and the kinetic energy is ``mass r.^2 / 2 + inertia d.^2 / 2`` with the rates r.
-    and d.: points are linear in them, the mass matrix is constant, and ``d . d = 1`` is the only
-    constraint, with a multiplier.
+    Its degrees of freedom are the position r of the centre of mass and a unit director d. The point
+    (a, b) of the body frame is at ``r + a d + b d'``, with d' = d turned by 90 degrees. Positions
+    are linear in the DOFs, the mass matrix is constant, and ``d . d = 1`` is a constraint with a
+    multiplier.
 
-    A material point is named by its place (x, y) in the state of the start, as of a beam. One may
-    lie outside of the outline.
+    A material point is named by its initial position (x, y) and may lie outside of the outline.
 
     Parameters
     ----------
@@ -38,16 +36,15 @@ class RigidBody(Immutable):
     inertia
         Moment of inertia about the centre of mass, positive.
     position
-        Place of the centre of mass at the start, shape (2,).
+        Initial position of the centre of mass, shape (2,).
     angle
-        Angle of its own frame at the start, in radians, counterclockwise.
+        Initial angle of the body frame, in radians, counterclockwise.
     name
-        What messages call the body.
+        Name in messages.
     outline
-        Corners of a polygon in its own frame, from the centre of mass: a list of points, or an
-        array of shape (n, 2), or (2, n) as the attribute has it. For pictures and files, and to
-        find which body a point is in. By default the square whose plate of constant thickness has
-        this mass and inertia.
+        Corners of a polygon in the body frame, relative to the centre of mass: a list of points, or
+        an array of shape (n, 2) or (2, n). It is used in plots and files, and to locate points. The
+        default is the square plate with this mass and inertia.
 
     Other Parameters
     ----------------
@@ -84,7 +81,7 @@ class RigidBody(Immutable):
         self.inertia = require_positive("inertia", inertia)
         for name_of, value in (("mass", self.mass), ("inertia", self.inertia)):
             if value < np.finfo(float).tiny:
-                raise InputError(f"{name_of} must be a number whose inverse is one, got {value!r}")
+                raise InputError(f"{name_of} is too small, its inverse overflows: got {value!r}")
         self.position = require_finite("position", position, (2,))
         self.angle = require_finite_scalar("angle", angle)
         self.name = require_label("name", name)
@@ -99,34 +96,34 @@ class RigidBody(Immutable):
                 f"({self.position[0]:g}, {self.position[1]:g})>")
 
     def replace(self, **changes: Any) -> RigidBody:
-        """The same body with some arguments of its constructor changed, as ``mass=2.0``."""
+        """A copy with some arguments of the constructor changed, as ``mass=2.0``."""
         return rebuilt(self, changes)
 
-    # what a scene asks of a beam, too
+    # the interface of a beam
 
     @property
     def dofnames(self) -> list[str]:
-        """Names of the degrees of freedom."""
+        """Names of the DOFs."""
         return list(NAMES)
 
     @property
     def q0_local(self) -> Array:
-        """As :attr:`q0`, with the position measured from :attr:`origin`."""
+        """:attr:`q0` with the position relative to :attr:`origin`."""
         return np.append(np.zeros(2), self.q0[2:])
 
     @property
     def origin(self) -> Array:
-        """The centre of mass at the start, shape (2,)."""
+        """Initial centre of mass, shape (2,)."""
         return self.position
 
     @property
     def size(self) -> float:
-        """How far the outline reaches from the centre of mass."""
+        """Largest distance of the outline from the centre of mass."""
         return float(np.max(np.hypot(*self.outline)))
 
     @property
     def sizes(self) -> Array:
-        """Changes of the degrees of freedom where it moves by its size and turns, (4,)."""
+        """Typical changes of the DOFs when the body moves by its size, (4,)."""
         return np.array([self.size, self.size, 1.0, 1.0])
 
     @property
@@ -135,7 +132,7 @@ class RigidBody(Immutable):
         return self.mass
 
     def mass_entries(self) -> tuple[Array, Array, Array]:
-        """The mass matrix: rows, columns and values, shapes (4,)."""
+        """Rows, columns and values (4,) of the mass matrix."""
         k = np.arange(4)
         return k, k, np.array([self.mass, self.mass, self.inertia, self.inertia])
 
@@ -144,11 +141,7 @@ class RigidBody(Immutable):
         return np.append(self.mass * require_finite("g", g, (2,)), np.zeros(2))
 
     def velocity_of(self, field: Callable[[Array], Array]) -> Array:
-        """The rates (4,) of the degrees of freedom in a field of velocities.
-
-        It takes points x (2, n) of the start and returns velocities (2, n), and is asked at the
-        centre of mass and at the tip of the director.
-        """
+        """DOF rates (4,) in a velocity field, a function of initial points (2, n)."""
         v = field(self.position[:, None] + self.size * np.array([[0.0, 1.0], [0.0, 1.0]])
                   * self.q0[2:, None])
         n = np.array([-self.q0[3], self.q0[2]])
@@ -162,14 +155,14 @@ class RigidBody(Immutable):
         return out
 
     def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
-        """Numbers of degrees of freedom by their names, shape (n,).
+        """Numbers of DOFs by name, shape (n,).
 
         Parameters
         ----------
         boundary
-            None, or a point: a body is one place.
+            None, or a point.
         names
-            Of :attr:`dofnames`, or without component, as ``"r"``; None for all.
+            From :attr:`dofnames`, or without component, as ``"r"``; None for all.
         """
         if boundary is not None and not isinstance(boundary, RigidBody):
             self.place(boundary)
@@ -180,32 +173,32 @@ class RigidBody(Immutable):
                          if full in names or full.rsplit("^", 1)[0] in names])
 
     def direction(self) -> tuple[Array, Array]:
-        """Numbers (2, 1) and weight (1,) of the degrees of freedom of its director."""
+        """Number (2, 1) and weight (1,) of the DOFs of the director."""
         return np.array([[2], [3]]), np.ones(1)
 
     # points
 
     def place(self, at: Any) -> Array:
-        """A point (x, y) of the start as an array (2,); None for the centre of mass."""
+        """An initial point (x, y) as an array (2,); None for the centre of mass."""
         return self.position if at is None else as_point(at)
 
     def local(self, x: ArrayLike) -> Array:
-        """Coordinates in its own frame, from the centre, of points (2, ...) of the start."""
+        """Coordinates in the body frame of initial points (2, ...)."""
         x = require_finite("x", x)
         if x.ndim < 1 or len(x) != 2:
             raise InputError(f"x must have shape (2, ...), got {x.shape}")
         return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
 
     def probe(self, at: Any) -> tuple[Array, Array]:
-        """Numbers and weights (2, 3) of the degrees of freedom in the position of a material point.
+        """Numbers and weights (2, 3) of the DOFs in the position of a material point.
 
-        ``sum(q[dofs] * weights, axis=1)`` is the position; None is the centre of mass.
+        The position is ``sum(q[dofs] * weights, axis=1)``; None is the centre of mass.
         """
         a, b = self.local(self.place(at))
         return np.array([[0, 2, 3], [1, 3, 2]]), np.array([[1.0, a, -b], [1.0, a, b]])
 
     def contains(self, x: ArrayLike) -> Array:
-        """Whether points (2, n) of the start are inside of the outline or on it, shape (n,)."""
+        """Whether initial points (2, n) are in the outline, shape (n,)."""
         p = self.local(require_finite("x", x, (2, None))).T
         corners = self.outline.T
         inside, near = np.zeros(len(p), dtype=bool), np.zeros(len(p), dtype=bool)
@@ -219,24 +212,24 @@ class RigidBody(Immutable):
         return inside | near
 
     def outline_at(self, u: Array) -> Array:
-        """The corners (2, n) of the outline at a displacement (4,)."""
+        """The outline (2, n) at a displacement (4,)."""
         q = self.q0 + u
         d = q[2:]
         return q[:2, None] + np.array([[d[0], -d[1]], [d[1], d[0]]]) @ self.outline
 
     def angle_at(self, u: Array) -> Array:
-        """The angle at displacements (..., 4), no more than pi from :attr:`angle`."""
+        """The angle at displacements (..., 4), within pi of :attr:`angle`."""
         d = self._frame.T @ (self.q0[2:] + u[..., 2:])[..., None]
         return self.angle + angle_of(d[..., 0, 0], d[..., 1, 0])
 
     def angular_velocity(self, u: Array, v: Array) -> Array:
-        """The angular velocity, counterclockwise, of displacements and their rates (..., 4)."""
+        """The angular velocity, counterclockwise, for displacements and rates (..., 4)."""
         d = self.q0[2:] + u[..., 2:]
         return d[..., 0] * v[..., 3] - d[..., 1] * v[..., 2]
 
 
 def on_body(place: Any, beam: Any) -> tuple[Any, Any]:
-    """A place and a beam; a RigidBody in place of a place is its centre of mass, or all of it."""
+    """Place and beam; a RigidBody given as place becomes the beam."""
     return (None, place) if isinstance(place, RigidBody) else (place, beam)
 
 
@@ -247,10 +240,10 @@ def _square(mass, inertia):
 
 def _polygon(outline):
     points = require_finite("outline", outline)
-    if points.ndim == 2 and points.shape[1] == 2:  # of three corners (2, n) has more columns
+    if points.ndim == 2 and points.shape[1] == 2:  # n >= 3, so that (2, n) differs
         points = points.T
     if points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not np.any(points):
-        raise InputError("an outline is a polygon of three corners at least, from the centre of "
-                         "mass: a list of points, or an array of shape (n, 2), got "
+        raise InputError("an outline is a polygon of at least three corners, relative to the "
+                         "centre of mass: a list of points, or an array of shape (n, 2), got "
                          f"{shown(outline)}")
     return points

@@ -8,14 +8,14 @@ import numpy as np
 from ..core.band import add_multiple, clear, copy
 from ..core.source import I1, I2, primitive, shaped, source
 from .beam import Beam
-from .kernels.arrays import add_changes, add_pushes
+from .kernels.arrays import add_changes, add_transposed
 from .kernels.law import LINEAR
-from .kernels.strain import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS,
-                             run)
+from .kernels.strain import (FORCE, GIVEN, GRADIENTS, LINEARISED, MEAN, STRESS, TANGENT,
+                             UNSYMMETRIC, VISCOUS, run)
 from .kernels.tables import CABLE, StrainTables, repeated, together
 
-#: Columns of the table of a body: first stress of the tables and the one behind the last; samples
-#: of an element and degrees of freedom; first gradient and the one behind the last; the kind.
+#: Columns of the table of a body: begin and end of stresses; samples and DOFs of an element; begin
+#: and end of gradients; kind.
 BEGIN, END, SAMPLES, SPAN, BEGIN_GRADIENTS, END_GRADIENTS, KIND = range(7)
 
 
@@ -27,7 +27,7 @@ class Body(NamedTuple):
 
 
 class FlatBody(NamedTuple):
-    """The same for compiled code, of one type: the addresses of the words of the tables."""
+    """A Body for compiled code, with the addresses of the tables' words."""
 
     packs: I1
     table: I2
@@ -40,34 +40,30 @@ def tables_of(body, k):
 
 
 def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = False) -> Body:
-    """The Body of beams with their slices of the degrees of freedom.
+    """The Body of beams with their slices of DOFs.
 
-    With ``joined`` those of beams with the same samples are one: many short beams take no longer
-    than a long one.
+    With ``joined``, tables with the same samples are merged, so that many short beams are as fast
+    as a long one.
     """
     tables = [[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
               for beam, s in zip(beams, slices)]
     if joined and len(beams) > 1:
-        alike: dict[Any, list[StrainTables]] = {}
-        # elements of one table add to different degrees of freedom: those of one beam stay apart
+        groups: dict[Any, list[StrainTables]] = {}
+        # left nodes of a table are unique: tables of one beam stay separate
         for k, (j, t) in enumerate(pair for its in tables for pair in enumerate(its)):
-            alike.setdefault((j, _samples(t)) if t.law.kind == LINEAR else k, []).append(t)
-        tables = [[together(some) for some in alike.values()]]
+            groups.setdefault((j, _samples(t)) if t.law.kind == LINEAR else k, []).append(t)
+        tables = [[together(some) for some in groups.values()]]
     return _body(tables, lambda t: t.rows.shape[1])
 
 
 def _samples(t):
-    """What tables have in common that can be one."""
+    """Key of tables that can be merged."""
     return (t.kind, t.G.shape[1:], len(t.C) > 0, t.weights.shape[1],
             *((x.shape, x.tobytes()) for x in (t.rows, t.pairs, t.along)))
 
 
-def pushed_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:
-    """The Body of what strains without stress change: their stresses or, nonlinear, strains.
-
-    The tables of linear laws take stresses that are given; of others strains at the points, that
-    are added to those of the displacement.
-    """
+def eigenstrain_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Body:
+    """The Body of eigenstrains: stresses for tables of linear laws, else strains at the points."""
     return _body([[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
                   for beam, s in zip(beams, slices)],
                  lambda t: t.rows.shape[1] if t.law.kind == LINEAR else 3 * t.weights.shape[1])
@@ -85,9 +81,9 @@ def _body(tables, numbers):
 
 
 def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float]) -> Body:
-    """The Body of what resists the rates of strains, by the retardation times of the beams.
+    """The Body of viscous stresses for the beams' retardation times; ``body`` if all are zero.
 
-    ``body`` itself where nothing does; the stresses have the same places as there.
+    Stresses have the same positions as in ``body``.
     """
     packs: list[StrainTables] = []
     rows, first = [], 0
@@ -103,10 +99,9 @@ def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float])
 
 
 def copies_of(body: Body, n: int, N: int) -> Body:
-    """The Body of ``n`` times the same beams, whose degrees of freedom begin N later each time.
+    """The Body of n copies of the beams, with an offset of N between their DOFs; without tangents.
 
-    What takes few elements at a time takes less than n times as long for them. There are no
-    tangents of it: they would be n times as long.
+    Few elements are faster in one call.
     """
     table = body.table.copy()
     table[:, [BEGIN, END]] *= n
@@ -114,18 +109,18 @@ def copies_of(body: Body, n: int, N: int) -> Body:
 
 
 def stress_size(body: Body) -> int:
-    """How many numbers the stresses of all samples are."""
+    """Number of stresses of all samples."""
     return int(body.table[-1, END]) if len(body.table) else 0
 
 
 def gradients_size(body: Body) -> int:
-    """How many numbers :func:`body_gradients` finds."""
+    """Number of results of :func:`body_gradients`."""
     return int(body.table[-1, END_GRADIENTS]) if len(body.table) else 0
 
 
 @source
 def quadratic(body):
-    """True if all strains are quadratic in the degrees of freedom: those of sections are."""
+    """True if all strains are quadratic in the DOFs, which holds for sections."""
     for k in range(body.table.shape[0]):
         if body.table[k, KIND] == CABLE:
             return False
@@ -134,22 +129,19 @@ def quadratic(body):
 
 @source
 def _stress(body, k, stresses):
-    """The stresses of tables k, a view; or of none."""
+    """View of the stresses of table k."""
     return stresses[body.table[k, BEGIN]:body.table[k, END]] if stresses.size > 0 else stresses
 
 
 @source
 def _gradients(body, k, gradients):
-    """What :func:`body_gradients` has found for tables k, a view."""
+    """View of the gradients of table k."""
     return gradients[body.table[k, BEGIN_GRADIENTS]:body.table[k, END_GRADIENTS]]
 
 
 @source
 def evaluate_body(body, what, u, v, f, given, out, flat, ld):
-    """What :func:`~skfem_ancf.beam.kernels.strain.evaluate` does, for all beams.
-
-    The tangent goes to an array in which columns begin every ``ld`` entries.
-    """
+    """Call :func:`~skfem_ancf.beam.kernels.strain.evaluate` for all tables."""
     for k in range(body.table.shape[0]):
         written = _gradients(body, k, out) if what == GRADIENTS else _stress(body, k, out)
         run(tables_of(body, k), what, u, v, f, _stress(body, k, given), written, flat, ld)
@@ -164,16 +156,15 @@ def body_force(body, u, f):
 
 
 @source
-def body_tangent(body, u, f, carried, use_carried, stresses, A):
-    """The internal force, the lower half of the tangent, and the stresses.
+def body_tangent(body, u, f, independent, use_independent, stresses, A):
+    """Internal force, lower half of the tangent without loads, and stresses.
 
-    The loads complete it: :func:`~skfem_ancf.actions.tables.add_load_stiffness`. The geometric part
-    takes the stresses ``carried`` in place of these if ``use_carried``.
+    The geometric part uses the independent stresses if ``use_independent``.
     """
     clear(f)
     clear(A.flat)
-    evaluate_body(body, np.int64(TANGENT), u, u, f, carried if use_carried else carried[:0],
-                  stresses, A.flat[A.top:], A.ld)
+    given = independent if use_independent else independent[:0]
+    evaluate_body(body, np.int64(TANGENT), u, u, f, given, stresses, A.flat[A.top:], A.ld)
 
 
 @source
@@ -185,7 +176,7 @@ def body_stress(body, u, stresses):
 
 @source
 def body_mean_stress(body, copies, weights, stresses, out):
-    """The mean stresses of copies, with weights."""
+    """Weighted mean of the stresses of copies."""
     clear(out)
     for k in range(body.table.shape[0]):
         all_of_them, mean = _stress(copies, k, stresses), _stress(body, k, out)
@@ -194,20 +185,17 @@ def body_mean_stress(body, copies, weights, stresses, out):
 
 
 @source
-def body_carry(body, u, du, stresses, carried):
-    """The stresses, linearised, at u + du, from those at u."""
+def body_linearised(body, u, du, stresses, independent):
+    """Stresses at u plus their linearised change by du."""
     none = u[:0]
-    evaluate_body(body, np.int64(CARRY), u, du, none, stresses, carried, none, np.int64(0))
+    evaluate_body(body, np.int64(LINEARISED), u, du, none, stresses, independent, none, np.int64(0))
 
 
 @source
 def add_viscous_stress(viscous, body, copies, k, u, v, scratch, out):
-    """Add the stresses in proportion to the rates of the strains, to those of copy k.
-
-    ``scratch``, shape (2, s), is scratch, of which the first row is zero.
-    """
+    """Add the viscous stresses to those of copy k; ``scratch`` is (2, s), its first row zero."""
     clear(scratch[1])
-    body_carry(viscous, u, v, scratch[0], scratch[1])
+    body_linearised(viscous, u, v, scratch[0], scratch[1])
     for j in range(body.table.shape[0]):
         one, all_of_them = _stress(body, j, scratch[1]), _stress(copies, j, out)
         add_multiple(1.0, one, all_of_them[k * one.size:(k + 1) * one.size])
@@ -215,7 +203,7 @@ def add_viscous_stress(viscous, body, copies, k, u, v, scratch, out):
 
 @source
 def add_viscous_force(body, u, v, f):
-    """Add the force of stresses in proportion to the rates of the strains."""
+    """Add the force of viscous stresses."""
     none = f[:0]
     evaluate_body(body, np.int64(VISCOUS), u, v, f, none, none, none, np.int64(0))
 
@@ -229,13 +217,13 @@ def body_mean(body, u0, u1, f):
 
 
 @source
-def body_mixed(body, mean, u0, u1, f, carried, stresses):
-    """As :func:`body_force` at u1, or :func:`body_mean`, but of independent stresses.
+def body_mixed(body, mean, u0, u1, f, independent, stresses):
+    """As :func:`body_force` at u1, or :func:`body_mean`, but for independent stresses.
 
     The stresses of the strain are written.
     """
     clear(f)
-    evaluate_body(body, np.int64(MEAN if mean else FORCE), u0 if mean else u1, u1, f, carried,
+    evaluate_body(body, np.int64(MEAN if mean else FORCE), u0 if mean else u1, u1, f, independent,
                   stresses, f[:0], np.int64(0))
 
 
@@ -248,14 +236,14 @@ def add_force_of(body, u, stresses, f):
 
 @source
 def body_gradients(body, u, gradients):
-    """The derivatives of the strains at u, and of the weighted stresses, of each element."""
+    """Derivatives of the strains and the weighted stresses at u for each element."""
     none = u[:0]
     evaluate_body(body, np.int64(GRADIENTS), u, u, none, none, gradients, none, np.int64(0))
 
 
 @source
 def body_tangent_by(body, u, stresses, gradients, A):
-    """As :func:`body_gradients`, and the lower half of the tangent at these stresses."""
+    """As :func:`body_gradients`, with the lower half of the tangent for given stresses."""
     clear(A.flat)
     evaluate_body(body, np.int64(GRADIENTS), u, u, u[:0], stresses, gradients, A.flat[A.top:],
                   A.ld)
@@ -263,31 +251,31 @@ def body_tangent_by(body, u, stresses, gradients, A):
 
 @source
 def _halves(body, k, gradients):
-    """The gradients of tables k, shape (2, elements, samples, degrees of freedom)."""
+    """The gradients of table k, (2, elements, samples, DOFs)."""
     row, found = body.table[k], _gradients(body, k, gradients)
     n = row[SAMPLES] * row[SPAN]
     return shaped(found, (np.int64(2), found.size // (2 * n), row[SAMPLES], row[SPAN]))
 
 
 @source
-def carry_by(body, copies, gradients, du, stresses, carried):
-    """As :func:`body_carry`, of copies, by the gradients of the body."""
-    copy(stresses, carried)
+def linearised_by(body, copies, gradients, du, stresses, independent):
+    """Linearised stresses of copies, by the gradients of the body."""
+    copy(stresses, independent)
     for k in range(body.table.shape[0]):
         add_changes(_halves(body, k, gradients)[1], tables_of(copies, k).start, du,
-                    _stress(copies, k, carried))
+                    _stress(copies, k, independent))
 
 
 @source
 def add_force_by(body, copies, gradients, stresses, f):
-    """As :func:`add_force_of`, of copies, by the gradients of the body."""
+    """As :func:`add_force_of` for copies, by the gradients of the body."""
     for k in range(body.table.shape[0]):
-        add_pushes(_halves(body, k, gradients)[0], tables_of(copies, k).start,
+        add_transposed(_halves(body, k, gradients)[0], tables_of(copies, k).start,
                    _stress(copies, k, stresses), f)
 
 
 @source
-def add_turned(body, u, v, U):
+def add_unsymmetric(body, u, v, U):
     """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
     none = u[:0]
-    evaluate_body(body, np.int64(TURNED), u, v, none, none, none, U.flat, U.ld)
+    evaluate_body(body, np.int64(UNSYMMETRIC), u, v, none, none, none, U.flat, U.ld)

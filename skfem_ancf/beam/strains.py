@@ -15,22 +15,22 @@ from ..formulations import COMPONENTS
 from ..formulations.base import Term
 
 
-# Green-Lagrange strain of the derivatives a along the axis and b across it of the displacement,
-# pairs of arrays; (x, y) is the tangent of the axis in the reference configuration.
+# Green-Lagrange strain from the displacement derivatives a along the axis and b across it (pairs of
+# arrays); (x, y) is the tangent of the axis in the reference configuration.
 
 
 def along_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """The component eps_xx."""
+    """eps_xx."""
     return (x + 0.5 * a[0]) * a[0] + (y + 0.5 * a[1]) * a[1]
 
 
 def across_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """The component eps_yy."""
+    """eps_yy."""
     return (0.5 * b[0] - y) * b[0] + (x + 0.5 * b[1]) * b[1]
 
 
 def shear(a: Any, b: Any, x: Any, y: Any) -> Any:
-    """Twice the component eps_xy."""
+    """2 eps_xy."""
     return (x + a[0]) * b[0] + (y + a[1]) * b[1] - y * a[0] + x * a[1]
 
 
@@ -38,22 +38,16 @@ STRAINS = along_axis, across_axis, shear
 
 
 class Interpolation:
-    """Displacements of elements as sums ``c_ij T_i(2 xi - 1) T_j(2 eta - 1)``, T Chebyshev's.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    """
+    """Displacements as Chebyshev sums ``c_ij T_i(2 xi - 1) T_j(2 eta - 1)``."""
 
     def __init__(self, beam: Any) -> None:
         mesh, element, mapping = beam.mesh, beam.element, beam.mesh.mapping()
         self.nodes, self.lengths, self.start = mesh.t, mesh.lengths, beam.q0_local
-        #: The reference configuration is more than straight elements of this height.
+        #: The reference configuration is curved, or its height varies.
         self.is_general = not mesh.is_straight or mesh.heights is not None
         self.tangents, self.height = mesh.p_X[:, mesh.t[0]], mesh.height
         self._heights = None if mesh.heights is None else mapping.heights
-        #: Of the layers of a cable, lateral contraction over stretch.
+        #: Lateral contraction over stretch in the layers of a cable.
         self.lateral_ratios = None if beam.has_sections else np.array(
             [layer.material.lateral_ratio for layer in beam.across.layers])
         p, m = element.axis_degree + 1, max(element.order, 1) + 1
@@ -67,14 +61,14 @@ class Interpolation:
         self.slope = element.local(np.zeros((2, 1)), 1.0)[3]
 
     def height_at(self, e: Array, xi: Array) -> Any:
-        """Heights over the largest at places xi (..., n) of elements (n,)."""
+        """Relative heights at xi (..., n) of elements (n,)."""
         return 1.0 if self._heights is None else polyval(xi, self._heights[:, e], tensor=False)
 
     def of_elements(self, q: Array, e: Array) -> Array:
-        """The coefficients (p, m, 2, n) of degrees of freedom (N,) on elements (n,)."""
+        """Coefficients (p, m, 2, n) for DOFs (N,) on elements (n,)."""
         nodes = q.reshape(-1, len(self.slope) // 2, 2)
         q_e = np.concatenate([nodes[self.nodes[0, e]], nodes[self.nodes[1, e]]], axis=1)
-        q_e[:, len(self.slope) // 2] -= q_e[:, 0]  # from the first node: less round-off
+        q_e[:, len(self.slope) // 2] -= q_e[:, 0]  # relative to the first node: less round-off
         q_e[:, 0] = 0.0
         q_e = q_e.transpose(1, 2, 0) * (self.lengths[e] ** self.slope[:, None])[:, None]
         if self._heights is None:
@@ -90,12 +84,12 @@ class Interpolation:
 
 
 def places(n: int) -> Array:
-    """The zeros of the polynomial T_n of 2 x - 1, shape (n,)."""
+    """Zeros of T_n(2 x - 1), shape (n,)."""
     return 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
 def transform(n: int) -> Array:
-    """From values at :func:`places` to coefficients of Chebyshev polynomials, shape (n, n)."""
+    """Matrix (n, n) from values at :func:`places` to Chebyshev coefficients."""
     return np.linalg.inv(chebvander(2.0 * places(n) - 1.0, n - 1))
 
 
@@ -106,7 +100,7 @@ def _slope_matrix(n):
 
 
 class Gradients:
-    """The gradient of a displacement ``u`` (N,) at points of elements ``e`` (n,)."""
+    """Displacement gradient for ``u`` (N,) at points of elements ``e`` (n,)."""
 
     def __init__(self, beam: Any, u: Array, e: Array) -> None:
         self.at: Array
@@ -114,13 +108,13 @@ class Gradients:
         self.e, ne = e, len(basis.lengths)
         of, self.at = (e, np.arange(len(e))) if len(e) < ne else (np.arange(ne), e)
         c = basis.of_elements(u, of)
-        if basis.is_general:  # every element contains its map from the reference cell
+        if basis.is_general:  # the mapping is represented in the element's space
             c = np.concatenate([c, basis.of_elements(basis.start, of)], axis=2)
         self.by = np.array([np.tensordot(basis.by_xi, c, 1),
                             np.einsum("jk,pk...->pj...", basis.by_eta, c)])
 
     def __call__(self, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
-        """Derivatives along the axis and across it, and its tangent, at places, (n,) or numbers."""
+        """Derivatives along and across the axis, and its tangent, at points (n,)."""
         e, at, basis = self.e, self.at, self.basis
         if np.ndim(xi):
             table, at = _sum(self.by.swapaxes(0, 1), xi, at), np.arange(len(at))
@@ -139,7 +133,7 @@ class Gradients:
 
 
 def _sum(tables, x, at):
-    """``sum_k T_k(2 x - 1) tables[k]``, of tables (n, ..., elements) at some elements."""
+    """``sum_k T_k(2 x - 1) tables[k]`` at some elements."""
     T = chebvander(2.0 * x - 1.0, len(tables) - 1).T
     out = tables[0].take(at, axis=-1)
     for c, t in zip(tables[1:], T[1:]):
@@ -149,13 +143,11 @@ def _sum(tables, x, at):
 
 def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
               across: Rule | None = None) -> Array:
-    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) of the elements, shape (3, n).
+    """Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), shape (3, n).
 
-    Each component is sampled where the term of the formulation says, and interpolated between.
-
-    ``u`` (N,) is the displacement, ``e`` (n,) are elements and ``X`` (2, n) reference points. It is
-    that of the first term, or of another; what its law does not take is zero. With points and
-    weights ``across`` the section it is the mean over sections.
+    ``u`` (N,) is the displacement, ``e`` (n,) are elements, ``X`` (2, n) points of the reference
+    cell. Each component is sampled and interpolated as ``term`` says, by default the first term of
+    the formulation. ``across``, points and weights, gives the mean over sections.
     """
     if not beam.has_sections:
         return _strain_of_cable(beam, u, e, X)
@@ -171,7 +163,7 @@ def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
 
 
 def _places(samples, rows, xi):
-    """Each place along the axis, None for the points, with the components and their weights."""
+    """Sampling points along the axis (None: the points themselves), with components and weights."""
     found: dict[Any, list[Any]] = {}
     for row in rows:
         nodes = samples.get(COMPONENTS[row])
@@ -185,7 +177,7 @@ def _places(samples, rows, xi):
 
 
 def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
-    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) of the elements, shape (3, n)."""
+    """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), shape (3, n)."""
     E, at = strain_at(beam, u, e, X)[..., None], X[:, :, None]
     of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
           partial(_stress_of_cable, strain=E, X=at, tind=e))
@@ -193,7 +185,7 @@ def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:
-    """Evaluate :func:`strain_at` or :func:`stress_at`, ``of``, at points of elements.
+    """Evaluate :func:`strain_at` or :func:`stress_at` at points of elements.
 
     X is (2, npoints) or (2, nelements, npoints), tind the elements or None for all; the result is
     (3, nelements, npoints).
@@ -205,13 +197,7 @@ def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: A
 
 
 class BeamLayer:
-    """One layer of a beam, as its formulation asks for it.
-
-    Parameters
-    ----------
-    beam, layer, terms
-        The beam, its layer, and the terms of the strain energy of this.
-    """
+    """A layer of a beam with the terms of its strain energy."""
 
     def __init__(self, beam: Any, layer: Any, terms: Sequence[Term]) -> None:
         self.beam, self.material, self.terms = beam, layer.material, terms
@@ -232,16 +218,16 @@ class BeamLayer:
 
 
 def stretched(xx: Array) -> tuple[Array, Array]:
-    """The stretch of a fibre of a Green-Lagrange strain, and that less 1 without cancellation."""
+    """Stretch of a fibre with a Green-Lagrange strain, and stretch - 1 without cancellation."""
     stretch = np.sqrt(1.0 + 2.0 * xx)
     return stretch, 2.0 * xx / (1.0 + stretch)
 
 
 def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any, Any]:
-    """The axis of a cable at places xi (n,) of elements e (n,).
+    """The axis of a cable at xi (n,) of elements e (n,).
 
-    Unit tangents before and after, (2, 2, n); stretch less that before, change of curvature, and
-    curvature before, (n,).
+    Unit tangents before and after, (2, 2, n); stretch - 1, change of curvature, and initial
+    curvature, (n,).
     """
     L, basis = beam.mesh.lengths[e], beam.interpolation
     derivatives = []
@@ -260,12 +246,12 @@ def cable_axis(beam: Any, u: Array, e: Array, xi: Array) -> tuple[Any, Any, Any,
     strain = np.array([((2.0 * a[0] - da[0]) * da[0] + (2.0 * a[1] - da[1]) * da[1])
                        / (length + length0), kappa - kappa0])
     if np.iscomplexobj(strain) and not u.real.any():
-        strain.real = 0.0  # not round-off, where the axis is curved
+        strain.real = 0.0  # exactly, without round-off of a curved axis
     return (a0 / length0, a / length), strain[0], strain[1], kappa0
 
 
 def fibres(beam: Any, e: Array, X: Array, extension: Array, bending: Array, kappa0: Array) -> Any:
-    """Strain of the fibres of a cable by their length at points (2, n), and eps_yy over eps_xx."""
+    """Stretch - 1 of the fibres of a cable at points (2, n), and eps_yy over eps_xx."""
     basis = beam.interpolation
     Y = (X[1] - 0.5) * basis.height * basis.height_at(e, X[0])
     ratios = basis.lateral_ratios

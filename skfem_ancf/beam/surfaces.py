@@ -1,4 +1,4 @@
-"""Points on the surface of a beam, for forces on it."""
+"""Points on the surface of a beam."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from ..mesh.places import facets_of
 from .beam import Beam
 from .distribution import Facets, station_of_node
 
-#: Sides of an element, as facets are numbered in it; the body is on the left along the first two.
+#: Sides of an element in the order of its facets; the body is on the left along the first two.
 BOTTOM, RIGHT, TOP, LEFT = range(4)
 
 
 class Surface(NamedTuple):
-    """Points of facets that are the same side of their elements: BOTTOM, RIGHT, TOP or LEFT.
+    """Points of facets on the same side of their elements: BOTTOM, RIGHT, TOP or LEFT.
 
-    ``facets`` and ``elements`` are the numbers of the facets, (nf,), and of an element of each;
-    ``X`` reference points (2, np); ``along`` the derivative of the place by the parameter of a
-    facet, with the body on its left, (2, nf, np); ``weights`` those of the rule times the width,
-    (nf, np).
+    ``facets`` and ``elements`` (nf,) are numbers; ``X`` (2, np) points of the reference cell;
+    ``along`` the derivative of the position along a facet, with the body on its left, (2, nf, np);
+    ``weights`` (nf, np) those of the quadrature times the width.
     """
 
     side: int
@@ -36,21 +35,18 @@ class Surface(NamedTuple):
 
     @property
     def areas(self) -> Array:
-        """What the points stand for, shape (nf, np)."""
+        """Areas of the points, shape (nf, np)."""
         return self.weights * np.sqrt(self.along[0] ** 2 + self.along[1] ** 2)
 
     @property
     def normals(self) -> Array:
-        """Unit normals, outward, shape (2, nf, np)."""
+        """Outward unit normals, shape (2, nf, np)."""
         x, y = self.along
         return np.array([y, -x]) / np.sqrt(x * x + y * y)
 
 
 def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
-    """Points of a place by sides and layers of the section, so many Gauss points a facet.
-
-    End sections that are no plain rectangles have those that the element needs.
-    """
+    """Surfaces of a place by side and layer, with Gauss points on each facet."""
     mesh, across, out = beam.mesh, beam.across, []
     found = np.asarray(facets_of(mesh, place))
     n, ne, rule = mesh.p.shape[1], mesh.nelements, gauss(points)
@@ -72,7 +68,7 @@ def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
 
 def groups_of(mesh: MeshBeam, surfaces: Sequence[Surface]
               ) -> tuple[list[Facets], tuple[float, ...]]:
-    """Facets along a beam, numbered as the points of ``surfaces`` come, and stations across it."""
+    """Facets along a beam, numbered as the points of ``surfaces``, and stations of others."""
     groups, stations, first = [], [], 0
     for one in surfaces:
         if one.side in (BOTTOM, TOP):
@@ -85,7 +81,7 @@ def groups_of(mesh: MeshBeam, surfaces: Sequence[Surface]
 
 
 def _sections(mesh, nodes):
-    """Nodes that are right and left ends of elements, each once, and the elements."""
+    """Right and left ends of elements at nodes, each once, and the elements."""
     left, right = (np.full(mesh.p.shape[1], -1) for _ in range(2))
     left[mesh.t[0]] = right[mesh.t[1]] = np.arange(mesh.nelements)
     ends = right[nodes] >= 0
@@ -101,7 +97,7 @@ def _surface(beam, side, facets, elements, X, weights):
 
 
 def add_nodal(beam: Beam, elements: Array, forces: Array, out: Array) -> None:
-    """Add forces (n, 2 nodal_dofs, 2) on the local functions of elements (n,) to a vector (N,)."""
+    """Add nodal forces (n, 2 nodal_dofs, 2) of elements (n,) to a vector (N,)."""
     half, nodes = forces.shape[1] // 2, out.reshape(-1, forces.shape[1] // 2, 2)
     np.add.at(nodes, beam.mesh.t[0, elements], forces[:, :half])
     np.add.at(nodes, beam.mesh.t[1, elements], forces[:, half:])

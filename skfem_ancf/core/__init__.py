@@ -1,1 +1,1 @@
-"""Foundations: errors, checks of arguments, quadrature, band matrices, progress."""
+"""Errors, argument checks, quadrature, band matrices, compilation, progress bars."""

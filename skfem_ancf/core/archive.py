@@ -1,4 +1,4 @@
-"""Files of arrays by name, of which there is never half a one."""
+"""Files of named arrays, written atomically."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ import numpy as np
 from .errors import FileError, MissingExtra
 from .types import Array, ArrayLike, StrPath
 
-#: Letters of a name that the one of a new file beside it has, at most: names may have 255.
+#: Longest stem of a temporary file's name; names are limited to 255 characters.
 STEM = 100
-#: Kinds of numbers and texts in files, by the letters of NumPy.
+#: NumPy kinds of arrays in files.
 KINDS = "biufcUS"
 
 
 class Unreadable(ValueError):
-    """A file is none of arrays of numbers and texts as :func:`write` writes them, or is damaged."""
+    """A file is damaged, or was not written by :func:`write`."""
 
 
 def find_h5py() -> Any:
-    """The package h5py; raises MissingExtra where it is not installed."""
+    """The package h5py; MissingExtra if it is not installed."""
     try:
         import h5py
     except ImportError:
@@ -38,27 +38,21 @@ def find_h5py() -> Any:
 
 
 def read(path: Path) -> dict[str, Array]:
-    """The arrays of a file by name, .npz or .h5, as :func:`write` stores them: uncompressed.
+    """Read named arrays from a .npz or .h5 file that :func:`write` wrote.
 
-    Reading takes no more memory than the file is large, whatever it says of itself, and nothing in
-    it is executed.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened.
-    Unreadable
-        If it is something else, compressed, or damaged.
+    Memory is bounded by the size of the file, and nothing in it is executed. Raises OSError if the
+    file cannot be opened, and Unreadable if it is compressed, damaged or something else.
     """
     load = _read_npz if path.suffix != ".h5" else partial(_read_h5, find_h5py())
     with open(path, "rb") as file:
         try:
             arrays = load(file)
-        except Exception as error:  # whatever is in it
+        except Exception as error:  # any content
             raise Unreadable(f"{type(error).__name__}: {error}") from None
     for name, array in arrays.items():
         if array.dtype.kind not in KINDS:
-            raise Unreadable(f"the array {name!r} is of {array.dtype}, neither numbers nor texts")
+            raise Unreadable(f"the array {name!r} has the type {array.dtype}, neither numbers nor "
+                             "texts")
     return arrays
 
 
@@ -67,7 +61,7 @@ def _read_npz(file):
     with zipfile.ZipFile(file) as members:
         if any(x.compress_type != zipfile.ZIP_STORED or x.file_size > size
                for x in members.infolist()):
-            raise Unreadable("its arrays are compressed, which no file of this package is")
+            raise Unreadable("its arrays are compressed: this package writes no such files")
     with np.load(file, allow_pickle=False) as arrays:
         return dict(arrays)
 
@@ -79,17 +73,17 @@ def _read_h5(h5py, file):
             if (not isinstance(h5.get(name, getlink=True), h5py.HardLink)
                     or not isinstance(found, h5py.Dataset) or found.is_virtual or found.external
                     or found.chunks is not None or found.id.get_storage_size() != found.nbytes):
-                raise Unreadable(f"{name!r} is no array that is stored in one piece")
+                raise Unreadable(f"{name!r} is not a contiguous array")
             arrays[name] = np.asarray(found[()])
     return arrays
 
 
 @contextmanager
 def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
-    """A new, empty file beside a path, which takes its place when all is written, or is removed.
+    """A new, empty file that replaces ``path`` when the block ends, or is removed on an error.
 
-    No link is followed, and the mode is that of the file that is replaced. With ``durable`` the new
-    file, of the same suffix, is on the disk before it takes the place.
+    Links are not followed, and the file mode is kept. With ``durable`` the new file, of the same
+    suffix, is synchronised to disk first.
 
     Examples
     --------
@@ -115,7 +109,7 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
 
 @contextmanager
 def output_file(path: StrPath) -> Iterator[Path]:
-    """As :func:`replacing`; makes the folder, and raises FileError."""
+    """As :func:`replacing`; creates the folder and raises FileError."""
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -128,14 +122,14 @@ def output_file(path: StrPath) -> Iterator[Path]:
 
 
 def new_file(path: Path) -> Path:
-    """A new, empty file beside a path, with a name that nobody knows beforehand."""
+    """Create an empty file with a random name beside a path."""
     new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
     new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)
     return new
 
 
 def put_in_place(new: Path, path: Path, durable: bool = False) -> None:
-    """Let a complete file take the place of another, see :func:`replacing`."""
+    """Replace a file by a complete one, see :func:`replacing`."""
     if durable:
         with open(new, "rb+") as file:
             os.fsync(file.fileno())
@@ -145,15 +139,9 @@ def put_in_place(new: Path, path: Path, durable: bool = False) -> None:
 
 
 def write(path: Path, arrays: Mapping[str, ArrayLike]) -> None:
-    """Write arrays by name to a file, .npz or .h5, which is complete and on the disk or as it was.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write named arrays to a .npz or .h5 file, atomically and durably; raises OSError."""
     with replacing(path, durable=True) as new, open(new, "wb") as file:
-        content = BytesIO()  # by way of memory: on a full disk neither can be closed
+        content = BytesIO()  # in memory first: neither library can close a file on a full disk
         if path.suffix == ".h5":
             with find_h5py().File(content, "w") as h5:
                 for name, array in arrays.items():

@@ -1,11 +1,9 @@
-"""Band matrices as kernels and LAPACK see them.
+"""Band matrices for kernels and LAPACK.
 
-Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, and :data:`SPARE` zeros behind each
-column; its factors L D L^T take its place.
-In two halves, ``top`` below 0: in each column that of the lower half, and behind it that of the
-transpose's; its factors L D R^T take its place.
-Else entry (i, j) at ``j * ld + top + i - j``, LAPACK's storage for ``gbtrf``, whose factors take
-its place.
+Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each
+column; L D L^T factors replace it. In two halves (``top`` < 0): each column of the lower half, then
+that of the transpose; L D R^T factors replace it. Otherwise entry (i, j) is at ``j * ld + top + i -
+j``, the storage of LAPACK's ``gbtrf``, whose factors replace it.
 """
 
 from __future__ import annotations
@@ -19,19 +17,18 @@ from scipy.linalg import blas, lapack
 from .source import F1, I1, indices, primitive, shaped, source
 from .types import Array
 
-#: Zeros behind each column of a lower half: compiled code works on four columns at once, by
-#: vectors that may end there.
+#: Zeros after each column of a lower half, for vectorised loops over four columns.
 SPARE = 6
-#: A pivot that small beside what it came from is round-off.
+#: Relative size of a pivot that is round-off.
 LOST = 1e-13
 #: ``top`` of a matrix in two halves.
 HALVES = -1
-#: Rest of an equation of joints beside the others, of the square of its size, that is round-off.
+#: Relative squared remainder of a redundant equation.
 REPEATED = 1e-13
 
 
 class Band(NamedTuple):
-    """A band matrix: its entries, the exchanges of ``gbtrf``, and its layout."""
+    """A band matrix: entries, pivots of ``gbtrf``, and layout."""
 
     flat: F1
     pivots: I1
@@ -41,13 +38,13 @@ class Band(NamedTuple):
 
 
 def as_lapack(A: Band) -> Array:
-    """A view of LAPACK's band storage, shape (rows, n)."""
+    """LAPACK's band storage, a view of shape (rows, n)."""
     ab = A.flat.reshape(-1, A.ld).T
     return ab if A.top > 0 else ab[:A.width + 1]
 
 
 def _transposed(A):
-    """The same of the transpose, of a matrix without exchanges."""
+    """:func:`as_lapack` of the transpose, for a matrix without pivoting."""
     first = A.ld // 2 if A.top < 0 else 0
     return A.flat.reshape(-1, A.ld).T[first:first + A.width + 1]
 
@@ -61,7 +58,7 @@ def multiply(A, x, y):
         y[:] = blas.dsbmv(k, 1.0, ab, x, lower=1)
     elif n > 2 * k:
         y[:] = blas.dgbmv(n, n, k, k, 1.0, ab[k:], x)
-    else:  # scipy's wrapper refuses
+    else:  # not supported by scipy's wrapper
         y[:] = ab[A.top] * x
         for d in range(1, min(k, n - 1) + 1):
             y[d:] += ab[A.top + d, :n - d] * x[:n - d]
@@ -70,16 +67,16 @@ def multiply(A, x, y):
 
 @primitive("skfem_ancf.core.loops")
 def add_multiple(c, x, y):
-    """y += c x, of vectors; compiled for short ones."""
+    """y += c x."""
     y += c * x
 
 
 @primitive("skfem_ancf.core.loops")
 def factorize(A):
-    """Factorise in place; False if a pivot is lost.
+    """Factorise in place; False if a pivot is round-off.
 
-    A symmetric matrix is not pivoted: one that is not positive definite has factors L D L^T too,
-    unless one of its leading parts is singular. Nor is one in two halves.
+    Only LAPACK's storage is pivoted. An indefinite symmetric matrix has L D L^T factors unless a
+    leading submatrix is singular.
     """
     ab = as_lapack(A)
     if A.top < 0:
@@ -99,12 +96,12 @@ def factorize(A):
 def _eliminate(A):
     """L D L^T, or L D R^T of two halves.
 
-    From one column to the next an entry of a row is ld - 1 numbers on: what is left of the next
-    columns is a square, and what of it is above the diagonal belongs to others.
+    Entries of a row are ld - 1 apart, so that the next columns form a strided square, whose upper
+    triangle belongs to other entries.
     """
     columns, rows = (x.T for x in (as_lapack(A), _transposed(A)))
     n, stride = len(columns), columns.itemsize
-    lower = np.tri(min(A.width, n - 1)).T  # its rows are columns
+    lower = np.tri(min(A.width, n - 1)).T  # rows are columns
     both = ((columns, rows), (rows, columns))[:1 if A.top == 0 else 2]
     for j in range(n):
         m, d = min(A.width, n - 1 - j), columns[j, 0]
@@ -136,7 +133,7 @@ def solve(A, x):
 
 @primitive("skfem_ancf.core.loops")
 def dense_solve(A, b):
-    """Solve in place of b, a vector; False if A is singular."""
+    """Solve in place of the vector b; False if A is singular."""
     try:
         b[:] = np.linalg.solve(A, b)
     except np.linalg.LinAlgError:
@@ -146,11 +143,10 @@ def dense_solve(A, b):
 
 @primitive("skfem_ancf.core.loops")
 def solve_dependent(S, b):
-    """Solve in place of b, a vector, equations of which some may repeat others.
+    """Solve in place of b a system S (m, m) with redundant equations.
 
-    S, shape (m, m), is scaled to a unit diagonal and eliminated with complete pivots up to those
-    that are round-off: the other equations determine what is left, up to what b does not say. Of
-    all solutions b becomes the smallest in that scale. False if S is not finite or zero.
+    S is scaled to a unit diagonal and eliminated with complete pivoting down to round-off; b
+    becomes the minimum-norm solution in that scale. False if S is zero or not finite.
     """
     m, size = b.size, np.abs(np.diagonal(S)).copy()
     size[size == 0.0] = 1.0
@@ -173,7 +169,7 @@ def solve_dependent(S, b):
     x, free = np.zeros((m, m - rank + 1)), m - rank
     x[:rank, free], x[:rank, :free], x[rank:, :free] = y[:rank], -A[:rank, rank:], np.eye(free)
     x[:rank] = np.linalg.solve(np.triu(A[:rank, :rank]), x[:rank])
-    for k in range(free):  # away from what changes nothing
+    for k in range(free):  # remove the null space
         one = x[:, k] / np.sqrt(x[:, k] @ x[:, k])
         x[:, k + 1:] -= np.outer(one, one @ x[:, k + 1:])
     b[order] = x[:, free]
@@ -189,27 +185,11 @@ def subtract_rows(J, x, out):
 
 @primitive("skfem_ancf.core.loops")
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    """Change x by multiples of the rows of ``Y = J A^-1`` so that ``J1 x`` becomes what -b was.
+    """Project x onto J1 x = -b by multiples of the rows of ``Y = J A^-1``.
 
-    Parameters
-    ----------
-    A
-        With its factors.
-    J, J1
-        Shape (m, n).
-    free
-        The columns of J that are used, as ones and zeros.
-    anew
-        Make Y, shape (m, n), which is else taken as it is.
-    S
-        Becomes ``J1 Y^T``, shape (m, m).
-    b, x
-        Shapes (m,), (n,); b becomes what Y is multiplied by, subtracted from x.
-
-    Returns
-    -------
-    bool
-        False if S is not finite, or zero: equations that repeat others are met by these.
+    A is factorised; J and J1 are (m, n), ``free`` (n,) selects columns of J. Y (m, n) is recomputed
+    if ``anew``, S (m, m) is set to ``J1 Y^T``. b (m,) becomes the multipliers, x (n,) is reduced by
+    b Y. False if S is zero or not finite; redundant equations are allowed.
     """
     if anew:
         solve_many(A, J * free, Y)
@@ -222,15 +202,7 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
 
 
 def solve_many(A: Band, B: Array, X: Array) -> None:
-    """X[k] = A^-1 B[k] for all k.
-
-    Parameters
-    ----------
-    A
-        A matrix that :func:`factorize` has factorised.
-    B, X
-        Right-hand sides and solutions, shape (m, N).
-    """
+    """X[k] = A^-1 B[k] for all k, with factors of A; B and X are (m, N)."""
     ab = as_lapack(A)
     if A.top > 0:
         X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T
@@ -241,14 +213,10 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
 
 @primitive("skfem_ancf.core.loops")
 def factorize_complex(A, width):
-    """L D L^T of a complex symmetric band, in place of its lower half; False if there is none.
+    """L D L^T of a complex symmetric band in place; False if it fails.
 
-    Parameters
-    ----------
-    A
-        Real parts, then imaginary ones, each as of a symmetric :class:`Band`.
-    width
-        Half bandwidth.
+    A has real parts, then imaginary parts, each as in a symmetric :class:`Band` of half bandwidth
+    ``width``.
     """
     ld = width + 1 + SPARE
     n, flat = A.size // (2 * ld), np.append(_complex(A), np.zeros((width + 1) * ld))
@@ -295,7 +263,7 @@ def copy(a, b):
 
 @source
 def mirror(A):
-    """Of a matrix that is not stored as symmetric: the upper half becomes as the lower."""
+    """Copy the lower half of an unsymmetric band to the upper half."""
     if A.top > 0:
         rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
         for k in range(1, A.width + 1):
@@ -306,7 +274,7 @@ def mirror(A):
 
 @source
 def add_halves(A, factor, U):
-    """U = A + factor U, of which U stores two halves."""
+    """U = A + factor U, where U stores two halves."""
     n, m, top = A.flat.size // A.ld, A.width + 1, A.top
     rows, both = shaped(A.flat, (n, A.ld)), shaped(U.flat, (n, 2, U.ld // 2))
     if top > 0:
@@ -324,13 +292,13 @@ def add_halves(A, factor, U):
 
 @source
 def fix(A, fixed):
-    """Rows and columns of these numbers become those of the identity."""
+    """Set rows and columns of these numbers to those of the identity."""
     fix_stored(A.flat, A.ld, A.width, A.top, fixed)
 
 
 @source
 def fix_stored(flat, ld, width, top, fixed):
-    """The same of what a band stores."""
+    """:func:`fix` for stored entries."""
     n, step = flat.size // ld, max(1, ld - 1)
     for i in fixed:
         at = i * ld + max(top, 0)
@@ -350,7 +318,7 @@ def fix_stored(flat, ld, width, top, fixed):
 
 @source
 def diagonal(A, d):
-    """The diagonal into d."""
+    """Write the diagonal to d."""
     rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
     for j in indices(d.size):
         d[j] = rows[j, A.top]
@@ -358,29 +326,29 @@ def diagonal(A, d):
 
 @primitive("skfem_ancf.core.loops")
 def dot(a, b):
-    """The product of two vectors."""
+    """Scalar product."""
     return np.dot(a, b)
 
 
 @primitive("skfem_ancf.core.loops")
 def total(x):
-    """The sum of a vector's numbers."""
+    """Sum."""
     return np.sum(x)
 
 
 @primitive("skfem_ancf.core.loops")
 def smallest(x):
-    """The smallest number of a vector."""
+    """Minimum."""
     return np.min(x)
 
 
 @primitive("skfem_ancf.core.loops")
 def largest(x):
-    """The largest absolute value of a vector, 0 if it has none."""
+    """Largest absolute value, 0 if empty."""
     return np.max(np.abs(x), initial=0.0)
 
 
 @primitive("skfem_ancf.core.loops")
 def weighted(a, b, w):
-    """The sum of a b w."""
+    """Sum of a b w."""
     return np.dot(a * b, w)

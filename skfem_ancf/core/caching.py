@@ -1,4 +1,4 @@
-"""Caches of functions of arrays."""
+"""Caches for functions of arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class ArrayKey:
-    """Arrays as a key: equal to those of the same shapes, types and numbers."""
+    """A hashable key of arrays, compared by shape, type and values."""
 
     def __init__(self, *arrays: Any) -> None:
         self.arrays = arrays
@@ -26,7 +26,7 @@ class ArrayKey:
 
 
 def array_cache(maxsize: int) -> Callable[[Function], Function]:
-    """``functools.lru_cache`` for functions of arrays, whose results must be read-only.
+    """``functools.lru_cache`` for functions of arrays; results must be read-only.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where compiled code is kept, and what of it is there; without Numba, which loads slowly."""
+"""The cache of compiled code on disk; without importing Numba, which is slow."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class NotCompiled(Exception):
 
 @cache
 def _stamp() -> str:
-    """Of all that is compiled: Numba looks at the file of a function, not at what it calls."""
+    """Hash of all compiled files: Numba checks only the file of a function, not its callees."""
     total = hashlib.sha256()
     package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
     for path in sorted(package.rglob("*.py")):
@@ -36,18 +36,18 @@ def _stamp() -> str:
 
 @cache
 def folder() -> Path:
-    """Where notes are kept of what has been compiled: as Numba keeps its own."""
+    """The folder of notes on compiled code, as Numba's cache."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
         return Path(given)
-    own = Path(__file__).parent / "__pycache__"
-    if _writable(own):
-        return own
+    local = Path(__file__).parent / "__pycache__"
+    if _writable(local):
+        return local
     return Path.home() / ".cache" / "skfem_ancf"
 
 
 def _writable(path):
-    """True if a folder can be written to, or made."""
+    """True if a folder can be written or created."""
     while not path.exists() and path != path.parent:
         path = path.parent
     return path.is_dir() and os.access(path, os.W_OK)
@@ -55,7 +55,7 @@ def _writable(path):
 
 @cache
 def can_keep() -> bool:
-    """True if compiled code can be kept on disk, as far as is known before; else warns, once."""
+    """True if compiled code can be cached on disk; otherwise it warns once."""
     if not _writable(folder()):
         cannot_keep("it cannot be written")
         return False
@@ -64,29 +64,20 @@ def can_keep() -> bool:
 
 @cache
 def _warn_of(path):
-    warn(f"compiled code is not kept in {str(path)!r}: each process compiles again. Make "
+    warn(f"compiled code is not cached in {str(path)!r}: each process compiles again. Make "
          "the folder writable, or set the environment variable NUMBA_CACHE_DIR to another one",
          CompilationWarning)
 
 
 def cannot_keep(reason: object) -> None:
-    """Warn, once a process, that what is compiled is not kept on disk.
-
-    Parameters
-    ----------
-    reason
-        Why.
-    """
-    logger.info("compiled code is not kept: %s", reason)
+    """Warn once per process that compiled code is not cached on disk."""
+    logger.info("compiled code is not cached: %s", reason)
     _warn_of(folder())
 
 
 @cache
 def key() -> str:
-    """What compiled code depends on, in 16 letters: names by which it is kept end with them.
-
-    Numba's own index of what it keeps is that of one version, which another writes again.
-    """
+    """Hash of all that compiled code depends on, in 16 characters, part of names in the cache."""
     try:
         numba = version("numba")
     except PackageNotFoundError:
@@ -101,13 +92,7 @@ def _note_of(name: str) -> Path:
 
 
 def on_disk(*names: str) -> bool:
-    """True if all are compiled and kept, as far as is known without Numba.
-
-    Parameters
-    ----------
-    *names
-        Names of what is compiled.
-    """
+    """True if all named parts are cached, as far as is known without Numba."""
     try:
         return all(_note_of(name).exists() for name in names)
     except OSError:
@@ -115,7 +100,7 @@ def on_disk(*names: str) -> bool:
 
 
 def note(name: str) -> None:
-    """Note that something has been compiled; warns where that cannot be written."""
+    """Note that a part is compiled; warns if that cannot be written."""
     try:
         folder().mkdir(parents=True, exist_ok=True)
         _note_of(name).touch()
@@ -125,7 +110,7 @@ def note(name: str) -> None:
 
 @contextmanager
 def nothing_collected() -> Iterator[None]:
-    """Collect no garbage: Numba makes millions of small objects that live as long as it works."""
+    """Disable garbage collection: Numba makes millions of small objects that live on."""
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -1,8 +1,8 @@
-"""The errors of the package: what was wrong, the value, and what to change.
+"""Errors of the package and checks of arguments.
 
-Every error derives from :class:`AncfError`; those about bad input are also ``ValueError``. The
-functions ``require_...`` check arguments: they return what they are given, converted, or raise an
-:class:`InputError`. ``name`` is what messages call the argument.
+Every error derives from :class:`AncfError`; those about input are also ``ValueError``. The
+functions ``require_...`` return their argument, converted, or raise an :class:`InputError`;
+``name`` is the argument's name in the message.
 """
 
 from __future__ import annotations
@@ -23,34 +23,32 @@ import numpy as np
 
 from .types import Array
 
-#: The filters of warnings belong to all threads: one at a time sets and restores them.
+#: Warning filters are global: one thread at a time changes them.
 _FILTERS = RLock()
 
-#: Longest text of a value in a message.
+#: Longest representation of a value in a message.
 WIDTH = 80
 
 
 class AncfError(Exception):
-    """Base class of every error raised by :mod:`skfem_ancf`."""
+    """Base class of all errors of :mod:`skfem_ancf`."""
 
 
 class InputError(AncfError, ValueError):
-    """An argument has a value that cannot describe a beam."""
+    """An argument is invalid."""
 
 
 class MeshError(InputError):
-    """The mesh, its geometry or a point on it is not valid."""
+    """A mesh, its geometry or a point on it is invalid."""
 
 
 class NameUnknown(InputError):
-    """A boundary, coordinate, formulation or scheme name is not known.
-
-    The message lists the known ones and suggests the nearest.
+    """An unknown name; the message lists the known ones and suggests the most similar.
 
     Attributes
     ----------
     kind, name, known
-        What was named, the name given, and those that are known.
+        The kind of name, the given name, and the known names.
     """
 
     def __init__(self, kind: str, name: object, known: Iterable[Any]) -> None:
@@ -64,27 +62,27 @@ class NameUnknown(InputError):
 
 
 class CallError(InputError, TypeError):
-    """A call with unknown or missing arguments; the message lists those that there are."""
+    """A call with unknown or missing arguments; the message lists the known ones."""
 
 
 class CallbackError(InputError):
-    """A function of the caller's raised an error, or returned what cannot be used."""
+    """A user's function raised an error or returned an invalid value."""
 
 
 class FileError(InputError, OSError):
-    """A file cannot be read or written, or holds something else."""
+    """A file cannot be read or written, or has a wrong content."""
 
 
 class SupportError(AncfError):
-    """The supports leave a rigid motion free, or contradict each other."""
+    """Supports leave a rigid motion unconstrained, or contradict each other."""
 
 
 class ImmutableError(AncfError, AttributeError):
-    """An attribute of an object that does not change was set."""
+    """An attribute of an immutable object was set."""
 
 
 class PickleError(AncfError, pickle.PicklingError):
-    """An object holds a function that pickle cannot take; the message says which."""
+    """An object has a function that cannot be pickled; the message says which."""
 
 
 class MissingExtra(AncfError, ImportError):
@@ -93,7 +91,7 @@ class MissingExtra(AncfError, ImportError):
     Parameters
     ----------
     module
-        Name of the package that cannot be imported.
+        Name of the missing package.
     extra
         Name of the extra of ``skfem-ancf`` that installs it.
     """
@@ -117,12 +115,12 @@ class ConvergenceError(AncfError):
     message
         What did not converge, where, and what to change.
     state
-        What had converged until then, or None.
+        The last converged state, or None.
 
     Attributes
     ----------
     state
-        The last converged state, or None if there is none.
+        The last converged state, or None.
     """
 
     def __init__(self, message: str, state: Any = None) -> None:
@@ -131,30 +129,29 @@ class ConvergenceError(AncfError):
 
 
 class StabilityWarning(UserWarning):
-    """The equilibrium path has lost its stability on the way to what was found."""
+    """The equilibrium path has lost its stability."""
 
 
 class ModelWarning(UserWarning):
-    """The solution is beyond what the law or the mesh is good for."""
+    """The solution is outside of the range of the material law or the mesh."""
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a solution: what was found until then is kept.
+    """Ctrl-C during a solution; ``state`` has the result so far.
 
-    A KeyboardInterrupt, so that ``except Exception`` does not take it for an error, and a script
-    does not go on as if all were done.
+    It is a KeyboardInterrupt, so that ``except Exception`` does not catch it.
 
     Parameters
     ----------
     message
-        Where it was stopped.
+        Where the solution stopped.
     state
-        What was found until then.
+        The result so far.
 
     Attributes
     ----------
     state
-        The History or the Path up to there, or the last State that converged.
+        The History or the Path so far, or the last converged State.
     """
 
     def __init__(self, message: str, state: Any = None) -> None:
@@ -163,38 +160,36 @@ class Interrupted(KeyboardInterrupt):
 
 
 class CheckpointError(AncfError):
-    """A checkpoint cannot be written, is damaged, or is of another scene."""
+    """A checkpoint cannot be written, is damaged, or belongs to another scene."""
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint, or the file of a sweep, could not be written; the run goes on, the last good
-    file stays.
-    """
+    """A checkpoint or the file of a sweep could not be written; the previous file remains."""
 
 
 class CompilationWarning(UserWarning):
-    """Compiled code cannot be kept on disk: each process compiles again."""
+    """Compiled code cannot be cached on disk: each process compiles again."""
 
 
 class SweepWarning(UserWarning):
-    """Members of a sweep failed; the others are there."""
+    """Some members of a sweep failed."""
 
 
 # messages
 
 def shown(value: object) -> str:
-    """A value as a message shows it: its repr on one line, shortened."""
-    if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the largest
+    """A value for a message: its repr on one line, shortened."""
+    if isinstance(value, int) and value.bit_length() > 256:  # Python limits the number of digits
         return f"{'-' * (value < 0)}10**{int(0.30103 * (value.bit_length() - 1))} or more"
     try:
         text = " ".join(repr(value).split())
-    except Exception:  # whatever it is, it has no repr
+    except Exception:  # repr failed
         text = f"<{type(value).__name__}>"
     return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
 
 
 def _suggested(name, known):
-    """The known name that is most like one, as the end of a message."""
+    """The most similar known name as the end of a message, or ""."""
     names = {k.lower(): k for k in known if isinstance(k, str)}
     found = difflib.get_close_matches(name.lower() if isinstance(name, str) else "", names, 1, 0.5)
     return f"; did you mean {names[found[0]]!r}?" if found else ""
@@ -203,7 +198,7 @@ def _suggested(name, known):
 # numbers
 
 def require_finite_scalar(name: str, value: Any) -> float:
-    """A finite real number as a float. True, False, texts and arrays of one number are none."""
+    """A finite real number as a float; not bool, text or array."""
     if not _is_real(value):
         raise InputError(f"{name} must be a number, got {shown(value)}")
     try:
@@ -224,7 +219,7 @@ def _is_real(value):
 
 
 def require_positive(name: str, value: object, unit: str = "") -> float:
-    """A positive finite number; messages name its unit, if it has one."""
+    """A positive finite number; ``unit`` appears in the message."""
     value = require_finite_scalar(name, value)
     if value <= 0.0:
         raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {value!r}")
@@ -232,7 +227,7 @@ def require_positive(name: str, value: object, unit: str = "") -> float:
 
 
 def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
-    """A finite number >= 0; with ``energy`` a negative one would feed energy into the motion."""
+    """A finite number >= 0; ``energy`` explains why in the message."""
     number = require_finite_scalar(name, value)
     if number < 0.0:
         why = ": negative damping, mass or stiffness would feed energy in" if energy else ""
@@ -242,7 +237,7 @@ def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
 
 def require_integer(name: str, value: object, low: int, high: int | None = None,
                     why: str = "") -> int:
-    """An integer from ``low`` to ``high``; messages say ``why`` these are the bounds."""
+    """An integer from ``low`` to ``high``; ``why`` explains the bounds in the message."""
     if (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low
             or (high is not None and value > high)):
         wanted = f">= {low}" if high is None else f"from {low} to {high}"
@@ -252,12 +247,12 @@ def require_integer(name: str, value: object, low: int, high: int | None = None,
 
 
 def require_index(name: str, value: object, n: int) -> int:
-    """The index of one of ``n`` things, counted from the end if it is negative."""
+    """The index of one of ``n`` things; negative ones count from the end."""
     return require_integer(name, value, -n, n - 1) % n
 
 
 def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None) -> Array:
-    """An array of finite real numbers as float64; None in ``shape`` is a free extent."""
+    """An array of finite real numbers as float64; None in ``shape`` is any extent."""
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
     if shape is not None and (array.ndim != len(shape) or any(
@@ -271,12 +266,12 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
 
 
 def require_point(point: Any) -> Array:
-    """A material point as an array (2,); MeshError unless it is two numbers."""
+    """A material point as an array (2,); else MeshError."""
     if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and not any(
             isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x) for x in point):
         return require_finite("a material point", point, (2,))
-    raise MeshError("a material point has two coordinates (x, y), its place in the reference "
-                    f"configuration, or is the name of an end, as 'right', got {shown(point)}")
+    raise MeshError("a material point has two coordinates (x, y) in the reference configuration, "
+                    f"or is the name of an end, as 'right', got {shown(point)}")
 
 
 def _real_array(name, value):
@@ -285,20 +280,20 @@ def _real_array(name, value):
         array = np.asarray(value)
         if array.dtype.kind == "c":
             raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
-        # of objects: fractions, or large integers
+        # objects: fractions, or large integers
         if array.dtype.kind in "iuf" or array.dtype.kind == "O" and all(map(_is_real, array.flat)):
             return array.astype(np.float64)
     except OverflowError:
         raise InputError(f"{name} has a value that is too large for a float: {shown(value)}"
                          ) from None
-    except (TypeError, ValueError) as error:  # rows of different lengths, for one
+    except (TypeError, ValueError) as error:  # such as rows of different lengths
         if isinstance(error, InputError):
             raise
     raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
 
 
 def is_masked(value: object) -> bool:
-    """True of an array with masked values, and of a list or dict that holds one."""
+    """True for an array with masked values, or a list or dict with one."""
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
     if isinstance(value, dict):
@@ -307,52 +302,43 @@ def is_masked(value: object) -> bool:
 
 
 def require_unmasked(name: str, value: Any) -> None:
-    """No array with masked values, and nothing that holds one."""
+    """Raise InputError for masked values."""
     if is_masked(value):
-        raise InputError(f"{name} has masked values, whose numbers mean nothing: leave them out, "
-                         "as by numpy.ma.compressed, or fill them, as by numpy.ma.filled")
+        raise InputError(f"{name} has masked values: remove them with numpy.ma.compressed, or "
+                         "replace them with numpy.ma.filled")
 
 
-#: By how much a derivative may be off, over the larger of it and the difference.
+#: Largest relative error of a derivative, compared with the difference quotient.
 SLOPE = 0.01
 
 
 def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
                   else_: str = "") -> None:
-    """A derivative that is, nearly, that of a function.
+    """Raise InputError unless ``slope`` is close to ``change``, a difference of a function.
 
-    Parameters
-    ----------
-    what, of
-        What messages call the derivative, and the function.
-    change
-        By how much the function changes over a small step.
-    slope
-        The derivative times that step, an array of the same shape.
-    noise
-        Round-off of the change.
-    else_
-        The end of the message.
+    ``what`` and ``of`` are names of derivative and function; ``change`` over a small step and
+    ``slope`` times that step are arrays of one shape, ``noise`` is the round-off; ``else_`` ends
+    the message.
     """
     change, slope = np.ravel(change), np.ravel(slope)
     off = np.abs(change - slope)
     if np.max(off, initial=0.0) > SLOPE * np.max(np.abs([change, slope])) + noise:
         k = np.argmax(off)
-        raise InputError(f"{what} is not the derivative of {of}: over a small step it says "
-                         f"{slope[k]:.6g} where that changes by {change[k]:.6g}{else_}")
+        raise InputError(f"{what} is not the derivative of {of}: over a small step it gives "
+                         f"{slope[k]:.6g}, but the change is {change[k]:.6g}{else_}")
 
 
 # names and flags
 
 def require_option(kind: str, name: object, known: Iterable[str]) -> str:
-    """One of the known names of a kind, or :class:`NameUnknown`."""
+    """A known name, or :class:`NameUnknown`."""
     if not isinstance(name, str) or name not in known:
         raise NameUnknown(kind, name, known)
     return name
 
 
 def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...]:
-    """One known name or several as a tuple; ``kind`` is in the singular."""
+    """One or several known names as a tuple; ``kind`` is in the singular."""
     if isinstance(names, str):
         names = (names,)
     if not isinstance(names, (tuple, list, set, frozenset, np.ndarray)) or (
@@ -362,17 +348,17 @@ def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...
 
 
 def require_text(name: str, value: Any) -> Any:
-    """A text that a file can hold, or None."""
+    """A text that can be encoded, or None."""
     try:
         if value is not None:
             str.encode(value)
-    except (TypeError, UnicodeEncodeError):  # the latter of lone surrogates
+    except (TypeError, UnicodeEncodeError):  # the latter for lone surrogates
         raise InputError(f"{name} must be a text, or None for none, got {shown(value)}") from None
     return value
 
 
 def require_label(name: str, value: object) -> str | None:
-    """As :func:`require_text`, of texts that are not empty."""
+    """As :func:`require_text`, but not empty."""
     if isinstance(value, str) and not value:
         raise InputError(f"{name} must be a text, or None for none, got ''")
     return require_text(name, value)
@@ -386,7 +372,7 @@ def require_flag(name: str, value: object) -> bool:
 
 
 def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
-    """An object, not a class, with the attributes of a ``kind``."""
+    """An instance with these attributes; ``kind`` is its name in the message."""
     if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
         raise InputError(f"{name} must be a {kind}, got {shown(value)}")
     return value
@@ -394,7 +380,7 @@ def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
 
 def require_options(what: str, options: dict[str, Any], known: Iterable[str],
                     hint: str = "") -> dict[str, Any]:
-    """The keywords of a call, all of them known, or :class:`CallError` with a ``hint``."""
+    """Keywords that are all known, or :class:`CallError` with a ``hint``."""
     for name in options:
         if name not in known:
             raise CallError(f"{what} has no option {name!r}; known: "
@@ -403,12 +389,12 @@ def require_options(what: str, options: dict[str, Any], known: Iterable[str],
 
 
 def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
-    """A file name as a ``pathlib.Path``; its suffix, if it matters, in capitals too."""
+    """A file name as a ``Path``, with one of the suffixes in any case."""
     try:
         path = Path(value)
         if not os.fspath(value) or b"\0" in os.fsencode(path):
             raise ValueError
-    except (TypeError, ValueError):  # among them UnicodeEncodeError, of lone surrogates
+    except (TypeError, ValueError):  # UnicodeEncodeError too, for lone surrogates
         raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError("the file name must end with "
@@ -417,10 +403,10 @@ def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
     return path
 
 
-# functions of the caller's
+# users' functions
 
 def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
-    """What can be called; ``returns`` as in "of time that returns a number"."""
+    """A callable; ``returns`` is a phrase such as "of time that returns a number"."""
     if not callable(value):
         raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
     return value
@@ -428,7 +414,7 @@ def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
 
 @contextmanager
 def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
-    """Warnings of a kind are raised inside, in this thread while no other changes the filters."""
+    """Raise warnings of a category as errors, in one thread at a time."""
     with _FILTERS, warnings.catch_warnings():
         warnings.simplefilter("error", category)
         yield
@@ -436,9 +422,9 @@ def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
 
 @contextmanager
 def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator[None]:
-    """What a user's code raises in the block, whatever it is, as an error with a hint.
+    """Convert any exception of the block to the error ``kind`` with a hint.
 
-    ``what`` is formatted with ``of`` if it is needed. Errors of the package pass.
+    ``what`` is formatted with ``of``. Errors of the package pass unchanged.
 
     Examples
     --------
@@ -458,9 +444,10 @@ def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator
 
 
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
-    """What a function of the caller's returns; if it raises, a :class:`CallbackError` says of what.
+    """Call a user's function; its exceptions become :class:`CallbackError`.
 
-    ``what`` is the call, formatted with the arguments. Errors of the package pass.
+    ``what`` describes the call and is formatted with the arguments. Errors of the package pass
+    unchanged.
 
     Examples
     --------
@@ -486,7 +473,7 @@ def ask_number(what: str, function: Callable[..., Any], *args: Any) -> float:
 
 def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[..., Any],
               *args: Any, number: bool = False) -> Array:
-    """As :func:`ask`, for finite numbers of a shape; with ``number`` one may do for all."""
+    """As :func:`ask`, for a finite array; with ``number`` a scalar is broadcast."""
     value = ask(what, function, *args)
     if number and np.ndim(value) == 0:
         value = np.broadcast_to(value, shape)  # type: ignore[arg-type]
@@ -494,8 +481,7 @@ def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[
 
 
 def ask_field(what: str, function: Callable[[Array], Any], x: Array) -> Array:
-    """As :func:`ask`, for a vector field at points (2, ...): two components, which may be constant.
-    """
+    """As :func:`ask`, for a vector field at points (2, ...) with constant or array components."""
     try:
         value = ask(what, function, x)
     except CallbackError as error:
@@ -525,12 +511,12 @@ def _returned(check, what, value, args, *more):
 
 # warnings
 
-#: Files of the package, and of the library where its own blocks pass through.
+#: Files of the package, and contextlib, which occurs between their frames.
 _WITHIN = str(Path(__file__).resolve().parents[1]) + os.sep, contextlib.__file__
 
 
 def warn(message: str, category: type[Warning]) -> None:
-    """Give a warning that names the line of the caller's that has led to it."""
+    """Give a warning that points to the user's line."""
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_WITHIN):
         frame, level = frame.f_back, level + 1

@@ -1,4 +1,4 @@
-"""Objects that do not change once they are made."""
+"""Immutable objects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def read_only(value: T) -> T:
-    """A value; in place of an array that can be written to a copy that cannot."""
+    """The value; a writable array is replaced by a read-only copy."""
     if not isinstance(value, np.ndarray) or not value.flags.writeable:
         return value
     array = value.copy()
@@ -24,7 +24,7 @@ def read_only(value: T) -> T:
 
 
 class _Freezing(type):
-    """Freezes an object after the constructor of its class, which may be a user's subclass."""
+    """Freezes an object after the constructor, also of a user's subclass."""
 
     def __call__(cls, *args, **kwargs):
         made = super().__call__(*args, **kwargs)
@@ -33,13 +33,13 @@ class _Freezing(type):
 
     @property
     def __signature__(cls) -> inspect.Signature:
-        """That of the constructor, for ``help`` and :func:`rebuilt`."""
+        """The signature of the constructor, for ``help`` and :func:`rebuilt`."""
         arguments = inspect.signature(cls.__init__).parameters.values()  # type: ignore[misc]
         return inspect.Signature(list(arguments)[1:])
 
 
 class Immutable(metaclass=_Freezing):
-    """Base class of descriptions: public attributes are set by constructors alone.
+    """Base class of descriptions, whose public attributes only constructors set.
 
     Arrays become read-only. Private attributes and cached properties, which are not pickled, may
     be set later.
@@ -55,7 +55,7 @@ class Immutable(metaclass=_Freezing):
         self._frozen = True
 
     def _thawed(self):
-        """A copy whose attributes may be set, until it is frozen."""
+        """A copy whose attributes can be set until ``_freeze``."""
         other = object.__new__(type(self))
         vars(other).update(self.__getstate__(), _frozen=False)
         return other
@@ -90,9 +90,9 @@ class Immutable(metaclass=_Freezing):
 
 
 def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
-    """A copy of ``thing`` with some arguments changed; the others are its attributes of that name.
+    """A copy with changed arguments; the others are the attributes of the same names.
 
-    A constructor that passes ``**kwargs`` on takes the names ``more`` by them.
+    ``more`` are names that the constructor passes on by ``**kwargs``.
     """
     arguments = inspect.signature(type(thing)).parameters.values()
     names = [a.name for a in arguments if a.kind in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY)]
@@ -103,7 +103,7 @@ def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
             raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
     missing = [name for name in names if name not in changes and not hasattr(thing, name)]
     if missing:
-        raise InputError(f"{thing!r} does not keep the argument {missing[0]!r} it was made with: "
-                         "keep it as an attribute of that name, or give it to replace")
+        raise InputError(f"{thing!r} does not store its argument {missing[0]!r}: store it as an "
+                         "attribute of that name, or pass it to replace")
     return type(thing)(**{name: getattr(thing, name) for name in names if name not in changes},
                        **changes)

@@ -1,8 +1,8 @@
-"""Compiles the functions that :mod:`skfem_ancf.core.source` marks, by Numba's public interface.
+"""Compilation of functions marked by :mod:`skfem_ancf.core.source`, by Numba's public interface.
 
-Marked functions are registered by ``numba.extending``, so that compiled code finds them by what
-Python calls. What is called from Python, or by its address, is kept on disk. Numba compiles what a
-function calls again with each that calls it: behind an address large parts are compiled once.
+Marked functions are registered with ``numba.extending``. Functions that are called from Python, or
+by address, are cached on disk. Numba compiles a function again in each caller; large parts are
+therefore called by address.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from .source import MARKED
 from .words import Words, hints
 
 
-# no "nnan" and "ninf": a strain that is not finite must be seen
+# without "nnan" and "ninf", since strains that are not finite must be detected
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
-#: Types of fields and arguments, by their annotations.
+#: Numba types by annotation.
 SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(None): types.none}
-#: Of a small named tuple that compiled code makes, which stays a tuple: ``Annotated[Kind, MADE]``.
+#: ``Annotated[Kind, MADE]`` marks a small named tuple that compiled code makes by value.
 MADE = "made"
 _DTYPES = {"f": types.float64, "i": types.int64}
-#: What reading or writing what is kept raises, where there is something else.
+#: Exceptions of a damaged cache.
 _SPOILT = RuntimeError, OSError, EOFError, pickle.PickleError, KeyError, ValueError
 _registered: set[Any] = set()
 
 
 def register() -> None:
-    """Let compiled code call all marked functions that there are."""
+    """Let compiled code call all marked functions."""
     while len(_registered) < len(MARKED):
         for function, module in list(MARKED.items()):
             if function not in _registered:
@@ -53,15 +53,10 @@ def _register(function, found):
 
 
 class Record(types.NamedTuple):
-    """A named tuple by its address, that of its :class:`~skfem_ancf.core.words.Words`.
+    """A named tuple by the address of its :class:`~skfem_ancf.core.words.Words`.
 
-    A field is read where it is used. Of tuples of a hundred arrays, by value, Numba counts all
-    references wherever they are passed on, and takes ten times as long to compile.
-
-    Parameters
-    ----------
-    kind
-        The class of named tuples.
+    Fields are read where they are used. Tuples of many arrays by value take Numba ten times as
+    long, since it counts all references.
     """
 
     dtype = types.int64  # of the words
@@ -78,7 +73,7 @@ register_model(Record)(models.PointerModel)
 
 @lower_getattr_generic(Record)
 def _read(context, builder, record, pointer, name):
-    """A field from its words."""
+    """Read a field from its words."""
     kind, at = record.places[name]
 
     def place(k):
@@ -115,7 +110,7 @@ def _read(context, builder, record, pointer, name):
 
 @cache
 def reader(kind: Any) -> Any:
-    """A function of the address of :class:`~skfem_ancf.core.words.Words`: their Record."""
+    """A compiled function from the address of :class:`~skfem_ancf.core.words.Words` to a Record."""
     made = Record(kind)
 
     @intrinsic
@@ -129,7 +124,7 @@ def reader(kind: Any) -> Any:
 
 
 def type_of(hint: Any) -> Any:
-    """Numba's type of an annotation: a number, an array as ``F1``, or a class of named tuples."""
+    """Numba's type of an annotation: a number, an array such as ``F1``, or a named tuple."""
     kind = getattr(hint, "__metadata__", [hint])[0]
     if kind == MADE:
         return types.NamedTuple([type_of(x) for x in hints(hint.__origin__)], hint.__origin__)
@@ -141,7 +136,7 @@ def type_of(hint: Any) -> Any:
 
 
 def size_of(hint: Any) -> int:
-    """How many words an annotation has."""
+    """Number of words of an annotation."""
     kind = getattr(hint, "__metadata__", [hint])[0]
     if isinstance(kind, str):
         return 1 + int(kind[1])
@@ -149,24 +144,14 @@ def size_of(hint: Any) -> int:
 
 
 def compiled(function: Any) -> Any:
-    """A user's function for compiled code; what is compiled or marked already as it is."""
+    """A user's function for compiled code; compiled or marked ones are unchanged."""
     register()
     return function if function in MARKED or hasattr(function, "py_func") else njit(
         **OPTIONS)(function)
 
 
 def entry(function: Any, args: Any) -> Any:
-    """The compiled function for Python, compiled or taken from disk.
-
-    Named tuples are given as their words, see :class:`Record`.
-
-    Parameters
-    ----------
-    function
-        A marked function.
-    args
-        What it is called with: it takes arguments of these types only.
-    """
+    """A compiled function for Python, for arguments of these types; named tuples become words."""
     names: dict[str, Any] = {"function": njit(inline="always", **OPTIONS)(function)}
     given = [f"a{k}" for k in range(len(args))]
     for k, x in enumerate(args):
@@ -188,7 +173,7 @@ def entry(function: Any, args: Any) -> Any:
     return call
 
 
-#: Tuples whose words are kept for the next call.
+#: Number of tuples whose words are cached.
 LAST = 16
 
 
@@ -203,16 +188,9 @@ def _words(x, known):
 
 
 def address(function: Any, hints: Any, name: str = "", kept: bool = True) -> int:
-    """The address of a compiled function, see :func:`caller`.
+    """The address of a compiled function with annotated arguments, see :func:`caller`.
 
-    Parameters
-    ----------
-    function, hints
-        The function, and annotations of its arguments.
-    name
-        Of it on disk, where it has to be told from others.
-    kept
-        Keep it on disk.
+    ``name`` distinguishes it on disk; it is cached if ``kept``.
     """
     signature = types.void(*map(type_of, hints))
 
@@ -228,7 +206,7 @@ _alive: list[Any] = []
 
 
 def _named(function, name=""):
-    """A copy, under a name by which Numba finds no code of other versions on disk."""
+    """A copy with a name that is unique to this version in Numba's cache."""
     copy = FunctionType(function.__code__, function.__globals__, function.__name__,
                         function.__defaults__, function.__closure__)
     copy.__module__ = function.__module__
@@ -237,7 +215,7 @@ def _named(function, name=""):
 
 
 def _kept(make):
-    """What ``make(cache=True)`` returns, or without where nothing can be kept."""
+    """``make(cache=True)``, or ``make()`` without a cache."""
     register()
     with nothing_collected():
         if can_keep():
@@ -249,13 +227,7 @@ def _kept(make):
 
 
 def caller(*hints: Any) -> Any:
-    """What compiled code calls an address with, and a tuple of arguments.
-
-    Parameters
-    ----------
-    *hints
-        Annotations of the arguments.
-    """
+    """A function for compiled code that calls an address with a tuple of annotated arguments."""
     takes = tuple(map(type_of, hints))
     function = types.FunctionPrototype(types.void, takes)
 

@@ -1,4 +1,4 @@
-"""Banded matrices of chains of elements, over LAPACK."""
+"""Band matrices of chains of elements, with LAPACK."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from scipy.sparse import coo_matrix, csc_matrix, issparse
 from .band import HALVES, SPARE, Band, solve
 from .types import Array
 
-#: Eigenvalue of a matrix of unit diagonal that is round-off.
+#: Eigenvalue that is round-off, for a unit diagonal.
 SINGULAR = 4.0 * np.finfo(float).eps
-#: What factors and eigenvalues raise: singular matrices, Arnoldi without convergence.
+#: Exceptions of factorisations and eigenvalue solvers.
 NO_FACTORS = np.linalg.LinAlgError, RuntimeError
-#: Pivot of a matrix of unit diagonal below which its smallest eigenvalue may be round-off.
+#: Pivot below which the smallest eigenvalue may be round-off, for a unit diagonal.
 SMALL = 1e-7
-#: Growth of the entries of a matrix of unit diagonal at which a pivot block is made larger.
+#: Growth of entries at which a pivot block is enlarged, for a unit diagonal.
 GROWTH = 1e2
 
 
 def dense(A: Any) -> Array:
-    """A sparse or dense matrix as a dense one in C order."""
+    """A dense matrix in C order."""
     return A.toarray(order="C") if issparse(A) else np.ascontiguousarray(A)
 
 
 class Inertia(NamedTuple):
-    """Signs of the eigenvalues of a symmetric matrix, on the tangent space of the constraints.
+    """Signs of the eigenvalues of a symmetric matrix.
 
     Attributes
     ----------
     negative : int
         Number of negative eigenvalues.
     singular : bool
-        An eigenvalue is zero to round-off.
+        True if an eigenvalue is zero to round-off.
     """
 
     negative: int
@@ -45,22 +45,15 @@ class Inertia(NamedTuple):
 
 
 def halves(n: int, bandwidth: int) -> Band:
-    """A :class:`~skfem_ancf.core.band.Band` in two halves.
-
-    Parameters
-    ----------
-    n, bandwidth
-        Numbers of rows, and of subdiagonals.
-    """
+    """A zero unsymmetric :class:`~skfem_ancf.core.band.Band` of n rows, stored in two halves."""
     ld = 2 * (bandwidth + 1 + SPARE)
     return Band(np.zeros(n * ld), np.zeros(0, np.int64), ld, bandwidth, HALVES)
 
 
 def beside_zero(negative: Callable[[float], int]) -> Inertia:
-    """The :class:`Inertia` of a matrix, from the negative eigenvalues of those beside it.
+    """The :class:`Inertia` from ``negative(shift)``, a count for a relative shift of the diagonal.
 
-    ``negative`` is a function of the shift, relative to the diagonal. What changes its sign
-    between two shifts of round-off is zero.
+    An eigenvalue that changes sign between two shifts of round-off is zero.
     """
     below, above = negative(-SINGULAR), negative(SINGULAR)
     return Inertia(above, below != above)
@@ -68,12 +61,11 @@ def beside_zero(negative: Callable[[float], int]) -> Inertia:
 
 @lru_cache(32)
 def _lower(m):
-    """The lower half of ones, shape (m, m)."""
     return np.tri(m)
 
 
 class BandMatrix:
-    """A square band matrix that is filled element by element and factorised by LAPACK.
+    """A square band matrix that is assembled by element and factorised by LAPACK.
 
     Parameters
     ----------
@@ -82,27 +74,21 @@ class BandMatrix:
     bandwidth
         Number of subdiagonals, and of superdiagonals.
     symmetric
-        Store and factorise the lower half only: Cholesky, or LU where it is not positive
-        definite.
-
-    Other Parameters
-    ----------------
-    i, j, values
-        Rows, columns and values of entries, shape (k,).
+        Store the lower half only; Cholesky factors, or LU if the matrix is indefinite.
     """
 
     def __init__(self, n: int, bandwidth: int, symmetric: bool = True) -> None:
         self.n, self.bandwidth, self.symmetric = n, bandwidth, symmetric
-        # gbtrf wants space for the pivots, the lower half zeros that vectors may reach to
+        # space for the fill-in of gbtrf; padding for vectorised loops over the lower half
         self._ld = bandwidth + 1 + SPARE if symmetric else 3 * bandwidth + 1
         self._diagonal = 0 if symmetric else 2 * bandwidth
         self._flat = np.zeros(n * self._ld)
-        #: What kernels take: a view of the entries, and space for their factors.
+        #: View of the entries for kernels, with space for pivots.
         self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
         ab = self._flat.reshape(n, self._ld).T
         #: LAPACK's band storage, a view of shape (rows, n).
         self.ab = ab[:-SPARE] if symmetric else ab
-        self._rows = ab  # with the zeros behind it need not be copied to be multiplied
+        self._rows = ab  # with padding, so that dsbmv needs no copy
         self._factor: Any = None
         self.positive_definite: bool | None = None
 
@@ -112,27 +98,19 @@ class BandMatrix:
         self._factor = None
 
     def _blocks(self, start, step, m, count):
-        """Diagonal blocks of size m at rows start, start + step, ...: a view (count, m, m)."""
+        """View (count, m, m) of diagonal blocks at rows start, start + step, ..."""
         item, ld = self._flat.itemsize, self._ld
         return np.ndarray((count, m, m), float, self._flat, (start * ld + self._diagonal) * item,
                           (step * ld * item, item, (ld - 1) * item))
 
     def add_elements(self, K: Array, start: int, nd: int, left: Array) -> None:
-        """Add element matrices that couple node k and k + 1 of a chain.
+        """Add matrices K (ne, 2 nd, 2 nd) that couple node k and k + 1 of a chain.
 
-        Parameters
-        ----------
-        K
-            Element matrices, shape (ne, 2 nd, 2 nd). Overwritten if the matrix is symmetric.
-        start
-            Row of the first coordinate of node 0.
-        nd
-            Coordinates of a node.
-        left
-            Left node of each element, increasing, shape (ne,).
+        ``start`` is the first row of node 0, ``nd`` the number of DOFs of a node, ``left`` (ne,)
+        the increasing left nodes. K is overwritten if the matrix is symmetric.
         """
         m = 2 * nd
-        if self.symmetric:  # the upper half falls on entries of other elements
+        if self.symmetric:  # the upper half would overlap other entries
             K *= _lower(m)
         view = self._blocks(start, nd, m, int(left[-1]) + 1)
         if left[-1] - left[0] == len(left) - 1:
@@ -144,11 +122,11 @@ class BandMatrix:
             view[left[1::2]] += K[1::2]
 
     def position(self, i: ArrayLike, j: ArrayLike) -> Array:
-        """Where entries lie among the numbers of the band, rows and columns of shape (k,)."""
+        """Positions of entries (k,) in the flat storage."""
         return np.asarray(j) * self._ld + self._diagonal + np.asarray(i) - np.asarray(j)
 
     def add(self, i: ArrayLike, j: ArrayLike, values: ArrayLike) -> None:
-        """Add entries; of a symmetric matrix those above the diagonal are ignored."""
+        """Add entries; of a symmetric matrix only those in the lower half count."""
         i, j, values = map(np.atleast_1d, (i, j, values))
         if self.symmetric:
             keep = i >= j
@@ -174,14 +152,14 @@ class BandMatrix:
         return blas.dgbmv(self.n, self.n, k, k, 1.0, self.ab[k:], v)
 
     def combine(self, a: float, A: BandMatrix, b: float, B: BandMatrix) -> BandMatrix:
-        """Fill with ``a A + b B``."""
+        """Set to ``a A + b B``."""
         np.multiply(A._flat, a, out=self._flat)
         self._flat += b * B._flat
         self._factor = None
         return self
 
     def factorize(self) -> BandMatrix:
-        """Factorise; raises ``numpy.linalg.LinAlgError`` if the matrix is singular."""
+        """Factorise; LinAlgError if the matrix is singular."""
         if self.symmetric:
             c, info = lapack.dpbtrf(self.ab, lower=1)
             self.positive_definite = info == 0
@@ -196,7 +174,7 @@ class BandMatrix:
         return self
 
     def general(self) -> BandMatrix:
-        """The same matrix with both halves; itself if it has them."""
+        """The matrix with both halves stored."""
         if not self.symmetric:
             return self
         general = BandMatrix(self.n, self.bandwidth, symmetric=False)
@@ -207,7 +185,7 @@ class BandMatrix:
         return general
 
     def solve(self, b: Array) -> Array:
-        """Solve with the factors; ``b`` of shape (n,) or (n, k)."""
+        """Solve with the factors for ``b`` (n,) or (n, k)."""
         if self._factor is None:
             self.factorize()
         if self._factor[0] == "pb":
@@ -220,11 +198,11 @@ class BandMatrix:
                              self._factor[2])[0]
 
     def take_factors(self) -> None:
-        """Note that the entries have been replaced by factors, of :mod:`skfem_ancf.core.band`."""
+        """Declare that the entries are now factors of :mod:`skfem_ancf.core.band`."""
         self._factor = ("ldl",) if self.symmetric else ("gb", self.ab, self.band.pivots)
 
     def to_cholesky(self) -> None:
-        """Turn factors of :meth:`take_factors` with positive D into those of Cholesky."""
+        """Convert L D L^T factors with positive D to Cholesky factors."""
         if self._factor[0] == "ldl":
             c = self.ab * np.sqrt(self.ab[0])
             c[0] = np.sqrt(self.ab[0])
@@ -232,7 +210,7 @@ class BandMatrix:
 
     @property
     def definite(self) -> bool:
-        """True if it has factors that are those of a positive definite symmetric matrix."""
+        """True if it has factors with positive pivots."""
         if self._factor is None or not self.symmetric:
             return False
         if self._factor[0] == "ldl":
@@ -240,30 +218,19 @@ class BandMatrix:
         return self._factor[0] == "pb"
 
     def pivots(self) -> Array:
-        """The pivots of the factors of a symmetric matrix, that of Cholesky squared; (n,)."""
+        """Pivots (n,) of the factors of a symmetric matrix."""
         if self._factor[0] == "pb":
             return self._factor[1][0] ** 2
         return self._flat[::self._ld].copy()
 
     def inertia(self) -> Inertia:
-        """Signs of the eigenvalues of a symmetric matrix, from its factors.
+        """Inertia of a symmetric matrix, by Sylvester's law.
 
-        Cholesky says it where it succeeds. Else the matrix, scaled to a unit diagonal, is
-        eliminated block by block along the chain; a block whose elimination makes entries grow is
-        merged with the next one.
-
-        Returns
-        -------
-        Inertia
-            By Sylvester's law, as that of any symmetric matrix it is congruent to.
-
-        Raises
-        ------
-        ValueError
-            If the matrix is not symmetric.
+        If Cholesky fails, the matrix is eliminated block by block along the chain; blocks whose
+        elimination lets entries grow are merged with the next. ValueError if it is not symmetric.
         """
         if not self.symmetric:
-            raise ValueError("the inertia is that of a symmetric matrix")
+            raise ValueError("the inertia needs a symmetric matrix")
         if self._factor is None:
             self.factorize()
         diagonal = self.diagonal()
@@ -272,16 +239,16 @@ class BandMatrix:
         return beside_zero(lambda shift: self.shifted(shift).negative())
 
     def negative(self) -> int:
-        """The number of negative eigenvalues of a symmetric matrix, round-off counted too."""
+        """Number of negative eigenvalues of a symmetric matrix, including round-off."""
         _, info = lapack.dpbtrf(self.ab, lower=1)
         if info == 0:
             return 0
         size = np.abs(self.diagonal())
-        size[size == 0.0] = np.max(size)  # a diagonal may be zero where a beam has buckled
+        size[size == 0.0] = np.max(size)  # zero at a critical point
         return self._block_negative(1.0 / np.sqrt(size))
 
     def shifted(self, shift: float) -> BandMatrix:
-        """The matrix plus ``shift`` times its diagonal's size."""
+        """The matrix plus ``shift`` times the absolute diagonal."""
         out = BandMatrix(self.n, self.bandwidth, self.symmetric).combine(1.0, self, 0.0, self)
         out._flat[self._diagonal::self._ld] += shift * np.abs(self.diagonal())
         return out
@@ -304,7 +271,7 @@ class BandMatrix:
                 negative += int(np.sum(values < 0.0))
                 first, last, P = last, after, A - update
             else:
-                # rows before these are eliminated: they are in P, and touch no later ones
+                # earlier rows are eliminated: they are in P and do not couple to later ones
                 P = np.block([[P, E], [E.T, A]])
                 last = after
 
@@ -318,7 +285,7 @@ class BandMatrix:
         return scale[i0:i1, None] * out * scale[j0:j1]
 
     def determinant_sign(self) -> int:
-        """The sign of the determinant, from the factors of :meth:`factorize`: 1 or -1."""
+        """Sign of the determinant, 1 or -1."""
         if self._factor is None:
             self.factorize()
         if self._factor[0] == "pb":
@@ -340,13 +307,7 @@ class BandMatrix:
         return out
 
     def skew_size(self, sizes: Array) -> tuple[float, float]:
-        """The largest entries, without sign, of A - A^T and of A, of coordinates over their sizes.
-
-        Parameters
-        ----------
-        sizes
-            Of the coordinates, which have units of their own, shape (n,).
-        """
+        """Largest |entries| of A - A^T and of A, in units of the DOF sizes (n,)."""
         ab, top, n = self.ab, self._diagonal, self.n
         size, skew = float(np.max(np.abs(ab[top]) * sizes**2)), 0.0
         for k in range(1, min(self.bandwidth + 1, n)):
@@ -358,11 +319,11 @@ class BandMatrix:
         return skew, size
 
     def toarray(self) -> Array:
-        """The matrix as an array, shape (n, n)."""
+        """A dense array, shape (n, n)."""
         return self._dense(0, self.n, 0, self.n, np.ones(self.n))
 
     def tocsc(self) -> csc_matrix:
-        """The matrix as a scipy.sparse array in CSC format, without the zeros of the band."""
+        """A sparse matrix in CSC format."""
         first = max(self._diagonal - self.bandwidth, 0)
         columns = self._flat.reshape(self.n, self._ld)[:, first:self._diagonal + self.bandwidth + 1]
         j, k = np.nonzero(columns)

@@ -1,11 +1,11 @@
-"""What depends on the displacement, to first order about a base state.
+"""Linearisation about a base state by complex steps.
 
 A function f of the displacement u is evaluated at ``u0 + 1j STEP (u - u0)``. To first order,
 
     f(u0) + f'(u0) (u - u0) = Re f + Im f / STEP,
 
-exact to round-off, as nothing is subtracted [1]: one evaluation of what serves large displacements
-gives the linear strain, stress, force and rotation.
+to round-off, since nothing is subtracted [1]. The same code thus gives linear and nonlinear strain,
+stress, force and rotation.
 
 References
 ----------
@@ -21,18 +21,17 @@ import numpy as np
 
 from .types import Array, Law
 
-#: The step, a power of two. Its square is round-off beside anything, its fifth power a number.
+#: The step, a power of two; its square is negligible, its fifth power does not underflow.
 STEP = 2.0**-200
 
 
 def step(base: Any, value: Any) -> Any:
-    """The place at which a function is evaluated: from the base in the direction of a value.
-    """
+    """The complex argument from a base in the direction of a value."""
     return base + 1j * (STEP * (value - base))
 
 
 def first_order(z: Any) -> Any:
-    """What a function is to first order, from its value at a :func:`step`; real ones stay.
+    """Linearised value of a function from its result at a :func:`step`; real results pass.
 
     Examples
     --------
@@ -43,8 +42,7 @@ def first_order(z: Any) -> Any:
 
 
 def angle_of(x: Any, y: Any) -> Any:
-    """The angle of vectors, in radians: ``arctan2(y, x)``, of a :func:`step` too.
-    """
+    """``arctan2(y, x)`` in radians, also for a :func:`step`."""
     if not np.iscomplexobj(x):
         return np.arctan2(y, x)
     turn = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
@@ -52,16 +50,14 @@ def angle_of(x: Any, y: Any) -> Any:
 
 
 def unwrapped(angle: Array) -> Array:
-    """``np.unwrap`` along the last axis, of a :func:`step` too.
-    """
+    """``np.unwrap`` along the last axis, also for a :func:`step`."""
     if not np.iscomplexobj(angle):
         return np.unwrap(angle)
     return np.unwrap(angle.real) + 1j * angle.imag
 
 
 def stress_of(law: Law, strain: Array) -> Array:
-    """The stress of a law, of a :func:`step` too: by its moduli, so that it need not know of it.
-    """
+    """The stress of a law, for a :func:`step` by its moduli."""
     if not np.iscomplexobj(strain):
         return law.stress(strain)
     real = np.ascontiguousarray(strain.real)

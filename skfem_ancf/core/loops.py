@@ -1,7 +1,6 @@
-"""Loops that are compiled in place of calls of NumPy, SciPy and Python: of band matrices, sums into
-places that occur more than once, and calls of users' functions.
+"""Loops that replace calls of NumPy, SciPy and Python in compiled code.
 
-Each is what the function of its name does that :func:`skfem_ancf.core.source.primitive` marks.
+Each replaces the function of its name that :func:`skfem_ancf.core.source.primitive` marks.
 """
 
 import numpy as np
@@ -27,7 +26,7 @@ def multiply(A, x, y):
     for i in range(n):
         y[i] = 0.0
     for j in range(n):
-        # an index that is no sum of unknown sign needs no check: slices instead of x[j + k]
+        # slices instead of x[j + k]: Numba then needs no check for negative indices
         column, later, out, m = columns[j][top:], x[j:], y[j:], min(A.width, n - 1 - j) + 1
         c, s = later[0], column[0] * later[0]
         for k in range(1, m):
@@ -52,7 +51,7 @@ def factorize(A):
     if A.top > 0:
         return _exchanging(A)
     n, halves = A.flat.size // A.ld, 2 if A.top < 0 else 1
-    # entry i of half h of column j; an index that is no sum of unknown sign needs no check
+    # entry i of half h of column j
     L = A.flat.reshape(n, halves, A.ld // halves)
     for j in range(n):
         m, d = min(A.width, n - 1 - j), L[j, 0, 0]
@@ -130,7 +129,7 @@ def _solve_exchanged(A, x):
     flat, ld, top, n, reach = A.flat, A.ld, A.top, x.size, A.width
     for j in range(n):
         p = A.pivots[j]
-        reach = max(reach, A.width + p - j)  # of U: as far as rows were exchanged
+        reach = max(reach, A.width + p - j)  # bandwidth of U
         x[j], x[p] = x[p], x[j]
         xj = x[j]
         for i in range(1, min(A.width, n - 1 - j) + 1):
@@ -185,7 +184,7 @@ def solve_complex(A, width, x, y):
 
 @source
 def _eliminate_column(A, b, j):
-    """Take multiples of row j from those below, so that column j ends at the diagonal."""
+    """Eliminate column j below the diagonal."""
     n = b.size
     for i in range(j + 1, n):
         c = A[i, j] / A[j, j]
@@ -330,7 +329,7 @@ def total(x):
 def smallest(x):
     found = np.inf
     for i in range(x.size):
-        found = np.minimum(found, x[i])  # not a number, if one is not
+        found = np.minimum(found, x[i])  # propagates NaN
     return found
 
 
@@ -372,7 +371,7 @@ def subtract_from_band(A, i, j, v, x, k):
             A.flat[j[a] * A.ld + A.top + i[a] - j[a]] -= v[a] * x[k[a]]
 
 
-# users' functions
+# callbacks
 
 
 @source
@@ -381,38 +380,38 @@ def _ask(question, handle, what, t, x, a, b, out):
         callbacks.QUESTIONS[question](handle, what, t, x, a, b, out)
 
 
-def own_force(handle, t, scale, u, out):
+def custom_force(handle, t, scale, u, out):
     _ask(0, handle, 0, t, scale, u, u, out)
 
 
-def own_mean_force(handle, t, u0, u1, out):
+def custom_mean_force(handle, t, u0, u1, out):
     _ask(1, handle, 0, t, 1.0, u0, u1, out)
 
 
-def own_load_stiffness(handle, t, scale, u, flat):
+def custom_load_stiffness(handle, t, scale, u, flat):
     _ask(2, handle, 0, t, scale, u, u, flat)
 
 
-def own_joints(handle, what, t, u, v, out):
+def custom_joints(handle, what, t, u, v, out):
     _ask(3, handle, what, t, 1.0, u, v, out)
 
 
-def own_elements(handle, what, t, factor, a, b, out):
+def custom_elements(handle, what, t, factor, a, b, out):
     _ask(4, handle, what, t, factor, a, b, out)
 
 
-def own_poses(handle, t, span, poses):
+def custom_poses(handle, t, span, poses):
     _ask(5, handle, 0, t, span, poses, poses, poses)
 
 
-def own_solve(handle, t, u, multipliers, R, phi, du, dm):
+def call_solver(handle, t, u, multipliers, R, phi, du, dm):
     with objmode(done="boolean"):
-        done = callbacks.own_solve(handle, t, u, multipliers, R, phi, du, dm)
+        done = callbacks.call_solver(handle, t, u, multipliers, R, phi, du, dm)
     return done
 
 
-def own_distance(handle, obstacle, t, x, out):
-    out[:] = np.nan  # scenes with such shapes run in NumPy
+def custom_distance(handle, obstacle, t, x, out):
+    out[:] = np.nan  # never called: such scenes run in NumPy
 
 
 def log1p(x):

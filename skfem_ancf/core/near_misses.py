@@ -1,4 +1,4 @@
-"""Attributes that there are not: the error names those that are meant."""
+"""Suggestions for unknown attributes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import difflib
 import re
 from typing import TYPE_CHECKING
 
-#: Names that other packages, and people, have for what is called otherwise here. The first word
-#: of a key is the attribute that an object must have for it to be named.
+#: Synonyms in other packages. The first word of a key is the attribute that an object must have.
 MEANT = {
     "solve_static": "solve run_static static equilibrium analyze analyse analysis newton nonlinear",
     "solve_linear": "linear run_linear linear_static",
@@ -56,7 +55,7 @@ MEANT = {
 
 
 def meant(thing: object, name: str) -> list[str]:
-    """What of an object an attribute is called that it has not, at most three names."""
+    """At most three attributes of an object that an unknown name may mean."""
     there = [one for one in dir(thing) if not one.startswith("_")]
     found = [key for key, words in MEANT.items()
              if name.lower() in words.lower().split() and re.split(r"\W", key)[0] in there]
@@ -64,7 +63,7 @@ def meant(thing: object, name: str) -> list[str]:
 
 
 class NearMisses:
-    """Base class of objects whose attributes are asked by the names that other packages have.
+    """Base class whose AttributeError suggests attributes for synonyms.
 
     Examples
     --------
@@ -75,13 +74,12 @@ class NearMisses:
     AttributeError: MeshBeam has no attribute 'refine'; did you mean refined?
     """
 
-    if not TYPE_CHECKING:  # a type checker is to see the attributes that there are
+    if not TYPE_CHECKING:  # type checkers must see the real attributes only
         def __getattr__(self, name):
-            """AttributeError that names what is meant."""
-            if hasattr(type(self), name):  # a property that has failed: its own error
+            if hasattr(type(self), name):  # a property failed: raise its error
                 return object.__getattribute__(self, name)
             others = [] if name.startswith("_") else meant(self, name)
             text = f"; did you mean {' or '.join(others)}?" if others else ""
-            # without a name: Python would add a guess of its own
+            # without name=, else Python adds its own suggestion
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}{text}",
                                  name=None, obj=None)

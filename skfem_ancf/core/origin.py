@@ -1,4 +1,4 @@
-"""Whose a class or a function is: the package's own, or one that came by its doors."""
+"""Whether a class or function belongs to the package."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def ours(thing: Any) -> bool:
-    """True if a function, or the class of an object, is the package's own.
+    """True if a function, or the class of an object, is defined in this package.
 
     Examples
     --------

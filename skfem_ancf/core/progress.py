@@ -1,4 +1,4 @@
-"""A progress bar for long work, if tqdm is installed."""
+"""Progress bars by tqdm, if installed."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from .errors import InputError, MissingExtra, shown
 
 class _NoBar:
     def update(self, amount: float) -> None:
-        """Nothing to show."""
+        """Do nothing."""
 
 
 NO_BAR = nullcontext(_NoBar())
 
 
 def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextManager[Any]:
-    """A bar with ``update(amount)``.
-    """
+    """A bar with ``update(amount)``; ``show`` may be None for long work on a terminal."""
     if show is not None and not isinstance(show, bool):
         raise InputError(f"progress must be True, False or None, got {shown(show)}")
     if show is False or (show is None and not sys.stderr.isatty()):
@@ -31,7 +30,6 @@ def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextM
 
 @contextmanager
 def _bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
-    """The bar, where one is wanted."""
     try:
         from tqdm import tqdm
     except ImportError:
@@ -46,9 +44,9 @@ def _bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
 
 @contextmanager
 def announced_bar(total: float, desc: str) -> Iterator[Any]:
-    """A bar with ``update(amount)`` for work that is always announced, on stderr.
+    """A bar with ``update(amount)`` for work that is always announced on stderr.
 
-    On a terminal it is a bar, if tqdm is installed; else one line for each update.
+    Without a terminal or tqdm it prints one line for each update.
     """
     if sys.stderr is None:  # a program without a console
         yield _NoBar()
@@ -64,13 +62,13 @@ def announced_bar(total: float, desc: str) -> Iterator[Any]:
 
 
 class _Lines:
-    """A bar as lines, for output that goes to a file."""
+    """A progress bar in lines."""
 
     def __init__(self, total: float) -> None:
         self.total, self.done = total, 0.0
 
     def update(self, amount: float) -> None:
-        """A line more."""
+        """Print a line."""
         self.done += amount
         part = self.done / self.total
         print(f"{'#' * round(40 * part):-<40} {part:.0%}", file=sys.stderr, flush=True)

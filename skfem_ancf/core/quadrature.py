@@ -1,4 +1,4 @@
-"""Gauss rules on the reference cell of a beam, given along the axis and across the section."""
+"""Gauss rules along the axis and across the section of the reference cell."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .caching import array_cache
 from .errors import InputError, require_finite, require_integer, shown
 from .types import Array, Rule
 
-#: Points of the largest rule.
+#: Largest number of points.
 MAX_POINTS = 1000
 
 
 def gauss(n: int) -> Rule:
-    """The n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
+    """n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
     x, w = _gauss(require_integer("the number of Gauss points n", n, 1, MAX_POINTS))
     return x.copy(), w.copy()
 
@@ -30,7 +30,7 @@ def _gauss(n: int) -> Rule:
 
 
 def gauss_lobatto(n: int) -> Array:
-    """The n >= 2 Gauss-Lobatto points on [-1, 1], zeros of (1 - x^2) P_{n-1}': antisymmetric."""
+    """The n >= 2 Gauss-Lobatto points on [-1, 1], exactly antisymmetric."""
     n = require_integer("the number of Gauss-Lobatto points n", n, 2, MAX_POINTS)
     return _lobatto(n).copy()
 
@@ -42,18 +42,10 @@ def _lobatto(n: int) -> Array:
 
 
 def tensor(axis: Rule, section: Rule) -> Rule:
-    """The product of a rule along the axis and one across the section.
+    """Tensor product of rules along the axis and across the section.
 
-    Parameters
-    ----------
-    axis, section
-        Pairs of points and weights on [0, 1].
-
-    Returns
-    -------
-    X, W
-        Points (2, n) and weights (n,), the section running fastest: as scikit-fem's
-        ``Basis(quadrature=(X, W))`` wants them.
+    Returns points (2, n), the section fastest, and weights (n,), as for scikit-fem's
+    ``Basis(quadrature=(X, W))``.
     """
     return product_rule(_rule("axis", axis), _rule("section", section))
 
@@ -67,7 +59,6 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
 
 
 def _rule(name: str, rule: Any) -> Rule:
-    """Points and weights of a rule, as arrays."""
     if not isinstance(rule, (tuple, list)) or len(rule) != 2:
         raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")
     x = require_finite(f"the points of {name}", rule[0], (None,))
@@ -75,7 +66,7 @@ def _rule(name: str, rule: Any) -> Rule:
 
 
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
-    """The Lagrange polynomials of different nodes (n,) at points (m,), shape (m, n)."""
+    """Lagrange polynomials of nodes (n,) at points (m,), shape (m, n)."""
     nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
     return _lagrange(nodes, x).copy()
 

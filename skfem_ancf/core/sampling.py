@@ -1,4 +1,4 @@
-"""Functions of time at many times."""
+"""Sampling of functions of time."""
 
 from __future__ import annotations
 
@@ -12,27 +12,16 @@ from numpy.typing import ArrayLike
 from .errors import ask_array, require_finite, require_function
 from .types import Array
 
-#: Times up to which a function is asked one by one.
+#: Up to this number of times a function is called one by one.
 FEW = 8
 
 
 def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "function",
            shape: tuple[int, ...] | None = None) -> Array:
-    """A function of one time at each of several times, shape (n,) + that of its value.
+    """Evaluate a function of time at times (n,), shape (n,) + shape of its value.
 
-    A function that takes arrays is asked once; it is one if what it returns has the shape, and at
-    the first, the middle and the last time the value that it has for that time alone.
-
-    Parameters
-    ----------
-    function
-        Takes a time, returns a number or an array.
-    times
-        Times, shape (n,).
-    name
-        What messages call the function.
-    shape
-        That of its value; None for any.
+    If the function accepts arrays, it is called once. This is checked at the first, the middle and
+    the last time. ``shape`` is the expected shape of a value, None for any.
 
     Examples
     --------
@@ -51,7 +40,7 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     some = [0, n // 2, n - 1]
     if n <= FEW:
         return alone(times)
-    with suppress(Exception):  # whatever it is, the function is not made for arrays
+    with suppress(Exception):  # the function does not accept arrays
         values = np.asarray(function(times), dtype=float)
         values = values if values.ndim == 1 else np.moveaxis(values, -1, 0)
         few = alone(times[some])

@@ -1,8 +1,8 @@
-"""Functions that run as plain NumPy, and compiled by Numba.
+"""Functions that run in NumPy and compiled by Numba.
 
-A function marked by :func:`source` is plain Python on arrays, and :mod:`skfem_ancf.core.jit`
-compiles it, with all that it calls. What is a loop for a compiler is an array operation for NumPy:
-an index of :func:`indices` is a number in the one and a slice in the other::
+A function marked by :func:`source` is plain Python on arrays; :mod:`skfem_ancf.core.jit` compiles
+it with all that it calls. A loop of compiled code is an array operation in NumPy: an index of
+:func:`indices` is an integer in the former and a slice in the latter::
 
     @source
     def normal_force(EA, strain, N):
@@ -10,14 +10,13 @@ an index of :func:`indices` is a number in the one and a slice in the other::
             for e in indices(strain.shape[1]):
                 N[p, e] = EA * strain[p, e]
 
-Rules of such a function, where ``e`` comes from :func:`indices`:
+Rules for an index ``e`` of :func:`indices`:
 
-* statements on ``[..., e]`` only: no ``if`` on values, sums into ``s[e]`` and not into a number,
-  ``np.sqrt`` and not ``math.sqrt``; ``e`` takes no part in arithmetic, an array of numbers
-  indexed by it does: ``left[e] * nd + k``,
-* they may be nested where the arrays broadcast: ``for s in indices(n): for e in indices(m):``
-  with ``column(c[s]) * x[s, e]``,
-* ``out[at[e]] += x[e]`` needs ``at`` without repetitions.
+* use it in ``[..., e]`` only: no ``if`` on values, sums into ``s[e]`` instead of a scalar,
+  ``np.sqrt`` instead of ``math.sqrt``, no arithmetic with ``e`` (but ``left[e] * nd + k``),
+* loops may be nested if the arrays broadcast: ``for s in indices(n): for e in indices(m):`` with
+  ``column(c[s]) * x[s, e]``,
+* ``out[at[e]] += x[e]`` needs unique ``at``.
 """
 
 from collections.abc import Callable
@@ -25,7 +24,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 
-#: Arrays in the fields of named tuples: of floats or integers, with so many axes, contiguous.
+#: Annotations of contiguous arrays of floats or integers by the number of axes.
 F1: TypeAlias = Annotated[np.ndarray, "f1"]
 F2: TypeAlias = Annotated[np.ndarray, "f2"]
 F3: TypeAlias = Annotated[np.ndarray, "f3"]
@@ -35,24 +34,18 @@ I3: TypeAlias = Annotated[np.ndarray, "i3"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-#: Marked functions, and the module of the loops that are compiled in their place, or None.
+#: Marked functions, with the module of the loops that replace them in compiled code, or None.
 MARKED: dict[Any, str | None] = {}
 
 
 def source(function: _Function) -> _Function:
-    """Mark a function that is compiled as it is; it stays what it is."""
+    """Mark a function for compilation."""
     MARKED[function] = None
     return function
 
 
 def primitive(module: str) -> Callable[[_Function], _Function]:
-    """Mark a function that NumPy has, in place of which loops of its name are compiled.
-
-    Parameters
-    ----------
-    module
-        Where these are.
-    """
+    """Mark a NumPy function that is replaced by one of its name in ``module`` in compiled code."""
     def mark(function: _Function) -> _Function:
         MARKED[function] = module
         return function
@@ -62,7 +55,7 @@ def primitive(module: str) -> Callable[[_Function], _Function]:
 
 @primitive("skfem_ancf.core.loops")
 def indices(*ends):
-    """Indices from ``ends`` as of ``range``: all at once, as one slice; compiled, one by one.
+    """Indices as of ``range(*ends)``: one slice in NumPy, integers in compiled code.
 
     Examples
     --------
@@ -79,11 +72,11 @@ def indices(*ends):
 
 @primitive("skfem_ancf.core.loops")
 def column(x):
-    """A number for each row, beside the elements: ``x[:, None]``; compiled, the number."""
+    """``x[:, None]`` in NumPy, x in compiled code."""
     return x[:, None]
 
 
 @source
 def shaped(x, shape):
-    """A contiguous array in another shape, as a view."""
+    """A reshaped view of a contiguous array."""
     return x.reshape(shape)

@@ -1,4 +1,4 @@
-"""Named steps of a quasi-static run, and functions of its time."""
+"""Named steps of a quasi-static run."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .types import Array
 
 
 class Ramp(Immutable):
-    """A function of time, linear from one time to the next, constant before and behind.
+    """A piecewise linear function of time, constant outside of its times.
 
     Parameters
     ----------
     times
-        Ascending times, shape (n,).
+        Increasing times, shape (n,).
     values
         Numbers, shape (n,), or vectors, (n, k).
 
@@ -38,7 +38,7 @@ class Ramp(Immutable):
                              f"got values of shape {self.values.shape}")
 
     def __call__(self, t: Any) -> Any:
-        """The value at a time: a number, or (k,); of times (n,) shape (n,) or (k, n)."""
+        """The value at a time: a number, or (k,); for times (n,) shape (n,) or (k, n)."""
         if self.values.ndim == 1:
             found = np.interp(t, self.times, self.values)
             return found if np.ndim(t) else float(found)
@@ -46,22 +46,22 @@ class Ramp(Immutable):
 
 
 class Steps(Immutable):
-    """Steps of a quasi-static run, one after the other: their names and durations.
+    """Consecutive steps of a quasi-static run, with names and durations.
 
-    What acts in a scene takes functions of time: ``amplitude`` of loads and temperatures,
-    ``position`` and ``angle`` of obstacles, displacements of supports, angles of motors.
-    :meth:`ramp` makes them of the values at the ends of steps.
+    :meth:`ramp` makes functions of time from values at the ends of steps, for the ``amplitude`` of
+    loads and temperatures, ``position`` and ``angle`` of obstacles, displacements of supports and
+    angles of motors.
 
     Parameters
     ----------
     **durations
-        The duration of each step by its name, positive.
+        Positive duration of each step by name.
 
     Attributes
     ----------
     names : tuple of str
     ends : ndarray
-        The time at the end of each step, shape (n,).
+        Final time of each step, shape (n,).
 
     Examples
     --------
@@ -87,20 +87,19 @@ class Steps(Immutable):
             self.names, np.diff(self.ends, prepend=0.0))) + ")"
 
     def ramp(self, start: ArrayLike | None = None, /, **values: ArrayLike) -> Ramp:
-        """A function of time by its values at the ends of steps, linear within each.
+        """A function of time from values at the ends of steps, linear within each step.
 
         Parameters
         ----------
         start
-            The value at the time 0: a number or a vector, shape (k,); zero by default.
+            The value at time 0: a number or a vector, shape (k,); zero by default.
         **values
-            Values at the ends of steps by their names; in a step that is not named it stays what
-            it was.
+            Values at the ends of steps by name; in steps without a value it is constant.
 
         Raises
         ------
         NameUnknown
-            If there is no such step.
+            If a step is unknown.
         """
         for name in values:
             if name not in self.names:
@@ -113,5 +112,5 @@ class Steps(Immutable):
         return Ramp(np.append(0.0, self.ends), np.array(rows))
 
     def step_at(self, t: Array) -> Array:
-        """Numbers of the steps at times, shape (n,); at the end of a step its own."""
+        """Numbers of the steps at times, shape (n,); the end belongs to the step."""
         return np.minimum(np.searchsorted(self.ends, t - 1e-12 * self.ends[-1]), len(self) - 1)

@@ -12,19 +12,13 @@ from importlib.util import find_spec
 
 from .errors import InputError
 
-#: Environment variable: "0" leaves Numba out, as if it were not installed; "1" compiles at once;
-#: "auto", the default, for tasks that are large enough.
+#: Environment variable: "0" disables Numba, "1" compiles at once, "auto" (default) compiles for
+#: large tasks.
 VARIABLE = "SKFEM_ANCF_COMPILED"
 
 
 def wanted() -> str:
-    """What the environment variable ``SKFEM_ANCF_COMPILED`` says: "0", "1" or "auto".
-
-    Raises
-    ------
-    InputError
-        If it says anything else.
-    """
+    """The environment variable ``SKFEM_ANCF_COMPILED``: "0", "1" or "auto"; else InputError."""
     value = os.environ.get(VARIABLE, "auto")
     if value not in ("0", "1", "auto"):
         raise InputError(f"the environment variable {VARIABLE} must be 0 (without Numba), 1 "
@@ -37,14 +31,9 @@ _EXPECTED: ContextVar[float] = ContextVar("expected", default=1.0)
 
 @contextmanager
 def expecting(number: float) -> Iterator[None]:
-    """A task that repeats what is in it: the size by which it is decided whether to compile.
+    """Declare that the block repeats its content; nested numbers multiply.
 
-    Tasks within tasks multiply: members of a sweep, steps of a motion, iterations of a step.
-
-    Parameters
-    ----------
-    number
-        How often, about, at least once.
+    The product of members of a sweep, steps and iterations decides whether compiling pays.
 
     Examples
     --------
@@ -61,28 +50,12 @@ def expecting(number: float) -> Iterator[None]:
 
 
 def expected() -> float:
-    """How many iterations are expected of the task that is being done, about."""
+    """Expected number of iterations of the current task."""
     return _EXPECTED.get()
 
 
 def compiled_off() -> str | None:
-    """Why nothing is compiled by Numba, or None where it may be.
-
-    Raises
-    ------
-    InputError
-        If the environment variable ``SKFEM_ANCF_COMPILED`` is neither 0, 1 nor auto.
-
-    Examples
-    --------
-    >>> import os
-    >>> from skfem_ancf.core.switch import compiled_off
-    >>> before = os.environ.get("SKFEM_ANCF_COMPILED", "auto")
-    >>> os.environ["SKFEM_ANCF_COMPILED"] = "0"
-    >>> compiled_off()
-    'SKFEM_ANCF_COMPILED=0'
-    >>> os.environ["SKFEM_ANCF_COMPILED"] = before
-    """
+    """Why Numba is not used, or None; InputError for an invalid environment variable."""
     if wanted() == "0":
         return f"{VARIABLE}=0"
     if "NUMBA_DISABLE_JIT" in os.environ and os.environ["NUMBA_DISABLE_JIT"] not in ("", "0"):
@@ -91,7 +64,7 @@ def compiled_off() -> str | None:
 
 
 def _installed() -> bool:
-    """True if Numba is there: asked without importing it, which takes longer than a solution."""
+    """True if Numba is installed, without importing it, which is slow."""
     if "numba" in sys.modules:
         return sys.modules["numba"] is not None
     return _found()

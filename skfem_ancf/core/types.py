@@ -1,4 +1,4 @@
-"""Names of types for annotations: what arguments are, and what comes back."""
+"""Types for annotations."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike, NDArray
 
-#: An array of numbers; its shape is said where it is used.
+#: An array of numbers.
 Array: TypeAlias = NDArray[Any]
 
-#: What :func:`skfem_ancf.mesh.places.facets_of` takes.
+#: An argument of :func:`skfem_ancf.mesh.places.facets_of`.
 Place: TypeAlias = "str | ArrayLike | Callable[[Array], Array]"
 
-#: What a force is multiplied by: a function of time, or None.
+#: The amplitude of a force: a function of time, or None.
 TimeFunction: TypeAlias = "Callable[[float], float] | None"
 
 #: The name of a file.
@@ -25,7 +25,7 @@ Rule: TypeAlias = tuple[Array, Array]
 
 
 class Law(Protocol):
-    """What a formulation integrates: functions of the strain (3, ...)."""
+    """A constitutive law: functions of the strain (3, ...)."""
 
     def energy(self, strain: Array) -> Array:
         """Energy per volume, shape (...)."""
@@ -38,14 +38,14 @@ class Law(Protocol):
 
 
 class HasShear(Protocol):
-    """What a shear factor depends on: whether sections of an element carry the shear parabola."""
+    """An element, for the shear factor."""
 
     @property
     def carries_shear_parabola(self) -> bool: ...
 
 
 class Isotropic(Protocol):
-    """What the choice of an element reads of a material: its elastic constants."""
+    """Elastic constants, for the choice of an element."""
 
     @property
     def E(self) -> float: ...

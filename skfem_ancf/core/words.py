@@ -1,6 +1,6 @@
-"""The numbers of a named tuple as words of one array, which compiled code is given the place of.
+"""Named tuples as flat arrays of 64-bit words, which compiled code receives by address.
 
-Of a number the word is the number, of an array its address and shape, of a tuple its words.
+A number is one word; an array is its address and shape; a tuple is the words of its fields.
 """
 
 from __future__ import annotations
@@ -12,17 +12,9 @@ import numpy as np
 
 
 class Words:
-    """The words of a named tuple; it and they live as long as this.
+    """The words of a named tuple, which live as long as this object.
 
-    Parameters
-    ----------
-    x
-        Its fields are contiguous arrays of floats or integers, numbers, or such tuples.
-
-    Attributes
-    ----------
-    of, words, address
-        x, an array, and its place.
+    Fields are contiguous arrays of floats or integers, numbers, or named tuples.
     """
 
     def __init__(self, x: tuple[Any, ...]) -> None:
@@ -34,7 +26,7 @@ class Words:
 
 @cache
 def hints(kind: Any) -> tuple[Any, ...]:
-    """What the fields of a class of named tuples are."""
+    """Types of the fields of a named tuple."""
     return tuple(get_type_hints(kind, include_extras=True).values())
 
 

@@ -1,4 +1,4 @@
-"""Time integration. A new scheme is one file and one line here."""
+"""Time integration schemes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every time integrator shares: the motion at an instant, and what a scheme is."""
+"""The state of a motion at an instant, and the base class of schemes."""
 
 from __future__ import annotations
 
@@ -11,38 +11,37 @@ from ..core.errors import CheckpointError
 from ..core.types import Array
 from ..equations.system import System
 
-#: Part of a step up to which an acceleration is interpolated, where it is a difference.
+#: Fraction of a step below which accelerations are interpolated.
 NEAR = 0.1
 
 
 @dataclass
 class Motion:
-    """A motion at one instant.
+    """The state of a motion at one instant.
 
     Attributes
     ----------
     t
         Time.
-    u, v
-        Displacement and velocity of the degrees of freedom, shape (N,).
-    acceleration
-        The acceleration of the equation of motion, shape (N,).
+    u, v, acceleration
+        Displacement, velocity and acceleration of the degrees of freedom, shape (N,).
     algorithmic
-        The scheme's own acceleration, where it has one, shape (N,).
+        The acceleration-like variable w of the scheme, shape (N,).
     multipliers
-        Of the joints, shape (m,).
+        Lagrange multipliers of the joints at t, shape (m,).
     force
-        The multipliers where the last step took them, if that is not at its end, shape (m,).
+        Multipliers where the last step evaluates them, which may be within the step, shape (m,).
     before
-        Size of the step before; 0 where there is none.
+        Size of the previous step; 0 at the start.
     dissipated
-        The work of damping so far.
+        Work of damping since the start.
     contacts
-        What points remember of obstacles, shape (k,); None if there are none.
+        History variables of contact, shape (k,); None without contact.
     turns
-        Angles with whole turns, as of :class:`~skfem_ancf.actions.forces.turns.Turns`, shape (k,).
+        Angles including whole turns, shape (k,), see
+        :class:`~skfem_ancf.actions.forces.turns.Turns`.
     memory
-        What else the scheme keeps for its next step: None, or a dict of numbers and arrays.
+        Further data of the scheme for its next step: None, or a dict of numbers and arrays.
     """
 
     t: float
@@ -60,7 +59,7 @@ class Motion:
 
 
 def interpolate(a: Motion, b: Motion, t: float) -> Motion:
-    """The motion at t between two instants: cubic in the displacement, linear in accelerations."""
+    """Interpolate between two instants: cubic Hermite in u, linear in the accelerations."""
     h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
     du = b.u - a.u
     u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
@@ -74,7 +73,7 @@ def interpolate(a: Motion, b: Motion, t: float) -> Motion:
 
 
 def stored(arrays: dict[str, Any], name: str, like: Any) -> Any:
-    """An array of a checkpoint."""
+    """Get an array of a checkpoint; raises CheckpointError if its shape or kind is wrong."""
     found, like = np.asarray(arrays.get(name)), np.asarray(like)
     if found.shape != like.shape or found.dtype.kind != like.dtype.kind:
         raise CheckpointError(f"{name!r} should have the shape {like.shape} and the kind "
@@ -83,33 +82,32 @@ def stored(arrays: dict[str, Any], name: str, like: Any) -> Any:
 
 
 class Scheme:
-    """A time integrator: a member of the family of :mod:`skfem_ancf.dynamics.steps`, by numbers.
+    """A time integration scheme, given by the parameters of generalised-alpha.
 
-    A custom scheme is a subclass with other numbers, or one that overrides :meth:`step`.
+    A custom scheme is a subclass with other parameters, or one that overrides :meth:`step`.
 
     Attributes
     ----------
     order : int
         Order of convergence of displacements and velocities.
     parameters : tuple of float
-        alpha_m, alpha_f, beta, gamma; by default those of the trapezoidal rule.
+        alpha_m, alpha_f, beta, gamma. The default is the trapezoidal rule.
     conserving : bool
-        Forces are means over the step that conserve energy, and the scheme's acceleration is that
-        of its middle.
+        Forces are the energy-conserving means over a step, and the equation of motion holds in its
+        middle.
     tol : float
         Default tolerance of the iteration in a step, relative, in the energy norm.
     joined : bool
-        It is for scenes with joints and rigid bodies too.
+        The scheme works with joints and rigid bodies.
     adaptive : bool
-        It estimates its error, which chooses steps with ``dt="auto"``.
+        The scheme estimates its error; ``dt="auto"`` needs it.
     error_constant : float
-        The error that a step adds to the displacement is about this number times dt^(order + 1)
-        times the derivative of it of that order: for order 2, times dt^2 times the change of the
-        acceleration.
+        C in the local error of the displacement, C dt^(p + 1) d^(p + 1)u/dt^(p + 1), with the
+        order p.
     filtered : int
         How often :meth:`resolved` is applied to the estimated error.
     safety : float
-        Factor of the estimated error, as measured: ``benchmarks/tolerances.py``.
+        Factor of the estimated error, calibrated by ``benchmarks/tolerances.py``.
     """
 
     name = ""
@@ -123,25 +121,27 @@ class Scheme:
     safety = 1.0
 
     def step(self, integrator: Any, y: Motion, dt: float) -> Motion:
-        """Where the motion is one step later.
+        """Advance the motion by one step.
 
-        A scheme that overrides it is asked for each step, others are taken in blocks. What it
-        keeps for its next step goes to the ``memory`` of what it returns. A StepFailed is answered
-        by two steps of half the size.
+        Schemes that override this method take single steps; others are integrated in blocks. Data
+        for the next step belong in the ``memory`` of the result. If the method raises StepFailed,
+        two steps of half the size are tried.
 
         Parameters
         ----------
-        integrator, y, dt
-            An :class:`~skfem_ancf.dynamics.integrator.Integrator`, which can ``take`` a step by
-            :attr:`parameters`; where the step begins, and its size.
+        integrator
+            An :class:`~skfem_ancf.dynamics.integrator.Integrator`; ``integrator.take(y, dt)`` takes
+            a step with :attr:`parameters`.
+        y, dt
+            Start of the step, and its size.
         """
         return integrator.take(y, dt)
 
     def require(self, system: System) -> None:
-        """Raise InputError for a system that the scheme is not for."""
+        """Raise InputError if the scheme cannot integrate the system."""
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
-        """Estimate of the error that a step adds to the displacement, shape (N,).
+        """Estimate the error that a step adds to the displacement, shape (N,).
 
         Parameters
         ----------
@@ -151,43 +151,43 @@ class Scheme:
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
 
     def near(self, system: System) -> float:
-        """Part of a step up to which the acceleration is interpolated within it.
+        """Fraction of a step below which accelerations within it are interpolated.
 
-        A shorter step to there has it by a difference that is all round-off.
+        In shorter steps a finite difference would consist of round-off.
         """
         return NEAR
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:
-        """The mean of what is left of a change of the displacement while it is damped.
+        """Average a displacement increment over the time in which damping reduces it, shape (N,).
 
         Parameters
         ----------
         integrator, du, time
-            Who took the last step, the change, shape (N,), and for how long it is damped.
+            The integrator of the last step, the increment, shape (N,), and the time span.
         """
         return du
 
     def resolved(self, integrator: Any, du: Array) -> Array:
-        """What of a change of the displacement a step resolves, by its matrix as a filter.
+        """Filter from a displacement increment what a step does not resolve, shape (N,).
 
         Parameters
         ----------
         integrator, du
-            Who took the last step, and the change, shape (N,).
+            The integrator of the last step, and the increment, shape (N,).
         """
         return integrator.filtered(du)
 
 
 def in_blocks(scheme: Scheme) -> bool:
-    """True of a scheme that does not take its steps itself: many are taken at once."""
+    """True if the scheme does not override ``step``: many steps are taken in one call."""
     return type(scheme).step is Scheme.step
 
 
 def in_steps(scheme: Scheme) -> bool:
-    """True of a scheme whose steps are those of :mod:`skfem_ancf.dynamics.steps`."""
+    """True if the scheme is integrated by :mod:`skfem_ancf.dynamics.steps`."""
     return in_blocks(scheme) and not scheme.collocates
 
 
 def same_scheme(a: Scheme, b: Scheme) -> bool:
-    """True of schemes of one class with the same numbers."""
+    """True if two schemes have the same class and parameters."""
     return type(a) is type(b) and repr(sorted(vars(a).items())) == repr(sorted(vars(b).items()))

@@ -1,4 +1,4 @@
-"""Files from which a motion goes on: arrays by name, how they are written and checked."""
+"""Checkpoints: files from which a time integration continues."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from .run import Run, task_of
 from .sensors import Sensor
 
 FORMAT = "skfem-ancf checkpoint 10"
-#: Times of a motion at which functions of time are compared.
+#: Number of times at which functions of time are compared.
 TIMES = 33
-#: Points of the surface, about, at which distances of obstacles are.
+#: Approximate number of surface points at which distances to obstacles are compared.
 PLACES = 32
-#: Seconds between two files by default, and the part of the time that writing may take.
+#: Default seconds between two checkpoints, and the fraction of time that writing may take.
 SECONDS, SHARE = 60.0, 0.05
 
 
@@ -35,15 +35,14 @@ SECONDS, SHARE = 60.0, 0.05
 
 
 def description(system: System, t_start: float, t_end: float) -> dict[str, Array]:
-    """What a scene is, arrays (...) by the names of its parts.
+    """Characteristic arrays of a scene by part, to recognise a different scene.
 
-    Forces of each part at a displacement and a velocity that are as good as random, and functions
-    of time at a few times: that tells most scenes that differ.
+    They are forces at a pseudo-random displacement and velocity, and samples of functions of time.
     """
     times, rng = np.linspace(t_start, t_end, TIMES), np.random.default_rng(0)
     u, v = 1e-3 * rng.standard_normal((2, system.N)) * np.concatenate(
         [member.sizes for member in system.members])
-    with system.forces.unheld():
+    with system.forces.without_samples():
         force, inertia = system.internal_force(u, t_start), system.mass.multiply(u)
         damping = system.damping_force(u, v, t_start) if system.damped else np.zeros(1)
     found = {"supports": np.append(system.constraints.fixed, system.constraints.values_at(times)),
@@ -60,7 +59,7 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
     for k, joint in enumerate(system.constraints.all_joints):
         moments = times if joint.moving else times[:1]
         found[f"joint {k}"] = np.array([joint.value(u, t) for t in moments])
-    with system.forces.unheld():
+    with system.forces.without_samples():
         for k, element in enumerate(system.forces.elements):
             found[f"force element {k}"] = np.concatenate(
                 [np.ravel(x) for x in _of_element(system, element, u, v, times)])
@@ -79,24 +78,24 @@ def _kind(system, member):
 
 
 def _of_element(system, element, u, v, times):
-    """Numbers of a force element."""
+    """Characteristic arrays of a force element."""
     alone = Forces([element], system.N, system.bandwidth)
     tables = alone.tables(lambda i, j: i, False, 0)
     yield from (tables.numbers, tables.start, tables.of, tables.weight)
     yield from (alone.stiffness(tables, 0.0, u, v, c) for c in (0.0, 1.0))
-    for own in alone.own:
-        x = np.array([one.start for one in own.links])
+    for custom in alone.custom:
+        x = np.array([one.start for one in custom.links])
         moved = 1e-3 * np.linalg.norm(x, axis=-1, keepdims=True) * np.random.default_rng(
             0).standard_normal(x.shape)
-        yield own.force(x + moved, moved, times[0])
-        yield from (own.force(x, 0.0 * x, t) for t in times)
+        yield custom.force(x + moved, moved, times[0])
+        yield from (custom.force(x, 0.0 * x, t) for t in times)
     yield from (x for mass in alone.masses for x in mass.mass_entries())
     if element.groups:
         yield from alone.contacts.tables[1:3]
 
 
 def differences(now: dict[str, Array], then: dict[str, Array]) -> list[str]:
-    """Names of the parts by which two scenes differ, arrays (...) of :func:`description`."""
+    """Names of the parts in which two results of :func:`description` differ."""
     def same(x, y):
         return y is not None and x.shape == y.shape and y.dtype.kind in "biuf" and np.allclose(
             x, y, rtol=0, atol=1e-12 * np.abs(x).max(initial=0.0), equal_nan=True)
@@ -106,7 +105,7 @@ def differences(now: dict[str, Array], then: dict[str, Array]) -> list[str]:
 
 
 def same_problem(system: System, start: State, t: float) -> bool:
-    """True if a State's accelerations and multipliers are those of the system at a time."""
+    """True if accelerations and multipliers of a State are valid for a system at time t."""
     other, u = start.system, start.u
     if other is system and t == start.t:
         return True
@@ -122,23 +121,23 @@ def same_problem(system: System, start: State, t: float) -> bool:
 
 
 def _scheme_text(scheme):
-    """The class and the numbers of a scheme."""
+    """The class and parameters of a scheme as JSON."""
     return json.dumps([scheme.name or type(scheme).__name__, vars(scheme)], default=repr)
 
 
 def _scheme_of(text, given):
-    """The scheme of a file: one of the package, or what the caller gives."""
+    """The scheme of a file: one of the package, or the one that the caller passes."""
     from . import SCHEMES, get_scheme
 
     name, values = json.loads(text)
-    if given is not None and given != "auto":  # what that was is in the file
+    if given is not None and given != "auto":  # the file has the scheme that "auto" chose
         scheme = get_scheme(given)
         if _scheme_text(scheme) != text:
-            raise CheckpointError(f"the file is of a run by {name!r} of {values}, not by "
+            raise CheckpointError(f"the file is from a run with {name!r} and {values}, not with "
                                   f"{scheme!r}")
         return scheme
     if name not in SCHEMES:
-        raise CheckpointError(f"the run was made by a custom scheme, {name!r}: give it, "
+        raise CheckpointError(f"the run used a custom scheme, {name!r}: pass it, "
                               "resume(path, scheme=...)")
     scheme = SCHEMES[name].__new__(SCHEMES[name])
     for attribute, value in values.items():
@@ -158,26 +157,26 @@ def _checksum(arrays):
 
 
 def read(name: StrPath) -> dict[str, Array]:
-    """The arrays of a checkpoint by name; raises CheckpointError."""
+    """Read the arrays of a checkpoint by name; raises CheckpointError."""
     path = _path(name)
     if not path.exists():
         raise CheckpointError(f"there is no file {str(path)!r}")
     try:
         arrays = archive.read(path)
     except (OSError, archive.Unreadable) as error:
-        raise CheckpointError(f"{str(path)!r} cannot be read, it is no checkpoint or damaged: "
+        raise CheckpointError(f"{str(path)!r} cannot be read, it is not a checkpoint or damaged: "
                               f"{error}") from None
     written = arrays.pop("format", None)
     if written is None or written.shape or written.dtype.kind != "S":
         raise CheckpointError(
-            f"{str(path)!r} is a checkpoint of an earlier version: that version goes on with it"
-            if "text" in arrays else f"{str(path)!r} is no checkpoint of a motion")
+            f"{str(path)!r} is a checkpoint of an earlier version, which can resume it"
+            if "text" in arrays else f"{str(path)!r} is not a checkpoint of a motion")
     if written.item().decode(errors="replace") != FORMAT:
         raise CheckpointError(f"{str(path)!r} has the format {shown(written.item().decode())}, "
                               f"this version reads {FORMAT!r}")
     checksum = arrays.pop("checksum", None)
     if checksum is None or not np.array_equal(checksum, _checksum(arrays)):
-        raise CheckpointError(f"{str(path)!r} is damaged: its checksum is not that of its content")
+        raise CheckpointError(f"{str(path)!r} is damaged: its checksum does not match its content")
     return arrays
 
 
@@ -191,7 +190,7 @@ def _path(path):
 
 
 def _under(arrays, folder):
-    """Arrays whose names begin with that of a folder, without it."""
+    """The arrays whose names begin with a prefix, without it."""
     return {name[len(folder):]: x for name, x in arrays.items() if name.startswith(folder)}
 
 
@@ -200,7 +199,7 @@ def _named(folder, arrays):
 
 
 class Checkpoint:
-    """Writes a Run to a file now and then."""
+    """Writes a Run to a file at intervals."""
 
     def __init__(self, path: StrPath, every: int | None, run: Run) -> None:
         self.path, self.run = _path(path), run
@@ -213,7 +212,7 @@ class Checkpoint:
             "every": np.array(self.every or 0), "scheme": np.bytes_(_scheme_text(scheme).encode())}
 
     def begin(self) -> None:
-        """Write the start, so that what is wrong is said before the run."""
+        """Write the start, so that problems show before the run."""
         if self.path.exists():
             self._spare()
         if not self.path.parent.is_dir():
@@ -226,7 +225,7 @@ class Checkpoint:
                                   f"{error}") from None
 
     def _spare(self):
-        """Raise CheckpointError if the file that is there is worth keeping."""
+        """Raise CheckpointError if the existing file must not be overwritten."""
         try:
             arrays = read(self.path)
         except CheckpointError as error:
@@ -234,8 +233,8 @@ class Checkpoint:
         if not arrays["done"]:
             raise CheckpointError(
                 f"{str(self.path)!r} holds a run up to t = {arrays['now.t']:.6g} of "
-                f"{arrays['task.t_end']:.6g}: scene.resume({str(self.path)!r}) goes on with it; "
-                "delete the file to begin again")
+                f"{arrays['task.t_end']:.6g}: scene.resume({str(self.path)!r}) continues it; "
+                "delete the file to start again")
 
     def _write(self):
         run, now = self.run, dict(vars(self.run.y))
@@ -248,7 +247,7 @@ class Checkpoint:
         self._steps, self._clock = run.steps, time.monotonic()
 
     def update(self) -> None:
-        """Write if it is time to, or the end; warns with CheckpointWarning where it fails."""
+        """Write if it is due, or at the end; a failure gives a CheckpointWarning."""
         run, begun = self.run, time.monotonic()
         if self.every is not None:
             due = run.steps - self._steps >= self.every
@@ -261,13 +260,13 @@ class Checkpoint:
         except OSError as error:
             self._steps, self._clock = run.steps, time.monotonic()
             warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
-                 f"{run.y.t:.6g}, the last good one stays: {error}", CheckpointWarning)
+                 f"{run.y.t:.6g}, the previous one remains: {error}", CheckpointWarning)
         self._took = time.monotonic() - begun
 
 
 def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
            sensors: Sequence[tuple[str, Sensor]] = ()) -> tuple[Run, Checkpoint]:
-    """The Run of a checkpoint, and the Checkpoint that goes on writing it."""
+    """The Run of a checkpoint file, and the Checkpoint that continues to write it."""
     arrays = read(path)
     try:
         said = {"dt": "auto", "tol": None, "t_eval": None, **_under(arrays, "task.")}
@@ -276,7 +275,7 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
         other = differences(description(system, task.t_start, task.t_end),
                             _under(arrays, "scene."))
         if other:
-            raise CheckpointError("it is of another scene, it differs in: " + ", ".join(other))
+            raise CheckpointError("it is from another scene, which differs in: " + ", ".join(other))
         made = _scheme_of(arrays["scheme"].item().decode(), scheme)
         run = Run(system, made, task, sensors)
         run.recorder.load(_under(arrays, "sensor."))
@@ -288,6 +287,6 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
         run.load(y, _under(arrays, "run."), columns)
     except (InputError, CheckpointError, KeyError, ValueError, TypeError) as error:
         text = str(error) if isinstance(error, CheckpointError) else repr(error)
-        raise CheckpointError(f"{str(path)!r} cannot be gone on with: {text}") from None
+        raise CheckpointError(f"{str(path)!r} cannot be resumed: {text}") from None
     every = int(arrays["every"])
     return run, Checkpoint(path, every or None, run)

@@ -1,4 +1,4 @@
-"""Which scheme a motion takes by ``scheme="auto"``."""
+"""The choice of a scheme by ``scheme="auto"``."""
 
 from __future__ import annotations
 
@@ -13,34 +13,35 @@ from .gauss import Gauss
 from .generalized_alpha import GeneralizedAlpha
 from .radau import Radau
 
-#: Tolerance up to which steps of high order are the cheaper ones.
+#: Tolerance below which schemes of high order are cheaper.
 FINE = 1e-4
-#: Ratio of the fastest vibration to the slowest beyond which a beam is stiff.
+#: Ratio of axial to bending frequencies above which a beam is stiff.
 STIFF = 1e3
-#: The tolerance of motions where none is asked for.
+#: Default tolerance.
 RTOL = 1e-5
 
 
 class Choice(NamedTuple):
-    """A scheme, and why."""
+    """A scheme, and the reason for it."""
 
     scheme: Scheme
     reason: str
 
 
 def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
-    """The scheme for a scene.
+    """Choose the scheme for a system.
 
-    Obstacles take the scheme that conserves energy with them; so do coarse tolerances of scenes
-    that lose nothing, others generalised-alpha. Finer ones take collocation: Radau, which damps
-    what steps do not resolve, where there are joints, damping or stiff beams, and Gauss else.
+    * obstacles, frames: ``energy-momentum``,
+    * ``rtol`` above 1e-4: ``energy-momentum`` without damping, else ``generalized-alpha``,
+    * joints, damping or stiff beams: ``radau``, which damps what steps do not resolve,
+    * all others: ``gauss`` with three points.
 
     Parameters
     ----------
     system
         A :class:`~skfem_ancf.equations.system.System`.
     rtol
-        The tolerance asked for, relative to the size of the scene.
+        Tolerance, relative to the size of the scene.
 
     Examples
     --------
@@ -74,15 +75,10 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
 
 
 def stiffness_ratio(system: System) -> float:
-    """The frequency of the fastest vibration over that of bending, about, of the stiffest beam.
+    """Largest ratio of the highest axial frequency to the lowest bending frequency of a beam.
 
-    A wave along an element of the length L / n takes ``L / (n c)``, bending has the frequency
-    ``pi^2 c h / (sqrt(12) L^2)``: the ratio is ``0.7 n L / h``, whatever the material is.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
+    A wave crosses an element of length L / n in ``L / (n c)``, bending has the frequency
+    ``pi^2 c h / (sqrt(12) L^2)``: the ratio is about ``0.7 n L / h``.
     """
     return max((0.7 * b.mesh.nelements * float(np.sum(b.mesh.lengths)) / b.mesh.height
                 for b in system.beams), default=1.0)

@@ -14,21 +14,16 @@ from .base import Motion, Scheme
 from .differences import derivative, difference_row, grown
 from .stage_records import Method
 
-#: Part of a step up to which accelerations are interpolated where something is driven.
+#: Fraction of a step below which accelerations are interpolated, with prescribed motions.
 NEAR = 3e-3
 
 
 class _Tableau:
-    """The numbers of a method of collocation.
+    """Coefficients of a collocation method.
 
-    Attributes
-    ----------
-    method
-        Its :class:`~skfem_ancf.dynamics.stages.Method`.
-    bends
-        Of the acceleration, times the square of the step: its highest derivative and the one below,
-        from Z and from the acceleration at the end, or at the begin if the last point is the end,
-        shape (2, n + 1).
+    ``bends`` (2, n + 1) are the weights of dt^2 times the highest derivative of the acceleration
+    and the one below. They apply to Z and to the acceleration at the end of the step (at the start
+    if the last point is the end).
     """
 
     def __init__(self, points: Array) -> None:
@@ -41,7 +36,7 @@ class _Tableau:
         picked = np.nonzero(values.imag > -1e-12 * abs(values))[0]
         values = np.where(abs(values.imag) > 1e-12 * abs(values), values, values.real)[picked]
         to, back = np.linalg.inv(T)[picked], T[:, picked] * np.where(values.imag > 0.0, 2.0, 1.0)
-        self._fit = np.linalg.inv(c[:, None]**(k + 1))  # a polynomial without its first two terms
+        self._fit = np.linalg.inv(c[:, None]**(k + 1))  # monomials of degree 2 and above
         one = np.append(c, 1.0) if c[-1] < 1.0 else np.append(0.0, c)
         bends = np.array([difference_row(one), np.append(0.0, difference_row(one[1:]))])
         bends = bends if c[-1] < 1.0 else np.roll(bends, -1, axis=1)
@@ -50,7 +45,7 @@ class _Tableau:
         self.method = Method._make([c, weights, first, first @ first, *parts, self.ahead(1.0)])
 
     def ahead(self, ratio: float) -> Array:
-        """``ahead`` of the Method from a step of which the next is so many times as long."""
+        """``Method.ahead`` for a step whose size changes by this ratio."""
         powers = np.arange(2, len(self.points) + 2)
         return np.ascontiguousarray((1.0 + ratio * self.points[:, None])**powers @ self._fit)
 
@@ -61,21 +56,19 @@ def _tableau(points):
 
 
 class Collocation(Scheme):
-    """The equation of motion holds at points of the step, of a polynomial.
+    """Collocation: the equation of motion holds at n points of each step.
 
-    With ``A = (a_ij)`` the integrals from 0 to c_i of the Lagrange polynomials of the points, and b
-    those to 1,
+    With ``a_ij`` the integral of the Lagrange polynomial j from 0 to c_i, and b_j that from 0 to 1,
 
     * ``M W_i = Q(U_i, t_i) - f(U_i) - d(U_i, V_i)`` at the times ``t_i = t_0 + c_i h``,
     * ``V = v_0 + h A W`` and ``U = u_0 + h A V``,
     * ``v_1 = v_0 + h b W`` and ``u_1 = u_0 + h b V``.
 
     The unknowns are ``Z = U - u_0 - h c v_0``: ``W = A^-2 Z / h^2``, ``V = v_0 + A^-1 Z / h``.
-    With ``A^-1 = T diag(mu) T^-1`` the iteration matrix falls into ``K + mu D / h + mu^2 M / h^2``
-    for each eigenvalue, one complex band for each pair; its factors are kept as long as the
-    iteration contracts. It begins with the polynomial of the step before. Joints hold as rates at
-    the points, ``J(U) V = 0``, with multipliers in the equation of motion (index 2), and the end is
-    moved to where they are closed.
+    With ``A^-1 = T diag(mu) T^-1`` the iteration matrix decouples into ``K + mu D / h + mu^2 M /
+    h^2``, one complex band matrix for each pair of eigenvalues; its factors are reused while the
+    iteration contracts. The initial guess is the polynomial of the previous step. Joints enter as
+    ``J(U) V = 0`` at the points (index 2); the end of the step is projected onto the constraints.
 
     A method is a subclass with :attr:`points` and ``order``.
 
@@ -95,7 +88,6 @@ class Collocation(Scheme):
 
     @property
     def table(self) -> _Tableau:
-        """The numbers of the method."""
         return _tableau(tuple(self.points.tolist()))
 
     def __repr__(self):
@@ -104,16 +96,15 @@ class Collocation(Scheme):
     def require(self, system: System) -> None:
         if system.constraints.m and not (self.joined or system.backend.tables.linear_joints):
             raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
-                             "rigid bodies: take 'radau', or 'energy-momentum', which conserves "
+                             "rigid bodies: use 'radau', or 'energy-momentum', which conserves "
                              "energy with them")
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
-        """Estimate of the error that a step adds to the displacement, shape (N,).
+        """Estimate the error that a step adds to the displacement, shape (N,).
 
-        From a derivative of the acceleration of as high an order as the method's: the divided
-        difference over the points of a step and one of its ends, and of those of the steps before.
-        With both ends of a step of Gauss it would vanish for all that is linear, as the residual
-        of collocation is odd or even. At the start the orders that are missing grow as the last.
+        The estimate uses a derivative of the acceleration, by divided differences over the points
+        of the step, one of its ends and previous steps. (Both ends of a Gauss step would give zero
+        for linear problems.) At the start, missing derivatives are extrapolated.
 
         Parameters
         ----------
@@ -132,7 +123,7 @@ class Collocation(Scheme):
         return self.error_constant * grown(dt**(k + n + 2) * high, lower, self.order - 1 - k - n)
 
     def near(self, system: System) -> float:
-        """As of :class:`Scheme`: only rates of what is driven are differences."""
+        """As in :class:`Scheme`; only prescribed motions have rates by differences."""
         return NEAR if system.constraints.moves or system.backend.tables.motion_varies else 0.0
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:

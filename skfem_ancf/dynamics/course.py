@@ -1,8 +1,7 @@
-"""Functions of time: amplitudes of loads, motions of supports and joints, sampled step by step.
+"""Sampling of functions of time: load amplitudes, motions of supports and joints.
 
-Their rates are those of a polynomial through samples within one step. No value from outside of the
-step is used: neither do rates at the end of a motion differ from those of a motion that goes on,
-nor does a kink at the end of a step spoil those of the next.
+Rates are those of a polynomial through samples within one step. Samples outside of the step are
+not used, so that a kink at the end of a step does not spoil the rates of its neighbours.
 """
 
 from __future__ import annotations
@@ -17,44 +16,30 @@ from ..core.sampling import sample
 from ..core.types import Array
 from ..equations.system import System
 
-#: Samples of a step from which rates are made.
+#: Sample points in a step for the rates.
 SAMPLES = np.linspace(0.0, 1.0, 5)
-#: Intervals of a whole motion at whose ends functions of time are sampled ahead.
+#: Number of intervals of the whole motion at which functions of time are sampled in advance.
 AHEAD = 4096
-#: Part of a function's range by which it may leave a parabola within one step.
+#: Largest deviation from a parabola within one step, relative to the range of the function.
 HIDDEN = 0.1
 
 
 class Given(NamedTuple):
-    """What is given at p instants of n steps; arrays of one row where nothing varies.
+    """Prescribed functions at p instants of n steps; axes of constants have length 1."""
 
-    Attributes
-    ----------
-    times
-        Shape (n, p).
-    factors
-        Of the loads, shape (n, p, l) or (1, 1, l).
-    supports
-        Displacement of the degrees of freedom that are fixed, zero elsewhere, and its two rates,
-        shape (n, p, 3, N) or (1, 1, 3, N).
-    c, g
-        What the joints' equations have of time, and what their derivatives have, with both rates,
-        shapes (n, p, 3, m) and (n, p, 3, k), or (1, 1, ...).
-    """
-
-    times: Array
-    factors: Array
-    supports: Array
-    c: Array
-    g: Array
+    times: Array  # (n, p)
+    factors: Array  # load factors, (n, p, l)
+    supports: Array  # displacement, velocity, acceleration of fixed DOFs, else 0, (n, p, 3, N)
+    c: Array  # joint terms that depend on time, and their two rates, (n, p, 3, m)
+    g: Array  # the same of the joints' derivatives, (n, p, 3, k)
 
     def rows(self, part: slice) -> Given:
-        """The same of some of the steps."""
+        """Select some of the steps."""
         return Given(*(x if len(x) == 1 else x[part] for x in self))
 
 
 def rate_weights(at: Array, samples: Array) -> Array:
-    """What makes first and second derivatives at p places of values at k others, (2, p, k)."""
+    """Weights (2, p, k) of k samples for the first and second derivative at p points."""
     k = len(samples)
     fit = np.linalg.inv(chebvander(2.0 * samples - 1.0, k - 1))
     return np.array([2.0**order * chebval(2.0 * at - 1.0, chebder(np.eye(k), order)).T @ fit
@@ -63,7 +48,8 @@ def rate_weights(at: Array, samples: Array) -> Array:
 
 def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
           limit: float) -> Array:
-    """First and second rate, (2, k), of a function of times (n,) at the start or end t of a step.
+    """First and second rate, (2, k), of a function of time at the start or the end t of a step.
+    If ``ahead``, the step begins at t, else it ends there; no sample lies beyond ``limit``.
     """
     values = function(np.minimum((t if ahead else t - dt) + dt * SAMPLES, limit))
     first, second = rate_weights(np.array([0.0 if ahead else 1.0]), SAMPLES)[:, 0]
@@ -73,8 +59,8 @@ def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
 class Course:
     """Samples the functions of time of a system in steps of one size.
 
-    ``at`` (p,) are the instants, as parts of a step, at which values and rates are wanted;
-    ``samples`` (k,) those of which the rates are made.
+    ``at`` (p,) are the instants for values and rates, as fractions of a step; ``samples`` (k,) are
+    the sample points for the rates.
     """
 
     def __init__(self, system: System, at: Array, samples: Array) -> None:
@@ -84,10 +70,10 @@ class Course:
 
     def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
            block: tuple[int, int] | None = None) -> Given:
-        """What is given in the steps ``range(*steps)``, of which the first of all is at ``start``.
+        """Values and rates in the steps ``range(*steps)``; step 0 begins at ``start``.
 
-        Functions are asked at once in a block of steps, so that what they return does not depend on
-        ``steps``, and not beyond the time ``limit``.
+        A whole ``block`` of steps is sampled in one call, so that the result does not depend on
+        ``steps``. No sample lies beyond the time ``limit``.
         """
         first, last = block = block or steps
         key = start, dt, first, last, limit
@@ -118,7 +104,7 @@ class Course:
             supports[..., s.constraints.fixed] = moving(s.constraints.values_at)
         c, g = tables.still
         c, g = c[:, None], g[:, None, 1:]
-        if tables.motion_varies and not tables.plain.joints.own:
+        if tables.motion_varies and not tables.plain.joints.custom:
             found = moving(tables.driven)
             c = found[..., :s.constraints.m]
             if tables.turns:
@@ -129,7 +115,7 @@ class Course:
 
 
 class Lookahead:
-    """Functions of time of a whole motion, so that no step passes over an event."""
+    """Samples of all functions of time over the whole motion, so that no step misses an event."""
 
     def __init__(self, system: System, t_start: float, t_end: float) -> None:
         self._times = np.linspace(t_start, t_end, AHEAD + 1)
@@ -144,10 +130,7 @@ class Lookahead:
         self._values = values[:, varies] / size[varies]
 
     def cut(self, t: float, dt: float) -> float:
-        """A step size, at most dt, in which no function of time does what is not seen.
-
-        It is not seen if it is no parabola within the step: a blow that begins and ends there.
-        """
+        """Reduce a step size until every function of time is almost a parabola within the step."""
         while self._values.shape[1]:
             i, j = np.searchsorted(self._times, (t, t + dt))
             if j - i < 3:

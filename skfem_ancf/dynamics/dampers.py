@@ -1,4 +1,4 @@
-"""What resists velocities, as kernels: of materials, of the mass, and of modes."""
+"""Damping in kernels: of materials, proportional to the mass, and of modes."""
 
 from typing import NamedTuple
 
@@ -11,48 +11,28 @@ from ..core.source import F2, indices, source
 
 
 class Rows(NamedTuple):
-    """A matrix ``A + P^T S P`` with few rows P beside its band.
+    """A matrix ``A + P^T S P`` with few rows P besides the band A."""
 
-    Attributes
-    ----------
-    P, S
-        Rows (k, N), and what is between them, (k, k).
-    Z, H
-        ``P A^-1`` at free coordinates, and ``1 + S P Z^T``: made with the factors of A.
-    """
-
-    P: F2
-    S: F2
-    Z: F2
-    H: F2
+    P: F2  # (k, N)
+    S: F2  # (k, k)
+    Z: F2  # P A^-1 at free DOFs, (k, N)
+    H: F2  # 1 + S P Z^T, (k, k)
 
 
 class Dampers(NamedTuple):
-    """What resists velocities.
+    """The damping of a system."""
 
-    Attributes
-    ----------
-    active, viscous, elements
-        1 if there is any; 1 if a material does; 1 if a force element does.
-    mass
-        The force of the mass is ``mass M v``.
-    D
-        Room for the band matrix of the others.
-    modes
-        That of modes is ``modes^T (modes v)``; shape (k, N).
-    """
-
-    active: int
-    viscous: int
-    elements: int
-    mass: float
-    D: Band
-    modes: F2
+    active: int  # 1 if there is any
+    viscous: int  # 1 if a material has
+    elements: int  # 1 if a force element has
+    mass: float  # factor of M v
+    D: Band  # work: damping matrix
+    modes: F2  # modal damping force modes^T (modes v), (k, N)
 
 
 @source
 def inverse_rows(A, J, free, Y):
-    """Y[k] = A^-1 J[k] at free coordinates, with the factors of A."""
+    """Y[k] = A^-1 J[k] at free DOFs, with the factors of A."""
     for k in range(J.shape[0]):
         row, out = J[k], Y[k]
         for i in indices(free.size):
@@ -62,15 +42,15 @@ def inverse_rows(A, J, free, Y):
 
 @source
 def damping_force(e, dampers, M, t, u, v, out, scratch):
-    """The force at u that resists the velocity v, of the equations e."""
+    """The damping force of the equations e at u and v."""
     damping_beside(e, dampers, M, t, u, v, 0.0, out, scratch)
 
 
 @source
-def damping_beside(e, dampers, M, t, u, v, carried, out, scratch):
-    """The same without what is of materials, if the stresses of these are carried."""
+def damping_beside(e, dampers, M, t, u, v, mixed, out, scratch):
+    """The same, without materials in the mixed iteration (``mixed``)."""
     clear(out)
-    if dampers.viscous > 0 and carried == 0.0:
+    if dampers.viscous > 0 and mixed == 0.0:
         add_viscous_force(e.viscous, u, v, out)
     if dampers.elements > 0:
         add_resisting_force(e.forces, t, u, v, out)
@@ -89,7 +69,7 @@ def damping_beside(e, dampers, M, t, u, v, carried, out, scratch):
 def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
     """Add the derivative of :func:`damping_force` by v, times a factor, to a symmetric band.
 
-    That of the modes is left out. ``stresses`` (3, n) is scratch, of which the first row is zero.
+    Modal damping is excluded. ``stresses`` (3, n) is work, its first row zero.
     """
     if dampers.viscous > 0:
         yes = dampers.viscous > 0
@@ -103,7 +83,7 @@ def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
 
 @source
 def factorize_rows(A, rows, free):
-    """Make Z and H with the factors of A."""
+    """Set Z and H with the factors of A."""
     P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
     k = P.shape[0]
     G = np.empty((k, k))
@@ -120,7 +100,7 @@ def factorize_rows(A, rows, free):
 
 @source
 def solve_rows(A, rows, x):
-    """Solve in place with the factors of A and the rows, by Sherman, Morrison and Woodbury."""
+    """Solve in place by the Sherman-Morrison-Woodbury formula."""
     solve(A, x)
     k = rows.P.shape[0]
     if k > 0:

@@ -1,4 +1,4 @@
-"""Derivatives of what is known at instants of a motion, of the size of its steps."""
+"""Divided differences over the steps of a motion, for error estimates."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from ..core.types import Array
 from .base import Motion
 
-#: Growth from one derivative to the next, times the size of the step, at most.
+#: Largest ratio dt |f^(k + 1)| / |f^(k)| in an extrapolation.
 GROWTH = 2.0
 
 
 def difference(x: Array, a: Array) -> Array:
-    """The derivative of the highest order of a polynomial, shape (N,)."""
+    """The derivative of order n - 1 of the polynomial through n points, shape (N,)."""
     return difference_row(x) @ a
 
 
 def difference_row(x: Array) -> Array:
-    """What makes the derivative of the highest order of a polynomial of its values, shape (n,)."""
+    """Weights (n,) of :func:`difference`."""
     if len(x) < 3:
         return np.ones(1) if len(x) == 1 else np.array([1.0, -1.0]) / (x[0] - x[1])
     gaps = x[:, None] - x
@@ -29,7 +29,11 @@ def difference_row(x: Array) -> Array:
 
 def derivative(old: Motion, new: Motion, t: float, value: Array,
                order: int) -> tuple[int, Array, Array | None]:
-    """Derivatives of a function of time from its value in a step and those in steps before."""
+    """The two highest derivatives of a function from its values in this step and previous ones.
+
+    Returns the order, the derivative of that order and that of one order less, or None; the values
+    are stored in ``new.memory``.
+    """
     before = old.memory or {}
     values = np.concatenate([value[None], before.get("values", value[None][:0])])[:order + 1]
     times = np.append(t, before.get("times", ()))[:order + 1]
@@ -39,7 +43,7 @@ def derivative(old: Motion, new: Motion, t: float, value: Array,
 
 
 def grown(size: Array, lower: Array, missing: int) -> Array:
-    """A derivative times a power of the step, grown by those that are missing as from the last."""
+    """Extrapolate a scaled derivative to a higher one by the ratio of the last two."""
     if not missing:
         return size
     least = np.linalg.norm(lower)

@@ -1,8 +1,8 @@
-"""The end of a step: velocities, accelerations and multipliers."""
+"""Velocities, accelerations and multipliers at the end of a step."""
 
 from ..core.band import copy, dot, solve_joined, subtract_rows
 from ..actions.forces.kernels import settle_contact
-from ..core.callbacks import own_solve
+from ..core.callbacks import call_solver
 from ..core.source import indices, source
 from ..actions.tables import add_constraint_rate
 from .convergence import DEPENDENT, EXACTLY, FAILED, GO_ON
@@ -13,10 +13,9 @@ from .residual import free_velocity, kinetic_energy
 
 @source
 def end_velocity(joints, free, mass, rule, s, w, state, exact):
-    """v_1 of the iterate, with the joints' impulses; FAILED if these are not determined.
+    """v_1 = v - M^-1 J^T impulse of the iterate, with d Phi / dt = 0; FAILED for dependent joints.
 
-    ``v_1 = v - M^-1 J^T impulse`` with ``d Phi / dt = 0`` at the end of the step; up to what an
-    iteration leaves, where that is not the last, unless ``exact``.
+    Unless ``exact``, the accuracy is that of the iteration.
     """
     free_velocity(free, rule, s, w)
     if w.m.impulse.size > 0:
@@ -32,20 +31,18 @@ def end_velocity(joints, free, mass, rule, s, w, state, exact):
 
 @source
 def _eliminated(joints, rule, s, w, at, b, x, state, exact):
-    """Change x by ``-M^-1 J^T b`` so that ``J1 x`` becomes what -b was.
+    """Change x by ``-M^-1 J^T b`` so that ``J1 x`` becomes the initial -b, for eliminated joints.
 
-    The change is left in ``w.x.damping_velocity``.
-
-    Of joints that are eliminated. J is that at the displacement ``at``, J1 that at the end of the
-    step. FAILED if they depend on each other.
+    J is taken at the displacement ``at``, J1 at the end of the step. The change is also in
+    ``w.x.damping_velocity``. FAILED for dependent joints.
     """
     change, rate = w.x.damping_velocity, w.m.phi
     add_constraint_rate(joints, s.joints.g[0], s.t, w.x.u, x, b)
     for k in indices(b.size):
         rate[k] = -b[k]
     copy(at, change)
-    known = w.m.l if exact > 0 else w.m.l[:0]  # none: roughly
-    if not own_solve(rule.mass_solver, s.t, w.x.u, known, x, rate, change, b):
+    known = w.m.l if exact > 0 else w.m.l[:0]  # empty: rough solution
+    if not call_solver(rule.mass_solver, s.t, w.x.u, known, x, rate, change, b):
         state.failure[0] = DEPENDENT
         return FAILED
     for i in indices(x.size):
@@ -55,12 +52,12 @@ def _eliminated(joints, rule, s, w, at, b, x, state, exact):
 
 @source
 def accelerations(free, rule, s, w, state):
-    """w_1 (in place of the correction) and a_1, and the multipliers at the end of the step."""
+    """Set w_1 (in place of the correction), a_1 and the multipliers at the end of the step."""
     u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
     a1, w1, w0, given = w.x.acceleration, w.x.du, w.y[3], s.supports[2]
     l, impulse, l0, last = w.m.l, w.m.impulse, w.m.l0, w.m.last
     if rule.conserving > 0:
-        # what acts in the middle of a step, extrapolated to its end from the last two
+        # values in the middle of steps, extrapolated to the end from the last two
         ahead = s.dt / (s.dt + state.last_dt[0])
         for i in indices(u.size):
             w1[i] = (v[i] - v0[i]) / s.dt
@@ -78,9 +75,9 @@ def accelerations(free, rule, s, w, state):
 
 @source
 def close_acceleration(joints, free, mass, rule, s, w, state):
-    """Change accelerations and multipliers so that they meet the joints' second rate too."""
+    """Project accelerations and multipliers onto the second rate of the joints."""
     a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
-    l0, last, anew = w.m.l0, w.m.last, rule.conserving > 0  # J are those of the velocity, else
+    l0, last, anew = w.m.l0, w.m.last, rule.conserving > 0  # otherwise J is that of the velocity
     acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
     share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
     if rule.mass_solver > 0:
@@ -103,11 +100,10 @@ def close_acceleration(joints, free, mass, rule, s, w, state):
 
 @source
 def add_work(e, matrices, rule, s, w, state):
-    """Add what damping takes in the middle of the step, at its mean velocity.
+    """Add the work of damping at the mean velocity of the step.
 
-    In the conserving scheme that is the work of its force. In others velocities at the ends of
-    steps may be those of vibrations that the steps do not resolve: the mean force of both ends may
-    have a negative work.
+    In the conserving scheme this is the work of its force. In others the mean force of both ends
+    could have negative work, because of unresolved vibrations.
     """
     u, u0, d, middle = w.x.u, w.y[0], w.x.damping, w.x.middle
     damping_velocity = w.x.damping_velocity
@@ -121,7 +117,7 @@ def add_work(e, matrices, rule, s, w, state):
 
 @source
 def settle(forces, rule, s, w, taken):
-    """Anchors follow at the end of the step; what that has taken."""
+    """Update the contact history at the end of the step; ``taken`` is the dissipated work."""
     if rule.conserving > 0:
         settle_contact(forces, s.acting, s.dt, w.y[0], w.x.u, taken)
     else:
@@ -130,7 +126,7 @@ def settle(forces, rule, s, w, taken):
 
 @source
 def finish(free, M, s, w, state):
-    """The end of the step becomes the begin of the next."""
+    """The end of the step becomes the start of the next."""
     u, v, a1, w1, given = w.x.u, w.x.v, w.x.acceleration, w.x.du, s.supports[2]
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
     copy(u, u0)

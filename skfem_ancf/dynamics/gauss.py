@@ -1,4 +1,4 @@
-"""The methods of Gauss."""
+"""Gauss methods."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ from ..core.quadrature import gauss
 from ..core.types import Array
 from .collocation import Collocation
 
-#: Factors of the estimated error by number of points, as measured: the more points, the more of
-#: the error is of vibrations that turn so far in a step that the estimate falls short of them.
+#: Calibrated factors of the estimated error by number of points. The more points, the larger the
+#: phase of a vibration in a step, and the more the estimate falls short.
 SAFETY = {1: 1.0, 2: 0.9, 3: 1.4, 4: 3.0}
 
 
 class Gauss(Collocation):
-    """Collocation at the points of Gauss: of order 2 n with n points, symmetric and symplectic.
+    """Collocation at the n Gauss points: order 2 n, symmetric and symplectic.
 
-    Momentum and angular momentum are conserved to the tolerance of the iteration, as all that is
-    quadratic in the state; the energy stays close to what it was for very long times. n = 1 is the
-    implicit midpoint rule. Nothing is damped, so that a stiff beam goes on vibrating with what it
-    has: see :class:`Radau` for those, above all where accelerations are read. At the end of a step
-    they are by the forces there, which for a pendulum of steel in 40 steps are those of vibrations
-    that no step resolves, 240 times those of the swing.
+    Quadratic invariants such as momentum and angular momentum are conserved to the tolerance of the
+    iteration; the energy stays close to its initial value for very long times. n = 1 is the
+    implicit midpoint rule. Nothing is damped: accelerations of a stiff beam at the end of a step
+    are dominated by vibrations that the steps do not resolve; use :class:`Radau` for those.
 
-    Joints whose equations are linear in the coordinates and do not move, as clamps and lines at an
-    angle and hinges of beams, cost no order; others, and rigid bodies, are refused.
+    Joints that are linear in the degrees of freedom and do not move (rigid connections, hinges of
+    beams) keep the order; other joints and rigid bodies raise an InputError.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from .base import Motion, Scheme
 
 
 class GeneralizedAlpha(Scheme):
-    """Second order, with the damping of high frequencies chosen by one number.
+    """Generalised-alpha: second order, with numerical damping of high frequencies.
 
     The equation of motion holds at the end of each step,
     ``M a_{n+1} + f(u_{n+1}) = Q_{n+1}``, and Newmark's formulas use an acceleration ``w`` with
@@ -17,10 +17,8 @@ class GeneralizedAlpha(Scheme):
     Parameters
     ----------
     rho_inf
-        Spectral radius at infinite frequency, from 0 (annihilates it in one step) to 1 (no
-        damping). With 1 accelerations and reactions of what steps do not resolve alternate from
-        step to step: of a falling rod of L/h = 1e4 in steps of 0.01 s its pin's force by twice its
-        weight, whatever ``tol`` is, and with 0.8 by a hundredth.
+        Spectral radius at infinite frequency, from 0 (annihilated in one step) to 1 (no damping).
+        With 1, accelerations and reactions oscillate from step to step in stiff beams.
 
     References
     ----------
@@ -39,12 +37,12 @@ class GeneralizedAlpha(Scheme):
         self.set_parameters((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
 
     def set_parameters(self, alpha_m: float, alpha_f: float) -> None:
-        """Set both, and gamma and beta of second order with the least damping of low frequencies.
+        """Set alpha_m and alpha_f, and the optimal gamma and beta for second order.
 
         Parameters
         ----------
         alpha_m, alpha_f
-            Parts of the old accelerations in the means.
+            Weights of the old accelerations.
         """
         self.alpha_m, self.alpha_f = alpha_m, alpha_f
         self.gamma = 0.5 + alpha_f - alpha_m
@@ -59,7 +57,7 @@ class GeneralizedAlpha(Scheme):
         return self.alpha_m, self.alpha_f, self.beta, self.gamma
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
-        # the damping of first order that gamma above that of second order causes
+        # numerical damping of first order, if gamma exceeds its value for second order
         damping = 0.5 * (self.gamma - 0.5 - self.alpha_f + self.alpha_m)
         return super().local_error(old, new, dt) + damping * dt * (new.v - old.v)
 

@@ -1,4 +1,4 @@
-"""What a motion was: times, positions, energies, momenta."""
+"""The result of a time integration."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from ..visuals.pyvista import Series
 from .base import Motion, Scheme
 from .sensors import Readings
 
-#: What is stored of a Motion.
+#: Attributes of a Motion that are stored.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
            "dissipated", "contacts", "turns")
-#: Instants of a picture where none are named.
+#: Default number of instants in a plot.
 STROBES = 8
 
 
 def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> State:
-    """A Motion as a State, with what the run goes on with from there, or None."""
+    """The State of a Motion, with the arrays for continuing the run, or None."""
     inertia = np.zeros(system.N)
     if np.any(y.acceleration):  # a quasi-static run needs no density
         inertia = system.mass.multiply(y.acceleration)
@@ -52,11 +52,11 @@ class History(MaterialPoints):
     Parameters
     ----------
     system, scheme
-        What was integrated, and how.
+        The system that was integrated, and the scheme.
     columns
-        Arrays (nt, ...) by the names of what is stored of a Motion.
+        Stored arrays (nt, ...) by the names of the attributes of Motion.
     last
-        The last instant, or None; and what the run goes on with from there, or None.
+        The last instant and the arrays for continuing the run; either may be None.
     sensors, counts
         As below; the latter by name.
 
@@ -65,28 +65,28 @@ class History(MaterialPoints):
     t
         Times, shape (nt,).
     u, v, acceleration
-        Displacement of the coordinates and its rates, shape (nt, N).
+        Displacement, velocity and acceleration of the degrees of freedom, shape (nt, N).
     multipliers
-        Of the joints, shape (nt, m).
+        Lagrange multipliers of the joints, shape (nt, m).
     dissipated
-        The work of damping since the start, shape (nt,), exact with the energy-momentum scheme.
-        What a scheme itself damps is not in it.
+        Work of damping since the start, shape (nt,), exact with the energy-momentum scheme.
+        Numerical damping of the scheme is not included.
     sensors
-        What the sensors of the scene have read at every step, by name: a
+        Readings of the sensors at every step, by name: a
         :class:`~skfem_ancf.dynamics.sensors.Readings` with its times ``t``.
     event
-        The time at which ``integrate(until=...)`` has ended it; None if nothing did.
+        The time at which ``integrate(until=...)`` stopped, or None.
     steps
-        Steps of the motion; the instants may be fewer or more.
+        Number of steps; independent of the number of stored instants.
     substeps
-        Parts into which steps that did not converge were cut.
+        Number of smaller steps taken in place of steps that did not converge.
     rejected
-        Steps that the automatic step size took again.
+        Steps that the automatic step size repeated.
     iterations, factorizations
-        Residuals solved for, and tangents factorised, in all steps.
+        Total numbers of linear solutions and of factorised tangents.
     error
-        With ``integrate(..., check=True)`` the largest difference of a position from that of the
-        same motion in steps half as long, over the size of the scene; NaN where these fail.
+        With ``integrate(..., check=True)``, the largest difference in position from the same motion
+        with half the step size, relative to the size of the scene; NaN if that failed.
     """
 
     event: float | None
@@ -119,10 +119,10 @@ class History(MaterialPoints):
                 f"{self.factorizations} factorisations>")
 
     def state(self, k: int) -> State:
-        """The instant ``k`` as a State: strain, reactions (inertia included), plots, files.
+        """The instant ``k`` as a State: strain, reactions (with inertia), plots, files.
 
-        It has the velocity too, and what the scheme needs to go on: :meth:`Scene.integrate
-        <skfem_ancf.Scene.integrate>` from it (``start=``) continues the motion.
+        :meth:`Scene.integrate <skfem_ancf.Scene.integrate>` with ``start=`` this state continues
+        the motion.
         """
         k = require_index("k", k, len(self))
         last, arrays = self._last
@@ -135,7 +135,7 @@ class History(MaterialPoints):
         return state_of(self.system, self.scheme, Motion(**row))
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
-        """States one after the other, of the instants with these numbers; all by default."""
+        """Iterate over the states with these numbers; all by default."""
         if instants is not None and (isinstance(instants, (str, bytes, dict, set))
                                      or not hasattr(instants, "__iter__")):
             raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
@@ -148,13 +148,13 @@ class History(MaterialPoints):
     # at material points
 
     def angle(self, body: WhichMember) -> Array:
-        """The angle of a rigid body (or its name or number), turns counted, shape (nt,)."""
+        """The angle of a rigid body (object, name or number), with whole turns, shape (nt,)."""
         found = require_body(self.system, body)
         k = Turns(self.system).moments + self.system.bodies.index(found)
         return found.angle + self._columns["turns"][:, k]
 
     def _read(self, what, point, beam, line, *args, **options):
-        """What a method of the states gives at points, of all instants."""
+        """Call a method of every state at given points."""
         at = self.system.points.find(point, beam, line, ask=True)
         return [getattr(state, what)(*args, at, **options) for state in self]
 
@@ -205,13 +205,13 @@ class History(MaterialPoints):
         return over_time(self._read("resultants", at, beam, line, recover=recover))
 
     def joint_force(self, joint: Joint) -> Array:
-        """What a joint does to its first beam at all instants, shape (nt, m)."""
+        """Multipliers of a joint, its force on the first beam, at all instants, shape (nt, m)."""
         return np.array([state.joint_force(joint) for state in self])
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
-        """What the supports at a boundary do to the beam at all instants.
+        """Support reactions at a boundary at all instants.
 
-        Its force has the shape (nt, 2), the moment and each degree of freedom (nt,).
+        ``force`` has the shape (nt, 2); ``moment`` and each degree of freedom have (nt,).
 
         Parameters
         ----------
@@ -220,7 +220,7 @@ class History(MaterialPoints):
 
         Examples
         --------
-        What the pin of a pendulum carries:
+        The reaction of the pin of a pendulum:
 
         >>> import numpy as np
         >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
@@ -234,11 +234,11 @@ class History(MaterialPoints):
         return Reaction(np.array(force), np.array(moment),
                         {name: np.array([at[name] for at in names]) for name in names[0]})
 
-    # of the whole
+    # energies and momenta
 
     @cached_property
     def strain_energy(self) -> Array:
-        """Strain energy, with the potential of force elements, shape (nt,)."""
+        """Strain energy and potential of force elements, shape (nt,)."""
         system, memories = self.system, self._columns["contacts"]
         out = np.zeros(len(self)) + system.energy_of_beams(self.u)
         if system.forces.elements:
@@ -258,14 +258,17 @@ class History(MaterialPoints):
     def potential_energy(self) -> Array:
         """Potential of the loads, zero in the reference configuration, shape (nt,).
 
-        That of moments counts whole turns, which are followed from step to step.
+        The potential of a moment counts whole turns.
         """
         return np.array([self.system.load_potential(u, t, turned) for u, t, turned in zip(
             self.u, self.t, self._columns["turns"])])
 
     @property
     def total_energy(self) -> Array:
-        """Sum of the three energies, shape (nt,); with :attr:`dissipated` it stays the same."""
+        """Sum of strain, kinetic and potential energy, shape (nt,).
+
+        The sum with :attr:`dissipated` is constant unless loads depend on time.
+        """
         return self.strain_energy + self.kinetic_energy + self.potential_energy
 
     @cached_property
@@ -275,7 +278,7 @@ class History(MaterialPoints):
 
     @cached_property
     def angular_momentum(self) -> Array:
-        """Angular momentum about the origin of the coordinates, shape (nt,)."""
+        """Angular momentum about the origin, shape (nt,)."""
         return np.array([angular_momentum(self.system, u, v) for u, v in zip(self.u, self.v)])
 
     # files and pictures
@@ -288,9 +291,9 @@ class History(MaterialPoints):
     def to_pyvista(self, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                    lagrange: bool = False, undeformed: bool = False,
                    recover: bool = True) -> Series:
-        """One mesh of pyvista that takes every instant, in place.
+        """A pyvista mesh that can be moved to every instant.
 
-        Its ``mesh`` is at the first instant, ``update(k)`` puts it at another.
+        ``mesh`` shows the first instant, ``update(k)`` moves it to the instant k.
 
         Parameters
         ----------
@@ -305,15 +308,15 @@ class History(MaterialPoints):
              unit: str | None = None, subdivide: tuple[int, int] = (16, 8),
              filename: StrPath | None = None, dpi: float = 200, recover: bool = True,
              scale: float | str = 1.0, loads: bool = False, supports: bool = False) -> Any:
-        """Draw the body at several times in one picture, as a stroboscope shows it.
+        """Draw the body at several times in one plot.
 
         Parameters
         ----------
         field
-            What it is coloured by, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+            The field shown as colour, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
         times
-            Of each the stored instant that is nearest is drawn, shape (n,); by default eight, from
-            first to last.
+            Times, shape (n,); the nearest stored instants are drawn. The default is eight instants
+            from first to last.
         ax, thickness, undeformed, colorbar, cmap, limits, title, unit
             As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
         subdivide, filename, dpi, recover, scale, loads, supports
@@ -352,7 +355,7 @@ class History(MaterialPoints):
     def plot_curve(self, x: Any, y: Any, ax: Any = None, *, xlabel: str | None = None,
                    ylabel: str | None = None, title: str | None = None,
                    filename: StrPath | None = None, dpi: float = 200, **line: Any) -> Any:
-        """Draw one quantity against another, as a force over a displacement.
+        """Plot one quantity against another, such as a force against a displacement.
 
         Parameters
         ----------
@@ -388,7 +391,7 @@ class History(MaterialPoints):
                           filename=filename, dpi=dpi, **line)
 
     def _curve(self, name, of):
-        """Numbers at all instants, and what to call them."""
+        """The values of a quantity at all instants, and its axis label."""
         if not isinstance(of, (str, tuple)):
             return require_finite(name, np.asarray(of, dtype=float), (None,)), ""
         if of == "t":
@@ -418,7 +421,7 @@ class History(MaterialPoints):
             Ends with .pvd, for a list and one .vtu for each instant, or with .vtkhdf, for one file
             with all of them, in which the cells are stored once.
         progress
-            Show a progress bar: True, False, or None for "if it takes long".
+            Show a progress bar: True, False, or None for long runs only.
         subdivide, lagrange, undeformed, recover, fields, precision, encoding
             As for :func:`skfem_ancf.io.save_vtu`.
         """

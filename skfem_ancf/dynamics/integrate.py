@@ -1,4 +1,4 @@
-"""What is asked of a motion, and the loop that finds it."""
+"""Time integration: arguments and the loop over steps."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from .history import History
 from .run import MAX_STEPS, Run, StepFailed, task_of
 from .sensors import Sensor
 
-#: Steps after which a motion is looked at whether its body is turned inside out.
+#: Interval in steps between checks for inverted elements.
 LOOKED = 16
-#: Gigabytes of the joints' matrices, at most.
+#: Memory limit of the dense constraint Jacobians, in gigabytes.
 LARGEST = 2.0
 
 
@@ -44,15 +44,15 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         A :class:`~skfem_ancf.equations.system.System` and a
         :class:`~skfem_ancf.dynamics.Scheme`.
     u, v
-        Displacement and velocity at the start, shape (N,); zero by default.
+        Initial displacement and velocity, shape (N,); zero by default.
     start
-        In place of ``u``; an instant of a motion in place of ``v`` too. One of the same scene by
-        the same scheme goes on exactly: the last one of a History to round-off, another one to the
-        tolerance of the iteration.
+        A State instead of ``u``; an instant of a motion replaces ``v`` too. With the same scene
+        and scheme the motion continues exactly: from the last instant of a History to round-off,
+        from others to the tolerance of the iteration.
     t_end, dt, t_start, t_eval, tol, rtol, progress, breakpoints, checkpoint, every, until, check
         As for :meth:`skfem_ancf.Scene.integrate`, ``t_eval`` and ``breakpoints`` of shape (n,).
     sensors
-        Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`: those of the scene.
+        Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
 
     Returns
     -------
@@ -61,14 +61,14 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     Raises
     ------
     ConvergenceError
-        If a step fails even when cut to 1/64; its ``state`` is the History up to there.
+        If a step fails even with 1/64 of its size; ``state`` is the History up to there.
     Interrupted
-        On Ctrl-C, a KeyboardInterrupt; its ``state`` is the History up to there.
+        On Ctrl-C, a KeyboardInterrupt; ``state`` is the History up to there.
     CheckpointError
         If the checkpoint cannot be written at the start.
     SupportError
-        If joints repeat or contradict each other, or are open at the start, or supports would move
-        the body at once.
+        If joints are redundant, contradictory or open at the start, or if supports would displace
+        the body suddenly.
     """
     motion = None if start is None else start._motion
     if t_start is None:
@@ -83,12 +83,11 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     if until is not None:
         require_function("until", until, "of a State that returns a number")
     if checkpoint is not None and (until is not None or require_flag("check", check)):
-        raise InputError("a checkpoint cannot keep the function of until=, nor the second motion "
+        raise InputError("a checkpoint cannot store the function until=, nor the second motion "
                          "of check=True: leave out checkpoint=, or integrate in parts, "
                          "start=history.state(-1)")
 
     def begun(task, sensors=(), until=None):
-        """A Run at its start."""
         run = Run(system, scheme, task, sensors, until)
         if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
             run.go_on(motion, start._origin[1])
@@ -111,7 +110,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
 
 def _difference(history, begun, task, progress):
-    """How far a motion is from the same one in steps half as long, over the size of the scene."""
+    """Largest difference from the motion with half the step size, over the size of the scene."""
     system, scheme = history.system, history.scheme
     fine = replace(task, t_end=history.t[-1], t_eval=history.t,
                    dt=None if task.dt is None else 0.5 * task.dt,
@@ -126,7 +125,7 @@ def _difference(history, begun, task, progress):
 
 
 def _samples(system, t_start, t_end):
-    """The times at which controls are asked that hold what they say."""
+    """Sampling times of controllers with zero-order hold."""
     if not system.forces.sampled:
         return []
     start = require_finite_scalar("t_start", t_start)
@@ -140,43 +139,31 @@ def _samples(system, t_start, t_end):
 
 
 def _require_room(system):
-    """Raise InputError if the joints' dense matrices would fill the memory."""
+    """Raise InputError if the dense constraint Jacobians would fill the memory."""
     size = 24e-9 * system.constraints.m * system.N
     if size > LARGEST:
         raise InputError(
-            f"a motion keeps the derivatives of {system.constraints.m} equations of joints by "
-            f"{system.N} degrees of freedom as dense matrices, {size:.3g} GB: a Frame of lines "
-            "eliminates its nodes in 'energy-momentum' and 'generalized-alpha', if it is held at "
-            "nodes, without other joints, springs between points far apart and modal damping; else "
-            "take fewer or longer beams, or the frequencies and shapes of scene.modes(k)")
+            f"time integration stores the derivatives of {system.constraints.m} joint equations by "
+            f"{system.N} degrees of freedom as dense matrices, {size:.3g} GB. A Frame avoids this "
+            "with 'energy-momentum' and 'generalized-alpha', if it is supported at nodes, has no "
+            "other joints, no springs between distant points and no modal damping. Otherwise use "
+            "fewer elements, or scene.modes(k)")
 
 
 def _goes_on(system, scheme, start, t):
-    """True if an instant is one of the same motion: same scheme, same scene."""
+    """True if the start is an instant of a motion of the same scene by the same scheme."""
     return (not system.forces.sampled and same_scheme(start._origin[0], scheme)
             and same_problem(system, start, t))
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:
-    """Take the steps of a Run to its end, and write its file.
-
-    Parameters
-    ----------
-    run, file
-        A :class:`~skfem_ancf.dynamics.run.Run` that has begun, and its Checkpoint, or None.
-    progress
-        Show a progress bar: True, False, or None for "if it takes long".
-
-    Returns
-    -------
-    History
-    """
+    """Take all steps of a Run; warn about inverted elements, deep contact and jumps of springs."""
     history, inverted = _go(run, file, progress)
     contacts = run.system.forces.contacts
     texts = [] if inverted is None else [
-        f"the body is turned inside out, at t = {inverted:.6g} or before: it is compressed or bent "
-        "beyond what it can bear, and what follows means nothing. Use NeoHookean, more elements, "
-        "a smaller load or shorter steps"]
+        f"elements are turned inside out at t = {inverted:.6g} or before: the compression or "
+        "bending is too large, and results after that time are meaningless. Use NeoHookean, more "
+        "elements, a smaller load or shorter steps"]
     texts += filter(None, [_jump_of_a_turn(history), contacts.sweep.deep()])
     with contacts.lent(run.y.contacts):
         texts += contacts.sunk(run.y.u, run.y.t)
@@ -186,7 +173,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
 
 
 def _go(run, file, progress):
-    """Take the steps of a Run; its History, and when its body is turned inside out, or None."""
+    """Take all steps; the History, and the time at which elements are inverted, or None."""
     system, task, inverted, looked = run.system, run.task, None, run.steps
     system.forces.contacts.sweep.begin()
     try:
@@ -207,7 +194,7 @@ def _go(run, file, progress):
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
                                f"{failure}; try a smaller dt{_of_samples(run)}",
                                run.history()) from None
-    except AncfError as error:  # of a function of the caller's: what is done is kept
+    except AncfError as error:  # from a user's function: attach the motion so far
         vars(error)["state"] = run.history()
         raise
     except KeyboardInterrupt:
@@ -217,17 +204,17 @@ def _go(run, file, progress):
 
 
 def _of_samples(run):
-    """What else helps a motion that controls drive whose law is asked now and then."""
+    """Advice for a motion driven by sampled controllers that fails, or ""."""
     if not run.system.forces.sampled:
         return ""
     energy = max(run.integrator.energy, 0.0)
-    return (f". Energies of {energy:.3g} were seen: where the motion does not explain them, what "
-            f"the samples of {shown(run.system.forces.sampled[0])} hold drives vibrations. Sample "
-            "more often, add damping, or take scheme='energy-momentum'")
+    return (f". The energy reached {energy:.3g}. If the motion does not explain that, the sampled "
+            f"force of {shown(run.system.forces.sampled[0])} excites vibrations: sample more "
+            "often, add damping, or use scheme='energy-momentum'")
 
 
 def _jump_of_a_turn(history):
-    """Where a torsional spring has passed the angle up to which it is one, in words; or nothing."""
+    """Warning if a torsional spring turned by more than half a turn, or ""."""
     forces = history.system.forces
     turns = forces.turns(history.u) if forces.elements else ()
     if not len(turns):
@@ -235,5 +222,5 @@ def _jump_of_a_turn(history):
     jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]
     return "" if not len(jumps) else (
         f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more than half a "
-        "turn: its angle is taken in (-pi, pi], so that its moment jumps there and the energy is "
-        "not kept")
+        "turn: its angle is limited to (-pi, pi], so that its moment jumps there and the energy is "
+        "not conserved")

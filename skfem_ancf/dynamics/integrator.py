@@ -1,4 +1,4 @@
-"""Takes time steps: many at once, one, or its halves where it fails."""
+"""One-step integration: blocks of steps, single steps, and halved steps after a failure."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from .tangent import factors
 logger = logging.getLogger(__name__)
 
 DEPTH = 6  # how often a step is halved
-#: Lengths of a step past a position in which joints depend on each other, over that to it.
+#: Factors of the step size that are tried to step past a singular position of the joints.
 LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
-#: Steps of a block at most, and numbers that they may store.
+#: Largest number of steps in a block, and of stored floats.
 BLOCK, STORED = 256, 2_000_000
 
 
@@ -42,32 +42,10 @@ class StepFailed(Exception):
 
 
 class Integrator:
-    """Advances the motion of a system by one-step schemes.
+    """Integrates a system by one-step schemes.
 
-    The factors of the iteration matrix are kept from step to step as long as the iteration
-    contracts.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    scheme
-        A :class:`~skfem_ancf.dynamics.Scheme`.
-    tol
-        Tolerance of the iteration in a step, relative, in the energy norm.
-
-    Attributes
-    ----------
-    m
-        Number of equations of joints.
-    dt
-        Size of the last step.
-    substeps
-        Parts of steps that were cut.
-    limit
-        Time beyond which no function of time is asked.
-    longest
-        Steps of a block at most.
+    The iteration matrix is factorised again only when the iteration contracts too slowly. ``limit``
+    is the last time at which functions of time are sampled, ``longest`` the size of a block.
     """
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
@@ -76,8 +54,8 @@ class Integrator:
         self.m = system.constraints.m
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
         if self.tol >= 1.0:
-            raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
-                             f"1e-6 is coarse already; got {shown(tol)}")
+            raise InputError("tol is the relative error of the iteration in a step: it must be "
+                             f"less than 1, 1e-6 is coarse; got {shown(tol)}")
         memory = system.forces.contacts.tables.memory.size
         if not scheme.conserving:
             alpha_m, alpha_f, beta, _ = scheme.parameters
@@ -87,8 +65,8 @@ class Integrator:
         self._nodes: tuple[Condensed, CondensedMass] | None = None
         if in_steps(scheme) and system.mass_solver.by_nodes:
             self._nodes = Condensed(system, A), CondensedMass(system)
-        turned = scheme.conserving and self._nodes is None
-        U = halves(system.N if turned else 0, system.bandwidth)
+        unsymmetric = scheme.conserving and self._nodes is None
+        U = halves(system.N if unsymmetric else 0, system.bandwidth)
         self._matrices = Matrices(M, system.mass_solver.factors.band, A.band, U, *_damping(system))
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self._rule = Rule._make([
@@ -98,67 +76,66 @@ class Integrator:
         self.dt, self.substeps, self._lost = np.nan, 0, ""
         self.longest = max(1, min(STORED // (4 * system.N + memory), BLOCK))
 
-    # what it has found
 
     @property
     def iterations(self) -> int:
-        """Residuals solved for."""
+        """Number of linear solutions."""
         return int(self._state.iterations[0])
 
     @property
     def factorizations(self) -> int:
-        """Tangents factorised."""
+        """Number of factorised tangents."""
         return int(self._state.factorizations[0])
 
     @property
     def energy(self) -> float:
-        """The largest energy seen."""
+        """The largest energy so far."""
         return float(self._state.energy[0])
 
     @property
     def failure(self) -> str:
-        """Why the last step has failed."""
+        """Why the last step failed."""
         return self._lost or FAILURES[int(self._state.failure[0])]
 
     @property
     def ready(self) -> bool:
-        """True if there are factors of an iteration matrix."""
+        """True if the iteration matrix is factorised."""
         return bool(self._state.factors[0] != 0)
 
     def count(self, other: Integrator) -> None:
-        """Add the counts of another, which begins from zero."""
+        """Add the counts of another integrator, and reset those."""
         self._state.iterations[:] += other._state.iterations
         self._state.factorizations[:] += other._state.factorizations
         self.substeps += other.substeps
         other.reset()
 
     def reset(self) -> None:
-        """Count from zero."""
+        """Set the counts to zero."""
         self._state.iterations[0] = self._state.factorizations[0] = self.substeps = 0
 
     def expect(self, energy: float) -> None:
-        """The iteration's tolerance is relative to the largest energy of the motion."""
+        """Raise the largest energy, to which the tolerance is relative."""
         self._state.energy[0] = max(self.energy, energy)
 
     # the start
 
     @cached_property
     def _instants(self):
-        """Samples functions of time at the start of a step, and at its end."""
+        """Sampling of functions of time at the start and at the end of a step."""
         return [Course(self.system, np.array([x]), SAMPLES) for x in (0.0, 1.0)]
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
               contacts: Array | None = None) -> Motion:
-        """The Motion at the start, with consistent velocity, acceleration and multipliers.
+        """The initial Motion, with consistent velocity, acceleration and multipliers.
 
-        Where motions are given as functions of time, their rates are those in a step dt ahead.
+        Rates of functions of time are those in a step dt after t, or before t unless ``ahead``.
         """
         s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
         given = self._instants[not ahead].of(t if ahead else t - dt, dt, (0, 1), self.limit)
-        held, v_held, a_held = given.supports[0, 0]
-        y = Motion(t, np.where(free, u, held), np.where(free, v, v_held), a_held.copy(),
+        u_fixed, v_fixed, a_fixed = given.supports[0, 0]
+        y = Motion(t, np.where(free, u, u_fixed), np.where(free, v, v_fixed), a_fixed.copy(),
                    np.zeros(s.N), np.zeros(m), np.zeros(m))
-        self._require_held(y.u - u, t)
+        self._require_fitting_supports(y.u - u, t)
         joined, rate = None, y.multipliers
         if m:
             joints = JointMotion(given.c[0, 0], np.vstack([given.g[0, 0, :1], given.g[0, 0]]),
@@ -166,11 +143,11 @@ class Integrator:
             joined = Joined(s, joints, y.u, (t, dt, ahead, self.limit))
             gap = np.abs(joined.gap())
             if np.any(gap > 1e-8 * s.backend.tables.plain.joints.sizes):
-                raise SupportError(f"the joints do not fit at the start: the largest gap is "
-                                   f"{gap.max():.3g}. Begin with beams that fit, or from a static "
-                                   "solution (start=)")
+                raise SupportError("the joints are not closed at the start: the largest gap is "
+                                   f"{gap.max():.3g}. Change the positions of the beams, or start "
+                                   "from a static solution (start=)")
         solve = s.mass_solver(y.u, t, None if joined is None else joined.J)
-        jump = y.v - v  # of fixed degrees of freedom: their impulses move the free ones
+        jump = y.v - v  # impulses of the supports change the velocity of the free DOFs
         if joined is not None or jump.any():
             y.v = y.v + solve(-M.multiply(jump), rate if joined is None else -joined.rate(y.v))[0]
         if joined is not None:
@@ -181,12 +158,12 @@ class Integrator:
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
         inertia, kinetic = M.multiply(y.acceleration), 0.5 * float(y.v @ M.multiply(y.v))
         change = dt * float(y.v @ inertia) + 0.5 * dt**2 * float(y.acceleration @ inertia)
-        # from rest there is no energy yet
+        # at rest the energy is still zero
         self.expect(max(s.strain_energy(y.u, t), kinetic, kinetic + change))
         return y
 
     def _forces(self, y, memory):
-        """What accelerates, without inertia, and what points remember of obstacles."""
+        """Sum of all forces except inertia, and the history variables of contact."""
         s, contacts = self.system, self.system.forces.contacts
         with contacts.lent(memory):
             if contacts.lasting:
@@ -195,8 +172,8 @@ class Integrator:
             force = s.external_force(y.u, y.t) - s.internal_force(y.u, y.t)
             return force - s.damping_force(y.u, y.v, y.t) if s.damped else force, memory
 
-    def _require_held(self, jump, t):
-        """Raise SupportError where supports would move a body at once, in the mean of its mass."""
+    def _require_fitting_supports(self, jump, t):
+        """Raise SupportError if the supports would displace the body suddenly."""
         if not jump.any():
             return
         s = self.system
@@ -204,29 +181,28 @@ class Integrator:
         gap = np.sqrt(jump @ s.mass.multiply(jump) / (along @ s.mass.multiply(along)))
         if gap > 1e-8 * s.size:
             raise SupportError(
-                f"supports would move the body at once by {gap:.3g} in the mean, at t = {t:.6g}: "
-                "begin with a state that they hold, as a static solution (start=), and move them "
-                "by continuous functions of time")
+                f"supports would displace the body suddenly by {gap:.3g} on average, at "
+                f"t = {t:.6g}: start from a state that meets them, such as a static solution "
+                "(start=), and move them by continuous functions of time")
 
     # steps
 
     @cached_property
     def _course(self):
-        """Samples functions of time where the equation of motion holds, and at a step's end."""
+        """Sampling where the equation of motion holds, and at the end of a step."""
         return Course(self.system, np.array([0.5 if self.scheme.conserving else 1.0, 1.0]), SAMPLES)
 
     @cached_property
     def _work(self):
-        """Work arrays."""
         s = self.system
         return new_work(s.N, self.m, s.backend.tables.stresses.size,
                               0 if self._nodes else self.m)
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> list[Motion]:
-        """Up to ``n`` steps from the Motion ``y`` at ``start + first dt``; fewer where one fails.
+        """Take up to ``n`` steps from the Motion ``y`` at ``start + first dt``; fewer if one fails.
 
-        Functions of time are sampled at once in the steps ``range(*block)``, these by default.
+        Functions of time are sampled for all steps ``range(*block)`` at once; by default for these.
         """
         s, contacts = self.system, self.system.forces.contacts
         begun = y.t if start is None else start
@@ -248,7 +224,7 @@ class Integrator:
                 for k in range(done)]
 
     def _call(self, function: Callable, y: Motion, dt: float, rows: Array, *args: Any) -> int:
-        """Take steps by a function of equations, matrices and others; how many were done."""
+        """Call a compiled function that takes steps; returns how many succeeded."""
         s, state, before = self.system, self._state, np.array(self._state)
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
@@ -256,7 +232,7 @@ class Integrator:
         try:
             with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
                 done = self._backend.of(function)(self._matrices, *args)
-        except BaseException:  # also Ctrl-C: the motion may go on from y
+        except BaseException:  # also Ctrl-C: the motion may continue from y
             self._load_state(before)
             self.forget()
             raise
@@ -265,25 +241,24 @@ class Integrator:
             u, v = (np.concatenate([[x], rows[:done, k]]) for k, x in enumerate((y.u, y.v)))
             done, passed = s.forces.contacts.sweep.first(u, v, y.t + dt * np.arange(len(u)))
             if passed:
-                self._lost = f"no step that touches {passed}, it jumps over it"
+                self._lost = f"the step jumps over the obstacle {passed}"
         if done < len(rows):
             self.forget()
         return done
 
     @property
     def _backend(self):
-        """What runs functions of the equations, compiled or not."""
         return self.system.backend
 
     def take(self, y: Motion, dt: float) -> Motion:
-        """One step of dt from the Motion ``y``; raises StepFailed."""
+        """One step of size dt from the Motion ``y``; raises StepFailed."""
         taken = self.run(y, dt, 1)
         if not taken:
             raise StepFailed(self.failure)
         return taken[0]
 
     def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
-        """One step of the scheme; raises StepFailed."""
+        """One step of the scheme, repeated with new factors if it fails; raises StepFailed."""
         while True:
             fresh = not self.ready or dt != self.dt
             try:
@@ -293,12 +268,12 @@ class Integrator:
                 if fresh or not again:
                     raise StepFailed(str(failure)) from None
                 continue
-            if new.contacts is None:  # a user-defined scheme may not hand it on
+            if new.contacts is None:  # a custom scheme may not copy it
                 new.contacts = y.contacts
             return new
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:
-        """One step, in two halves where it does not converge; raises StepFailed."""
+        """One step, halved recursively if it does not converge; raises StepFailed."""
         try:
             return self.attempt(y, dt, depth == 0)
         except StepFailed as failure:
@@ -312,11 +287,10 @@ class Integrator:
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
 
     def leap(self, y: Motion, dt: float) -> Motion | None:
-        """A longer step, past a position in which joints depend on each other, or None.
+        """A longer step past a singular position of the joints, or None.
 
-        As where all bars of a linkage are in line: steps that end there do not converge, and
-        shorter ones end there too. Collocation takes one direction of each joint for a whole step,
-        and has none near there: it is a step of the energy-momentum scheme then.
+        For example, all bars of a linkage may be collinear: steps that end there do not converge.
+        Collocation, which linearises joints once per step, uses an energy-momentum step here.
         """
         if not self.m or self.system.forces.contacts.obstacles:
             return None
@@ -335,7 +309,7 @@ class Integrator:
     # factors
 
     def solve(self, b: Array) -> Array:
-        """The inverse of the last iteration matrix times b (N,)."""
+        """Solve with the last factorised iteration matrix, b of shape (N,)."""
         if self._nodes:
             return self._nodes[0].solve(b, np.zeros(self.m))[0]
         x = b.copy()
@@ -343,7 +317,7 @@ class Integrator:
         return x
 
     def filtered(self, du: Array) -> Array:
-        """What of a change (N,) the last step resolves: its inertia over the iteration matrix."""
+        """What the last step resolves of an increment du (N,): A^-1 (c M du)."""
         if not self.ready:
             return du
         s = self.system
@@ -351,18 +325,17 @@ class Integrator:
         return self.solve(inertia * s.constraints.free)
 
     def forget(self) -> None:
-        """Make new factors in the next step."""
+        """Discard the factors."""
         self._state.factors[0] = 0
 
     def _load_state(self, values):
-        """Take values (fields, 1) of the StepState."""
         for array, value in zip(self._state, values):
             array[:] = value
 
     # checkpoints
 
     def arrays(self) -> dict[str, Any]:
-        """Arrays by name from which :meth:`load` goes on as if there had been no break."""
+        """Arrays by name from which :meth:`load` continues to the last bit."""
         found = {**self._state._asdict(), "dt": self.dt, "substeps": self.substeps}
         if self._nodes:
             (at, multipliers), mass = self._nodes[0].at, self._nodes[1].at
@@ -373,7 +346,7 @@ class Integrator:
         return {name: np.array(array) for name, array in found.items()}
 
     def load(self, arrays: dict[str, Any]) -> None:
-        """Go on with what :meth:`arrays` gave."""
+        """Restore what :meth:`arrays` returned."""
         for name in (*self._state._fields, "dt", "substeps"):
             stored(arrays, name, self.arrays()[name])
         self._load_state([arrays[name] for name in self._state._fields])
@@ -384,7 +357,7 @@ class Integrator:
                 array[...] = stored(arrays, name, array)
                 if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < len(
                         array):
-                    raise CheckpointError("the exchanges of rows are none")
+                    raise CheckpointError("the pivots of the factors are invalid")
         if self._nodes:
             steps, mass = self._nodes
             if self.ready:
@@ -393,7 +366,6 @@ class Integrator:
                 mass.factorize(arrays["mass at"])
 
     def _factors(self) -> dict[str, Array]:
-        """The arrays of the factors of steps, by name."""
         A, rows, work = factors(self._matrices, self._state), self._matrices.rows, self._work
         beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
         return {"A": A.flat, "pivots": A.pivots, "origin": work.x.origin, "ahead": work.x.ahead,
@@ -401,7 +373,7 @@ class Integrator:
 
 
 def _step_data(given: Given, dt: float, system: System) -> StepData:
-    """Functions of time as steps take them: where the equation of motion holds, and at the end."""
+    """Functions of time as :mod:`~skfem_ancf.dynamics.steps` takes them."""
     g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
     joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
                           int(system.backend.tables.motion_varies))
@@ -410,7 +382,7 @@ def _step_data(given: Given, dt: float, system: System) -> StepData:
 
 
 def _damping(system):
-    """Rows beside the band, and the Dampers of a system."""
+    """The low-rank rows beside the band, and the Dampers of a system."""
     modes, M = system.modal_damping.rows, system.mass.band
     rows = np.concatenate([modes, system.forces.far_rows()])
     k = len(rows)

@@ -1,4 +1,4 @@
-"""What joints ask of velocities and accelerations at one instant."""
+"""Joint constraints at one instant: gap, Jacobian and rates."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Joined:
                  instant: tuple[float, float, bool, float]) -> None:
         self._system, self._u, self._instant = system, u, instant
         self._tables = system.backend.tables.plain.joints
-        if self._tables.own and motion.drives:
+        if self._tables.custom and motion.drives:
             c = rates(lambda times: np.array([system.constraints.constraint(u, t)
                                               for t in times]), *instant)
             motion = JointMotion(np.vstack([motion.c[:1], c]), motion.g, 0)
@@ -35,7 +35,7 @@ class Joined:
 
     @cached_property
     def J(self) -> Any:
-        """The derivative of Phi, shape (m, N), as of ``full_jacobian``."""
+        """The Jacobian of Phi, shape (m, N), dense or sparse."""
         s = self._system
         if not s.constraints.few:
             return s.constraints.sparse_jacobian(self._u, self._instant[0])
@@ -44,7 +44,7 @@ class Joined:
         return J
 
     def rate(self, v: Array) -> Array:
-        """That of Phi, shape (m,)."""
+        """The first rate of Phi, shape (m,)."""
         out, (t, dt, *_) = np.empty(self._system.constraints.m), self._instant
         drive_rate(self._tables, self._motion, t, dt, self._u, out)
         return out + self.J @ v
@@ -53,7 +53,7 @@ class Joined:
         """The second rate of Phi, shape (m,)."""
         s, out, (t, dt, *_) = self._system, np.empty(self._system.constraints.m), self._instant
         acceleration_of_joints(self._tables, self._motion, t, dt, self._u, v, out)
-        if self._tables.own and s.constraints.drives:
+        if self._tables.custom and s.constraints.drives:
             out += 2.0 * rates(lambda times: np.array([
                 s.constraints.full_jacobian(self._u, t) @ v for t in times]), *self._instant)[0]
         return out + self.J @ a

@@ -1,4 +1,4 @@
-"""The method of Radau IIA."""
+"""The Radau IIA method."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ POINTS = read_only(np.array([0.4 - 0.1 * np.sqrt(6.0), 0.4 + 0.1 * np.sqrt(6.0),
 
 
 class Radau(Collocation):
-    """Collocation at the three points of Radau, of which the last is the end: of order 5.
+    """Radau IIA with three points: order 5, L-stable.
 
-    What a step does not resolve is damped out at once (L-stable): for stiff beams and large steps.
+    Vibrations that a step does not resolve are damped at once: for stiff beams and large steps.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Rates of joints that are given as functions of time, by differences within one step."""
+"""Rates of joints that depend on time, by differences within one step."""
 
 from __future__ import annotations
 
@@ -6,36 +6,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.callbacks import own_joints
+from ..core.callbacks import custom_joints
 from ..core.source import F2, F3, indices, source
 from ..actions.tables import add_products, add_triples
 
-#: Intervals into which a step is divided.
+#: Number of intervals of a step.
 PARTS = 4
 _FIRST = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
 _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
 
 class JointMotion(NamedTuple):
-    """What of joints depends on time, at one instant.
+    """Time-dependent terms of the joints at one instant, see :mod:`skfem_ancf.actions.tables`."""
 
-    Attributes
-    ----------
-    c
-        c of :mod:`skfem_ancf.actions.tables` at the end of a step and its first two rates, shape
-        (3, m).
-    g
-        g there, g when the joints act, and the first two rates of g, shape (4, k).
-    drives
-        1 if a joint moves.
-    """
-
-    c: F2
-    g: F2
-    drives: int
+    c: F2  # c at the end of a step, and its first two rates, (3, m)
+    g: F2  # g there, g where the joints act, and the first two rates of g, (4, k)
+    drives: int  # 1 if a joint moves
 
 
 class JointMotions(NamedTuple):
-    """The same at many instants, a row for each, or one row for all."""
+    """The same at several instants, a row for each, or one row if constant."""
 
     c: F3
     g: F3
@@ -44,11 +33,11 @@ class JointMotions(NamedTuple):
 
 @source
 def drive_rate(joints, motion, t, dt, u, out):
-    """The rate of Phi at rest, at the end t of a step of dt: c' + g' . u."""
+    """The partial rate of Phi, c' + g' . u, at the end t of a step of dt."""
     c = motion.c[1]
     for k in indices(out.size):
         out[k] = c[k]
-    if joints.own == 0:
+    if joints.custom == 0:
         add_products(out, joints.gk, motion.g[2], u, joints.gi)
     elif motion.drives > 0:
         _add_differences(joints, t, dt, u, u, PARTS / dt, 0.0, 0.0, out)
@@ -60,20 +49,20 @@ def acceleration_of_joints(joints, motion, t, dt, u, v, out):
     c, g = motion.c[2], motion.g[2]
     for k in indices(out.size):
         out[k] = c[k]
-    if joints.own == 0:
+    if joints.custom == 0:
         add_triples(out, joints.hk, joints.hv, v, joints.hi, v, joints.hj)
         add_products(out, joints.gk, motion.g[3], u, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
     else:
-        own_joints(joints.own, np.int64(4), t, u, v, out)
+        custom_joints(joints.custom, np.int64(4), t, u, v, out)
         if motion.drives > 0:
             _add_differences(joints, t, dt, u, v, 0.0, (PARTS / dt)**2, 2.0 * PARTS / dt, out)
 
 
 @source
 def _add_differences(joints, t, dt, u, v, first, second, along, out):
-    """Of user-defined joints: out += first Phi' + second Phi'' + along (J v)', with factors."""
+    """Custom joints: out += first Phi' + second Phi'' + along (J v)', by differences."""
     values = np.empty(out.size)
     for part in range(PARTS + 1):
         time = t - part * dt / PARTS
@@ -82,6 +71,6 @@ def _add_differences(joints, t, dt, u, v, first, second, along, out):
             if c != 0.0:
                 for i in indices(out.size):
                     values[i] = 0.0
-                own_joints(joints.own, k, time, u, v, values)
+                custom_joints(joints.custom, k, time, u, v, values)
                 for i in indices(out.size):
                     out[i] += c * values[i]

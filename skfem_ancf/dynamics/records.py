@@ -1,4 +1,4 @@
-"""Records of time steps: the scheme, matrices, data of each step, and work arrays."""
+"""Named tuples of time steps: scheme, matrices, data of a step, work arrays."""
 
 from typing import NamedTuple
 
@@ -11,203 +11,104 @@ from .rates import JointMotion, JointMotions
 
 
 class Rule(NamedTuple):
-    """A scheme in numbers.
+    """The parameters of a scheme."""
 
-    Attributes
-    ----------
-    conserving
-        1 for the energy-momentum scheme.
-    alpha_m, alpha_f, beta, gamma
-        As above.
-    tol
-        Tolerance of the iteration, relative, in the energy norm.
-    floor, inertia
-        Round-off of the strains in that norm, and what the square of that of places is a factor of.
-    solver, mass_solver
-        Handles of what solves with the iteration matrix and with the mass where joints are
-        eliminated, see :mod:`skfem_ancf.equations.condensation`; 0 where they are a border.
-    """
-
-    conserving: int
+    conserving: int  # 1 for the energy-momentum scheme
     alpha_m: float
     alpha_f: float
     beta: float
     gamma: float
-    tol: float
-    floor: float
-    inertia: float
-    solver: int
-    mass_solver: int
+    tol: float  # of the iteration, relative, in the energy norm
+    floor: float  # round-off of the strains in that norm
+    inertia: float  # mass times squared positions, for the round-off of joints
+    solver: int  # handle of the linear solver for eliminated joints, or 0
+    mass_solver: int  # the same with the mass matrix
 
 
 class Matrices(NamedTuple):
-    """The mass matrix, its factors with the supports fixed, and those of the iteration matrix.
-
-    Attributes
-    ----------
-    M, mass, A
-        As said.
-    U
-        That of conserving steps with carried stresses, which is not symmetric; else of no size.
-    rows
-        What the iteration matrix has beside its band.
-    dampers
-        What resists velocities.
-    """
+    """Matrices of a system, with the supports fixed in factors."""
 
     M: Band
-    mass: Band
-    A: Band
-    U: Band
-    rows: Rows
+    mass: Band  # factors of M
+    A: Band  # iteration matrix and its factors
+    U: Band  # unsymmetric one of conserving mixed steps, or empty
+    rows: Rows  # of the iteration matrix
     dampers: Dampers
 
 
 class StepData(NamedTuple):
-    """Functions of time for a block of steps; arrays of one row where nothing depends on time.
-
-    Attributes
-    ----------
-    dt
-        Size of the steps.
-    times
-        Their ends, and when their equations of motion hold, shape (n, 2).
-    factors
-        Of the loads, shape (n, l).
-    supports
-        Displacement, velocity and acceleration at fixed coordinates, zero elsewhere, shape
-        (n, 3, N).
-    joints
-        A :class:`~skfem_ancf.dynamics.rates.JointMotions`.
-    """
+    """Functions of time for a block of steps; one row if constant."""
 
     dt: float
-    times: F2
-    factors: F2
-    supports: F3
+    times: F2  # ends of the steps, and instants of their equations of motion, (n, 2)
+    factors: F2  # of the loads, (n, l)
+    supports: F3  # displacement, velocity, acceleration of fixed DOFs, else 0, (n, 3, N)
     joints: JointMotions
 
 
 class Step(NamedTuple):
-    """What of the :class:`StepData` is that of one step, and what else its equations take.
-
-    Attributes
-    ----------
-    dt, t, acting
-        Its size, its end, and when its equation of motion holds.
-    factors, supports, joints
-        As of the StepData, without the first axis.
-    mass_factor, damping_factor, stiffness_factor
-        The iteration matrix is ``mass_factor M + damping_factor D + stiffness_factor K``.
-    constant, kept
-        True if the joints' directions do not depend on the displacement; and nor on time, and the
-        step before has solved with them.
-    """
+    """The data of one step; the iteration matrix is the sum of ``..._factor`` times M, D, K."""
 
     dt: float
-    t: float
-    acting: float
-    factors: np.ndarray
+    t: float  # end of the step
+    acting: float  # instant of the equation of motion
+    factors: np.ndarray  # as in StepData
     supports: np.ndarray
     joints: JointMotion
     mass_factor: float
     damping_factor: float
     stiffness_factor: float
-    constant: bool
-    kept: bool
+    constant: bool  # the joint Jacobian does not depend on the displacement
+    kept: bool  # nor on time, and its solutions of the last step are valid
 
 
 class Vectors(NamedTuple):
-    """Work arrays, all of shape (N,).
+    """Work arrays of shape (N,)."""
 
-    Attributes
-    ----------
-    u, v, guess
-        Displacement and velocity of the iterate, and where it began.
-    base, speed, rest
-        ``u_1 - beta h^2 w_1``, ``v_1 - gamma h w_1``, and the part of the acceleration without w_1.
-    constrained, middle
-        The acceleration constrained by supports; where the tangent is taken.
-    acceleration, residual, du, force, scratch
-        The first four as said; scratch.
-    damping, damping_velocity
-        The damping force, and the velocity that it resists.
-    origin, ahead, straight
-        Where the factors were made, of forces and of the strains at the end, and u at the end with
-        the velocity at the begin.
-    """
-
-    u: F1
-    v: F1
-    guess: F1
-    base: F1
-    speed: F1
-    rest: F1
-    constrained: F1
-    middle: F1
+    u: F1  # displacement of the iterate
+    v: F1  # velocity of the iterate
+    guess: F1  # initial u
+    base: F1  # u_1 - beta h^2 w_1
+    speed: F1  # v_1 - gamma h w_1
+    rest: F1  # acceleration without w_1
+    constrained: F1  # acceleration prescribed by supports
+    middle: F1  # displacement at which the tangent is taken
     acceleration: F1
     residual: F1
-    du: F1
-    force: F1
+    du: F1  # correction
+    force: F1  # internal force
     scratch: F1
-    damping: F1
+    damping: F1  # damping force
     damping_velocity: F1
-    origin: F1
-    ahead: F1
-    straight: F1
+    origin: F1  # displacement of the factors: of forces
+    ahead: F1  # and of the strains at the end
+    straight: F1  # u at the end with the initial velocity
 
 
 class Multipliers(NamedTuple):
-    """Of joints, all of shape (m,).
+    """Arrays of joints, of shape (m,)."""
 
-    Attributes
-    ----------
-    l, dl
-        Multipliers of the iterate, and their correction.
-    phi, impulse
-        How far joints are open, and their impulses.
-    l0, last
-        The multipliers at the begin, and where the step before took them.
-    """
-
-    l: F1
-    dl: F1
-    phi: F1
+    l: F1  # multipliers of the iterate
+    dl: F1  # their correction
+    phi: F1  # constraint residual
     impulse: F1
-    l0: F1
-    last: F1
+    l0: F1  # multipliers at the start
+    last: F1  # multipliers where the last step evaluated them
 
 
 class Work(NamedTuple):
-    """Work arrays.
+    """Work arrays."""
 
-    Attributes
-    ----------
-    y
-        u, v, the acceleration and w at the begin of the step, shape (4, N).
-    x, m
-        As above.
-    J
-        The joints' directions where they act, those at the end of the step, and the solutions with
-        the former, by the factors and by those of the mass, shape (4, m, N); of no joint where they
-        are eliminated.
-    S
-        ``J1 A^-1 J^T``, shape (m, m), or of none.
-    stresses
-        Of all beams: zero, those at the begin, others, carried ones, those of the iterate, and the
-        last two of rates of strains, shape (7, k).
-    """
-
-    y: F2
+    y: F2  # u, v, acceleration and w at the start of the step, (4, N)
     x: Vectors
     m: Multipliers
-    J: F3
-    S: F2
-    stresses: F2
+    J: F3  # Jacobian where joints act, at the end, and solutions by A and M, (4, m, N)
+    S: F2  # J1 A^-1 J^T, (m, m)
+    stresses: F2  # zero; start; work; independent; iterate; the last two of strain rates, (7, k)
 
 
 def new_work(N: int, m: int, stresses: int, dense: int) -> Work:
-    """The :class:`Work` of steps."""
+    """The :class:`Work` of steps; ``dense`` is m, or 0 if joints are eliminated."""
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Multipliers._fields), m))
     return Work(np.zeros((4, N)), Vectors(*x), Multipliers(*shares), np.zeros((4, dense, N)),
                 np.zeros((dense, dense)), np.zeros((7, stresses)))
@@ -215,19 +116,19 @@ def new_work(N: int, m: int, stresses: int, dense: int) -> Work:
 
 @source
 def row_of(x, n):
-    """Of an array that may have one row for all steps."""
+    """Row n, or the only row."""
     return x[n if x.shape[0] > 1 else 0]
 
 
 @source
 def mass_factor(rule, dt):
-    """The factor of the mass in the iteration matrix: da_1 / du_1."""
+    """da_1 / du_1, the factor of M in the iteration matrix."""
     return (1.0 - rule.alpha_m) / ((1.0 - rule.alpha_f) * rule.beta * dt * dt)
 
 
 @source
 def damping_factor(rule, dt):
-    """The factor of the damping in the iteration matrix: that of the velocity by u_1."""
+    """dv / du_1, the factor of D in the iteration matrix."""
     return (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / dt
 
 
@@ -235,7 +136,7 @@ def damping_factor(rule, dt):
 def step_of(joints, rule, course, n):
     """The :class:`Step` number n."""
     c, g = course.joints.c, course.joints.g
-    constant = joints.hk.size == 0 and joints.own == 0
+    constant = joints.hk.size == 0 and joints.custom == 0
     kept = constant and g.shape[0] == 1 and n > 0
     joints_now = JointMotion(row_of(c, n), row_of(g, n), course.joints.drives)
     return Step(course.dt, course.times[n, 0], course.times[n, 1],

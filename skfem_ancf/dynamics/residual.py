@@ -3,9 +3,9 @@
 import numpy as np
 
 from ..core.band import clear, copy, dot, multiply, subtract_rows
-from ..beam.strain_energy import add_force_of, body_carry, body_force, body_mean, body_mixed
+from ..beam.strain_energy import add_force_of, body_force, body_linearised, body_mean, body_mixed
 from ..actions.forces.kernels import add_elastic_force
-from ..core.callbacks import own_joints
+from ..core.callbacks import custom_joints
 from ..core.source import indices, source
 from ..actions.tables import (add_curvature_force, add_joint_force, joint_directions,
                               mean_external_force)
@@ -21,7 +21,7 @@ def kinetic_energy(M, v, scratch):
 
 @source
 def to_middle(rule, w):
-    """Where the tangent and the joints' directions are taken, of the iterate."""
+    """Set the displacement at which tangent and joint Jacobian are taken."""
     u, u0, middle = w.x.u, w.y[0], w.x.middle
     a = 0.5 if rule.conserving > 0 else 0.0
     for i in indices(u.size):
@@ -30,7 +30,7 @@ def to_middle(rule, w):
 
 @source
 def free_velocity(free, rule, s, w):
-    """v_1 of the iterate, without the joints' part."""
+    """v_1 of the iterate without joint impulses."""
     u, v, base, speed = w.x.u, w.x.v, w.x.base, w.x.speed
     c = rule.gamma / (rule.beta * s.dt)
     for i in indices(u.size):
@@ -39,7 +39,7 @@ def free_velocity(free, rule, s, w):
 
 @source
 def to_damping_velocity(free, rule, s, w):
-    """The velocity that damping resists, of the iterate."""
+    """Set the velocity of the damping force."""
     u, u0, v, damping_velocity = w.x.u, w.y[0], w.x.v, w.x.damping_velocity
     free_velocity(free, rule, s, w)
     for i in indices(u.size):
@@ -48,23 +48,23 @@ def to_damping_velocity(free, rule, s, w):
 
 @source
 def internal_force(e, dampers, rule, w, state):
-    """The internal force of the iterate, without damping.
+    """The internal force of the iterate without damping.
 
-    With carried stresses S, what is missing in ``S = D eps(u)`` acts as the factors take it, in the
-    directions of where they were made::
+    In the mixed iteration with independent stresses S, the residual of ``S = D eps(u)`` acts in the
+    directions of the factors::
 
         f = B(u)^T S + B(origin)^T (D eps(u) - S)
 
-    and stresses of the rates of strains likewise.
+    and likewise for viscous stresses.
     """
     u0, u, f, S = w.y[0], w.x.u, w.x.force, w.stresses
-    missing, carried, own, slow, rates = S[2], S[3], S[4], S[5], S[6]
+    missing, independent, constitutive, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state.mixed_steps[0] > 0:
-        body_mixed(e.body, rule.conserving > 0, u0, u, f, carried, own)
+        body_mixed(e.body, rule.conserving > 0, u0, u, f, independent, constitutive)
         for i in indices(missing.size):
-            missing[i] = own[i] - carried[i]
+            missing[i] = constitutive[i] - independent[i]
         if dampers.viscous > 0:
-            body_carry(e.viscous, w.x.middle, w.x.damping_velocity, S[0], rates)
+            body_linearised(e.viscous, w.x.middle, w.x.damping_velocity, S[0], rates)
             add_force_of(e.body, w.x.middle, slow, f)
             for i in indices(missing.size):
                 missing[i] += rates[i] - slow[i]
@@ -77,7 +77,7 @@ def internal_force(e, dampers, rule, w, state):
 
 @source
 def add_elastic(forces, rule, s, w):
-    """Add the force of elements to the internal one: that of the iterate, or its mean."""
+    """Add the force of elements, of the iterate or the mean."""
     u, f = w.x.u, w.x.force
     if rule.conserving > 0:
         add_elastic_force(forces, s.acting, s.dt, w.y[0], u, f)
@@ -87,7 +87,7 @@ def add_elastic(forces, rule, s, w):
 
 @source
 def add_damping_force(e, matrices, s, w, state):
-    """Add the damping force of the iterate to the internal one, which has what is carried."""
+    """Add the damping force; materials are included already in the mixed iteration."""
     d, f = w.x.damping, w.x.force
     damping_beside(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.damping_velocity,
                    state.mixed_steps[0], d, w.x.scratch)
@@ -97,14 +97,14 @@ def add_damping_force(e, matrices, s, w, state):
 
 @source
 def directions(joints, rule, s, w):
-    """The joints' directions where they act, and at the end of the step."""
+    """Set the joint Jacobian where joints act, and at the end of the step."""
     to_middle(rule, w)
     if rule.solver > 0:
         return
-    if joints.own > 0 and rule.conserving > 0:
+    if joints.custom > 0 and rule.conserving > 0:
         flat = w.J[0].reshape(w.J[0].size)
         clear(flat)
-        own_joints(joints.own, np.int64(5), s.acting, w.x.u, w.y[0], flat)
+        custom_joints(joints.custom, np.int64(5), s.acting, w.x.u, w.y[0], flat)
     else:
         joint_directions(joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
     joint_directions(joints, s.joints.g[0], s.t, w.x.u, w.J[1])
@@ -134,14 +134,14 @@ def residual(loads, joints, free, M, rule, s, w):
 def add_impulses(joints, s, w):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, scratch, share, impulse = w.y[1], w.x.v, w.x.scratch, w.m.phi, w.m.impulse
-    if joints.own > 0:
+    if joints.custom > 0:
         n = v.size
         ends = np.empty(3 * n + impulse.size)
         copy(v0, ends[:n])
         copy(v, ends[n:2 * n])
         copy(w.y[0], ends[2 * n:3 * n])
         copy(impulse, ends[3 * n:])
-        own_joints(joints.own, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
+        custom_joints(joints.custom, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
         return
     for i in indices(v.size):
         scratch[i] = v0[i] + v[i]

@@ -1,4 +1,4 @@
-"""A motion on its way: steps, their sizes, instants to store, and what it takes to go on."""
+"""The loop over the steps of a motion: step sizes, breakpoints, events, storage, restart."""
 
 from __future__ import annotations
 
@@ -23,61 +23,45 @@ from .sensors import Recorder, Sensor
 from .stage_integrator import StageIntegrator
 from .stepsize import StepSize
 
-#: Steps of a motion, at most.
+#: Largest number of steps of a motion.
 MAX_STEPS = 10**9
-#: The smallest tolerance of automatic steps.
+#: The smallest tolerance of the automatic step size.
 MIN_RTOL = 1e-12
 EPS = np.finfo(float).eps
-#: Part of a step up to which an instant is interpolated: a step that short is all round-off.
+#: Fraction of a step below which an instant is interpolated; so short a step is all round-off.
 CLOSE = 1e-6
-#: Degrees of freedom times steps of a block: after some hundredths of a second, compiled, and about
-#: a second in NumPy it is to be seen, by a progress bar, and on Ctrl-C.
+#: Degrees of freedom times steps of a block, so that progress bars and Ctrl-C react in time.
 SHOWN = 50_000
-#: Iterations of a step, about, and steps of automatic size in a motion, as many as may be expected.
+#: Expected iterations of a step, and expected number of steps of automatic size.
 ITERATIONS, AUTOMATIC = 3, 1000
-#: The first step of automatic size, over the length of the motion.
+#: The first step of automatic size, over the duration of the motion.
 FIRST = 1e-4
-#: Part of the motion below which a step that fails is not taken again in one half as long.
+#: Smallest automatic step size after failures, over the duration of the motion.
 SHORTEST = 1e-7
-#: Part of a step to which an event is found.
+#: Tolerance of the time of an event, as a fraction of a step.
 EXACT = 1e-10
 
 
 @dataclass
 class Task:
-    """What is asked for.
-
-    Attributes
-    ----------
-    t_start, t_end
-        Times of start and end.
-    dt
-        Step size, or None for an automatic one.
-    tol, rtol
-        Tolerances of the iteration (None: the scheme's), and of the automatic step size.
-    t_eval
-        Times to store, shape (n,), or None for all steps.
-    breakpoints
-        Times inside of the motion at which a step ends and the next starts again.
-    """
+    """Arguments of a time integration."""
 
     t_start: float
     t_end: float
-    dt: float | None = None
-    tol: float | None = None
+    dt: float | None = None  # None: automatic
+    tol: float | None = None  # None: the scheme's
     rtol: float = 1e-5
-    t_eval: Array | None = None
-    breakpoints: tuple[float, ...] = ()
+    t_eval: Array | None = None  # (n,), or None for all steps
+    breakpoints: tuple[float, ...] = ()  # interior ones
 
     @property
     def span(self) -> float:
-        """Length of the motion in time."""
         return self.t_end - self.t_start
 
 
 def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
             breakpoints: Any) -> Task:
-    """What is asked for, checked: arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`."""
+    """Check the arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`."""
     t_start = require_finite_scalar("t_start", t_start)
     t_end = require_finite_scalar("t_end", t_end)
     span = require_positive("t_end - t_start", t_end - t_start)
@@ -105,8 +89,8 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
 
 
 def _require_step(t_start, t_end, step):
-    """Raise InputError where the times of the steps cannot be told apart, or never end."""
-    if step < 1e-100 or t_end > 1e100:  # their squares are in the equations
+    """Raise InputError if round-off cannot resolve the steps, or if there are too many."""
+    if step < 1e-100 or t_end > 1e100:  # their squares must not overflow
         raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
                          f"{t_end!r}")
     if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
@@ -114,29 +98,17 @@ def _require_step(t_start, t_end, step):
                          f"{t_end!r}")
     steps = (t_end - t_start) / step
     if steps > MAX_STEPS:
-        raise InputError(f"dt = {step!r} takes {steps:.3g} steps to t_end = {t_end!r}: more than "
-                         f"{MAX_STEPS:.0e} are not taken")
+        raise InputError(f"dt = {step!r} needs {steps:.3g} steps to t_end = {t_end!r}: the limit "
+                         f"is {MAX_STEPS:.0e}")
 
 
 def integrator_of(system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
-    """What takes the steps of a scheme."""
+    """The integrator for a scheme."""
     return (StageIntegrator if scheme.collocates else Integrator)(system, scheme, tol)
 
 
 class Run:
-    """The loop over steps, so that it can stop after any of them and go on.
-
-    Attributes
-    ----------
-    y : Motion
-        Where the motion is.
-    steps, rejected
-        Steps done, and steps that the automatic size took again.
-    longest
-        Steps of a block at most, or None.
-    event
-        The time at which ``until`` has ended the motion, or None.
-    """
+    """The loop over steps, which can stop after any step and continue from :meth:`arrays`."""
 
     y: Motion
 
@@ -165,7 +137,7 @@ class Run:
 
     def begin(self, u: Array, v: Array, contacts: Array | None = None,
               turns: Array | None = None) -> None:
-        """Begin with a displacement and a velocity."""
+        """Start with a displacement and a velocity."""
         self._sample(u, v, self.task.t_start, True)
         self.y = self._start(u, v, contacts)
         if turns is None or len(turns) != self._turns.number:
@@ -174,7 +146,7 @@ class Run:
         self._store_start()
 
     def go_on(self, y: Motion, arrays: dict[str, Any] | None = None) -> None:
-        """Begin where another run of the same scene was."""
+        """Continue from an instant of another run of the same scene."""
         self.y = replace(y, t=self.task.t_start)
         if arrays is not None:
             self.integrator.load(arrays)
@@ -185,24 +157,24 @@ class Run:
         self._store_start()
 
     def _sample(self, u, v, t, first):
-        """Ask controls whose law is asked now and then, if it is their time."""
+        """Evaluate sampled controllers that are due."""
         s = self.system
         if s.forces.sampled:
             s.forces.sample(s.backend.tables.plain.forces, u, v, t, first)
 
     def _start(self, u, v, contacts):
-        """The Motion where a segment begins."""
+        """The Motion at the start of a segment."""
         step = min(self._size, self._end - self._begun)
         return self.integrator.start(u, v, self._begun, step, contacts=contacts)
 
     def _follow(self, last, y):
-        """Tell a Motion by how much everything has turned, from the angles (k,) before; it."""
+        """Set ``y.turns`` from the previous angles (k,); returns y."""
         y.turns = self._turns.follow(last, y.u[None])[0]
         return y
 
     @property
     def iterations(self) -> float:
-        """Those that are expected of the motion, about."""
+        """Expected number of iterations."""
         task = self.task
         return ITERATIONS * (AUTOMATIC if task.dt is None else task.span / task.dt)
 
@@ -226,17 +198,17 @@ class Run:
         return self.event is not None or (self._last and self.y.t >= self._end)
 
     def _limit(self):
-        """Functions of time are asked before a breakpoint in the steps that end there."""
+        """Set the number of steps of the segment, and the limit of sampling before a breakpoint."""
         near = 16 * ulp(max(abs(self._begun), abs(self._end)))
         self.integrator.limit = np.inf if self._last else self._end - near
         self._count = 0 if self._sizes else max(1, ceil(
             (self._end - self._begun) / self._size * (1 - 1e-12)))
         even = abs(self._begun + self._count * self._size - self._end) < 1e-9 * self._size
-        # the last step may be shorter; the others are of one size, to keep the factors
+        # only the last step may be shorter, so that factors can be reused
         self._whole = self._count if even and self._last else self._count - 1
 
     def _turn(self, y):
-        """Beyond a breakpoint: accelerations and rates are those of what comes."""
+        """Start the next segment after a breakpoint, with new accelerations and rates."""
         self._segment, self._n = self._segment + 1, 0
         self._limit()
         if self._sizes is not None:
@@ -254,7 +226,7 @@ class Run:
     # steps
 
     def advance(self) -> None:
-        """Go on by a step, or by a block of them; raises StepFailed."""
+        """Take a step, or a block of steps; raises StepFailed."""
         if self._sizes is not None:
             self._automatic()
             return
@@ -268,7 +240,7 @@ class Run:
         self._commit(old, new)
 
     def _block(self):
-        """Some steps of one size, :data:`SHOWN` over the number of unknowns or fewer, if any."""
+        """Take a block of steps of one size; False if none succeeded."""
         size = self.integrator.longest
         first = self._n - self._n % size
         block = first, min(first + size, self._whole)
@@ -277,10 +249,10 @@ class Run:
             number = min(number, self.longest - self._n % self.longest)
         try:
             taken = self.integrator.run(self.y, self._size, number, self._begun, self._n, block)
-        except AncfError:  # of a function of the caller's: go on as far as it goes
+        except AncfError:  # from a user's function: continue in single steps
             self._in_blocks = False
             return False
-        if not taken:  # not one of them
+        if not taken:
             return False
         turns = self._turns.follow(self.y.turns, np.array([y.u for y in taken]))
         for new, angles in zip(taken, turns):
@@ -293,14 +265,14 @@ class Run:
         return True
 
     def _automatic(self):
-        """One step of automatic size, or a rejected one."""
+        """Take one step of automatic size, or reject it."""
         y, left = self.y, self._end - self.y.t
         h = self._sizes.cut(y.t, min(self._size, left))
         if left < (1 + 1e-3) * h:
             h = left
         elif left < 2 * h:
             h = 0.5 * left
-        touches = self.system.forces.contacts.obstacles  # when, is found in parts of a step
+        touches = self.system.forces.contacts.obstacles  # halved steps find the time of impact
         try:
             new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
             error = self._sizes.error(self.integrator, y, new, h)
@@ -315,13 +287,13 @@ class Run:
         if not kept:
             self.rejected += 1
             return
-        self._stuck = max(0, self._stuck - 1)  # steps that fail between others that do not
+        self._stuck = max(0, self._stuck - 1)
         if h == left:
             new.t = self._end
         self._commit(y, new)
 
     def _commit(self, old, new):
-        """A step is done."""
+        """Accept a step: find events, pass breakpoints, record and store."""
         self._follow(old.turns, new)
         if self._until is not None:
             new = self._look(old, new)
@@ -331,14 +303,14 @@ class Run:
                 self._look_beyond(new)
         else:
             self._n += 1
-        self.recorder.record([new])  # first: functions of the caller's may end it here
+        self.recorder.record([new])  # first, since users' functions may raise
         self._store(old, new)
         self.y, self.steps = new, self.steps + 1
 
     # events
 
     def _look(self, old, new):
-        """The end of a step, or the instant in it at which the event is."""
+        """The end of a step, or the instant of the event within it."""
         before = self._asked(old) if self._value is None else self._value
         self._value = self._asked(new)
         if before == 0.0 or before * self._value > 0.0:
@@ -350,7 +322,7 @@ class Run:
         return new
 
     def _look_beyond(self, new):
-        """What a breakpoint changes at once is an event there."""
+        """A change of sign at a breakpoint is an event there."""
         before, self._value = self._value, self._asked(new)
         if before * self._value < 0.0:
             self.event = new.t
@@ -368,7 +340,7 @@ class Run:
             self._next = 1
 
     def _store(self, old, new):
-        """Store what was asked for of the step between two Motions."""
+        """Store the instants that were asked for between two Motions."""
         wanted = self.task.t_eval
         if wanted is None:
             self._append(new)
@@ -385,14 +357,14 @@ class Run:
         row = [getattr(y, name) for name in COLUMNS]
         if y.contacts is None:
             row[COLUMNS.index("contacts")] = np.zeros(0)
-        if self.task.t_eval is not None:  # of a block most of which is not stored
+        if self.task.t_eval is not None:  # copy, to free the rest of the block
             row = [np.array(x) for x in row]
         self._stored.append(tuple(row))
 
     def _between(self, old, new, t):
-        """The motion at a time within a step: by a shorter step from the same start.
+        """The motion within a step, by a shorter step from the same start.
 
-        So it has what a step of the scheme keeps: its order, energy and momenta, closed joints.
+        Order, conserved quantities and closed joints are thus those of the scheme.
         """
         h, s = new.t - old.t, (t - old.t) / (new.t - old.t)
         if s > 1.0 - 1e-12:
@@ -414,7 +386,7 @@ class Run:
         return self._follow(old.turns, found)
 
     def columns(self) -> dict[str, Array]:
-        """What was stored, arrays (nt, ...) by the names of what is stored of a Motion."""
+        """The stored arrays (nt, ...) by the names of the attributes of Motion."""
         if self._stored:
             return dict(zip(COLUMNS, map(np.array, zip(*self._stored))))
         return {name: np.zeros((0, *np.shape([] if name == "contacts" else getattr(self.y, name))))
@@ -433,7 +405,7 @@ class Run:
     # checkpoints
 
     def arrays(self) -> dict[str, Any]:
-        """Arrays by name that, with :attr:`y`, make a Run go on exactly."""
+        """Arrays by name from which, with :attr:`y`, a Run continues exactly."""
         found = self.integrator.arrays() | {"size": np.array(self._size)}
         if self._sizes is not None:
             found |= self._sizes.arrays()
@@ -443,7 +415,7 @@ class Run:
         return found
 
     def load(self, y: Motion, arrays: dict[str, Any], columns: dict[str, Array]) -> None:
-        """Go on with what a run had that was stopped."""
+        """Restore a stopped run."""
         self.y = y
         self._stored = list(zip(*(columns[name] for name in COLUMNS)))
         self.integrator.load(arrays)
@@ -457,7 +429,7 @@ class Run:
         self._limit()
         if not self._begun <= y.t <= self._end or self._sizes is None and (
                 abs(self._time(self._n) - y.t) > 1e-9 * self._size):
-            raise CheckpointError(f"the time {y.t} is not that of the step {self._n}")
+            raise CheckpointError(f"the time {y.t} does not belong to the step {self._n}")
 
 
 __all__ = ["Run", "StepFailed", "Task", "integrator_of", "task_of"]

@@ -1,4 +1,4 @@
-"""Sensors: what is written down at every step of a motion, of which few states are stored."""
+"""Sensors: quantities that are recorded at every step."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
 from .base import Motion
 
-#: What is read of the coordinates of many steps at once.
+#: Quantities that are evaluated for many steps at once.
 MOVING = ("position", "displacement", "velocity", "acceleration")
-#: What is read of a section.
+#: Quantities of a section.
 SECTION = ("N", "Q", "M", "force", "curvature", "shear", "angle")
 
 
 class Sensor(Immutable):
-    """What is written down at every step.
+    """A quantity that is recorded at every step.
 
     Parameters
     ----------
     what
         "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress" or
-        another name of :data:`skfem_ancf.recovery.fields.FIELDS` there; "N", "Q", "M", "force",
+        another name of :data:`skfem_ancf.recovery.fields.FIELDS` at points; "N", "Q", "M", "force",
         "curvature", "shear" or "angle" of sections; "joint_force"; or a function of the State that
         returns a number or an array.
     at
-        Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; a joint
-        for its force; None for a function.
+        Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; the joint
+        for "joint_force"; None for a function.
     beam
-        The beam, its name or its number; found if it is not given.
+        The beam, its name or number; searched for by default.
     recover
-        Recovered fields and section forces, which takes about a millisecond a step and beam; by
-        default those of the elements.
+        Use recovered fields and section forces, about a millisecond per step and beam; by default
+        those of the elements.
     line
-        The number of the line, of a frame; found if it is not given.
+        The number of the line, for a frame; searched for by default.
     """
 
     def __init__(self, what: str | Callable[[State], Any], at: Any = None, beam: WhichBeam = None,
@@ -54,7 +54,7 @@ class Sensor(Immutable):
         self.what, self.at, self.beam, self.line = what, at, beam, line
         if callable(what) and not isinstance(what, type):
             if at is not None:
-                raise InputError("a sensor that is a function of the State has no place: leave "
+                raise InputError("a sensor that is a function of the State takes no points: leave "
                                  f"out at=, got {shown(at)}")
             return
         known = (*MOVING, *SECTION, "joint_force", *FIELDS)
@@ -62,14 +62,14 @@ class Sensor(Immutable):
             raise NameUnknown("quantity of a sensor", what, known)
         if what == "joint_force":
             if not isinstance(at, Joint):
-                raise InputError(f'a sensor of "joint_force" is at a joint, as scene.joint gives '
-                                 f"it to scene.joints, got {shown(at)}")
+                raise InputError('a sensor of "joint_force" needs at=joint, one of scene.joints, '
+                                 f"got {shown(at)}")
         elif at is None:
-            raise InputError(f"a sensor of {what!r} is at points of the body: give at=")
+            raise InputError(f"a sensor of {what!r} needs points of the body: give at=")
 
     @property
     def moving(self) -> bool:
-        """True if it is read of the coordinates of many steps at once."""
+        """True if it is evaluated for many steps at once."""
         return self.what in MOVING
 
     def __repr__(self) -> str:
@@ -78,21 +78,21 @@ class Sensor(Immutable):
 
 
 def locate(sensor: Sensor, system: System) -> Located | None:
-    """The points of a sensor in a scene; None if it has none."""
+    """The material points of a sensor in a scene, or None."""
     if callable(sensor.what) or sensor.what == "joint_force":
         return None
     found = system.points.find(sensor.at, sensor.beam, sensor.line, sensor.what not in MOVING)
     if sensor.what in SECTION and len(found.parts) != 1:
-        raise InputError("the points of a sensor of sections must be in one beam: make one for "
-                         "each")
+        raise InputError("the points of a sensor of sections must be in one beam: use one sensor "
+                         "for each beam")
     if sensor.what == "acceleration" and any(part.off_axis for part in found.parts):
-        raise InputError("the acceleration of a cable is known on its axis: off it sections "
-                         "turn with the tangent; put the sensor on the axis")
+        raise InputError("the acceleration of a cable is known on its axis only: put the sensor "
+                         "on the axis")
     return found
 
 
 def _read_steps(sensor, at, steps):
-    """Of one that is read of many steps at once, the values at them, shape (n, ...)."""
+    """Values of a sensor at many steps, shape (n, ...)."""
     u = np.array([y.u for y in steps])
     if sensor.what == "velocity":
         return at.velocity(u, np.array([y.v for y in steps]))
@@ -103,7 +103,7 @@ def _read_steps(sensor, at, steps):
 
 
 def _read(sensor, at, state):
-    """Of another one, the value at a State: a number or an array."""
+    """The value of a sensor at one State."""
     what: Any = sensor.what
     if callable(what):
         return ask_array("the function of a sensor", None, what, state)
@@ -117,14 +117,14 @@ def _read(sensor, at, state):
 
 
 class Readings(dict[str, "Array"]):
-    """What sensors have read: a mapping from their names to arrays (nt, ...).
+    """Readings of sensors: a mapping from names to arrays (nt, ...).
 
     Parameters
     ----------
     t
-        Times of the readings: the start and the end of every step, shape (nt,).
+        Times of the readings, the start and the end of every step, shape (nt,).
     values
-        The arrays by name.
+        Arrays by name.
     """
 
     def __init__(self, t: Array, values: dict[str, Array]) -> None:
@@ -155,7 +155,7 @@ class Readings(dict[str, "Array"]):
 
 
 class Recorder:
-    """Reads the sensors of a run."""
+    """Evaluates the sensors during a run."""
 
     def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
                  state_of: Callable[[Motion], State]) -> None:
@@ -165,7 +165,7 @@ class Recorder:
         self._read: list[list[Array]] = [[] for _ in self.sensors]
 
     def record(self, steps: Sequence[Motion]) -> None:
-        """Read at the ends of steps."""
+        """Evaluate all sensors at the ends of steps."""
         if not self.sensors:
             return
         others = [(sensor, at) for (_, sensor), at in zip(self.sensors, self._located)
@@ -180,7 +180,7 @@ class Recorder:
             read.append(one)
 
     def readings(self) -> Readings:
-        """What was read so far."""
+        """The readings so far."""
         return Readings(np.concatenate([np.zeros(0), *self._t]), {
             name: np.concatenate(read) if read else np.zeros(0)
             for (name, _), read in zip(self.sensors, self._read)})
@@ -188,12 +188,12 @@ class Recorder:
     # checkpoints
 
     def arrays(self) -> dict[str, Array]:
-        """The same as arrays by name, for a checkpoint."""
+        """The readings as arrays by name, for a checkpoint."""
         found = self.readings()
         return {"t": found.t, **{str(k): values for k, values in enumerate(found.values())}}
 
     def load(self, arrays: dict[str, Array]) -> None:
-        """Go on after what :meth:`arrays` gave; raises CheckpointError for other sensors."""
+        """Restore what :meth:`arrays` returned; raises CheckpointError for other sensors."""
         if len(arrays) != len(self.sensors) + 1:
             raise CheckpointError(f"the run had {len(arrays) - 1} sensors, the scene has "
                                   f"{len(self.sensors)}: {[name for name, _ in self.sensors]}")

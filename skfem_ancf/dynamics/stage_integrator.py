@@ -1,4 +1,4 @@
-"""Takes steps of collocation."""
+"""The integrator of collocation schemes."""
 
 from __future__ import annotations
 
@@ -20,15 +20,12 @@ from .stage_records import Interval, new_points
 from .stage_tangent import solve_for
 from .stages import collocate
 
-#: Samples of functions of time in a step: where Chebyshev's polynomials have their extrema.
+#: Samples of functions of time in a step: Chebyshev points.
 SAMPLES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
 
 
 class StageIntegrator(Integrator):
-    """Advances the motion of a system by collocation.
-
-    Parameters and methods are those of :class:`~skfem_ancf.dynamics.integrator.Integrator`.
-    """
+    """Integrates a system by collocation, as an Integrator."""
 
     scheme: Collocation
 
@@ -91,7 +88,7 @@ class StageIntegrator(Integrator):
         return x
 
     def damped(self, du: Array, time: float) -> Array:
-        """The mean of what is left of a change of the displacement while it is damped."""
+        """Average a damped increment over a time span: (M + D time / 2)^-1 M du."""
         s, M = self.system, self.system.mass.band
         A = M._replace(flat=M.flat + 0.5 * time * self._work.D.flat, pivots=M.pivots.copy())
         fix(A, s.constraints.fixed)
@@ -108,5 +105,5 @@ class StageIntegrator(Integrator):
 
 
 def _flat(x):
-    """The instants of all steps in one axis."""
+    """Merge the axes of steps and instants."""
     return np.ascontiguousarray(x).reshape(x.shape[0] * x.shape[1], *x.shape[2:])

@@ -1,4 +1,4 @@
-"""Factors of collocation for each eigenvalue, and what solves with them."""
+"""Factors of collocation for each eigenvalue, and their solutions."""
 
 import numpy as np
 
@@ -15,13 +15,13 @@ from .records import row_of
 
 @source
 def flat_points(x):
-    """The coordinates of all points in one row, a view."""
+    """All points in one row, a view."""
     return shaped(x, (x.size,))
 
 
 @source
 def factorize_stages(e, matrices, method, s, w, state, step):
-    """Factors of the iteration matrices at the mean of the points; False if there are none."""
+    """Factorise the iteration matrices at the mean of the points; False on failure."""
     origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
     at = step * (method.points.size + 1)
     for i in indices(origin.size):
@@ -29,7 +29,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
     for k in range(method.points.size):
         add_multiple(method.weights[k], w.U[k], origin)
     if state.mixed_steps[0] > 0:
-        body_mean_stress(e.body, e.copies, method.weights, w.carried, S[1])
+        body_mean_stress(e.body, e.copies, method.weights, w.independent, S[1])
         body_tangent_by(e.body, origin, S[1], w.B, e.K)
     else:
         body_stress(e.body, w.y[0], S[1])
@@ -70,7 +70,7 @@ def factorize_stages(e, matrices, method, s, w, state, step):
 
 @source
 def _between(w, h, k):
-    """The matrix between the rows beside the band, with the factors for the eigenvalue k."""
+    """Schur complement of the low-rank rows for the eigenvalue k."""
     q, Q, b, m, values = w.q, w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
     for a in range(b):
         for j in range(b):
@@ -89,7 +89,7 @@ def _between(w, h, k):
 
 @source
 def _rows(e, matrices, s, w, at):
-    """The rows beside the band at the mean of the points, and what is between those of no joint."""
+    """Set the low-rank rows at the mean of the points, and the coupling of those of no joint."""
     m, forces, t = w.l.shape[1], e.forces, s.times[at]
     if m > 0:
         joint_directions(e.joints, row_of(s.joints.g, at)[0], t, w.origin, w.J[:m])
@@ -127,7 +127,7 @@ def _stiffen(S, p, z, m, column):
 
 @source
 def solve_for(w, k, x, y):
-    """Solve in place with the factors for the eigenvalue k; y is not touched if that is real."""
+    """Solve in place with the factors of eigenvalue k; y is unchanged if that is real."""
     if w.method.values[1, k] != 0.0:
         solve_complex(w.pairs[k], w.real.width, x, y)
     else:
@@ -136,9 +136,9 @@ def solve_for(w, k, x, y):
 
 @source
 def join(method, s, w, k, r, q, x, y):
-    """Change x + i y, solved with the band for the eigenvalue k, by the rows J beside it.
+    """Correct x + i y, solved with the band, by forces r along the low-rank rows J.
 
-    By forces r along them: with those of joints ``mu / h J x = -gap``, others are ``C J x``.
+    For joints ``mu / h J x = -gap``; the force of other rows is ``C J x``.
     """
     m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
     p, z = method.values[0, k], method.values[1, k]
@@ -170,7 +170,7 @@ def join(method, s, w, k, r, q, x, y):
 def _combine(K, M, D, fixed, c, m, d, out):
     """``c K + m M + d D`` with the supports fixed, the lower half of each column.
 
-    Of a matrix that is not symmetric the mean of both halves: the iteration corrects the rest.
+    Of an unsymmetric K, its symmetric part; the iteration corrects the rest.
     """
     ld, top = K.width + 1 + SPARE, K.top
     n, x, y, z = out.size // ld, K.flat, M.flat, D.flat

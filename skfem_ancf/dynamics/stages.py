@@ -1,16 +1,16 @@
 """Steps of collocation.
 
-With ``A^-1 = T diag(mu) T^-1`` the points of a step fall into systems ``K + mu D / h + mu^2 M /
-h^2`` for each eigenvalue, one for each pair: complex and symmetric, with a positive real part but
-for a factor, so that their factors L D L^T need no exchanges.
+With ``A^-1 = T diag(mu) T^-1`` the points decouple into systems ``K + mu D / h + mu^2 M / h^2``,
+one for each pair of eigenvalues: complex symmetric, with a positive real part up to a factor, so
+that L D L^T factors need no pivoting.
 """
 
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
 from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, body_gradients,
-                                  body_mixed, body_stress, carry_by)
-from ..actions.forces.kernels import add_elastic_force, pace_contact, settle_contact
+                                  body_mixed, body_stress, linearised_by)
+from ..actions.forces.kernels import add_elastic_force, set_contact_rate, settle_contact
 from ..core.source import indices, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, constraint, external_force,
                               joint_directions)
@@ -21,25 +21,25 @@ from .rates import JointMotion, acceleration_of_joints, drive_rate
 from .records import row_of
 from .stage_tangent import factorize_stages, flat_points, join, solve_for
 
-#: Contraction up to which factors are kept, and where stresses are carried: new ones at points
-#: as far apart turn as far from them. For how many steps they are.
-REUSED, CARRIED, LASTING = 0.3, 0.5, 32
-#: Corrections that close joints at the end of a step.
+#: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
+#: steps.
+REUSED, MIXED, LASTING = 0.3, 0.5, 32
+#: Newton corrections of the joints at the end of a step.
 CLOSINGS = 2
 
 
 @source
 def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows):
-    """Take steps from ``w.y`` and ``w.first`` on; returns how many were done.
+    """Take steps from ``w.y`` and ``w.first``; returns how many succeeded.
 
-    Written are of each step the work of damping up to its end and what obstacles keep, (s, 1 + k),
-    u, v and the acceleration, (s, 3, N), the displacements of its points, (s, n, N), and the
-    multipliers of these and at the end, (s, n + 1, m).
+    Written for each step: work of damping and contact history, (s, 1 + k); u, v, acceleration,
+    (s, 3, N); displacements of the points, (s, n, N); multipliers there and at the end, (s, n + 1,
+    m).
     """
     method = w.method
     contacts, taken = e.forces.contacts, np.empty(1)
     if contacts.lasting > 0:
-        pace_contact(e.forces, s.h)
+        set_contact_rate(e.forces, s.h)
     for k in range(rows.shape[0]):
         if k > 0 or s.begun > 0:
             _ahead(method, method.ahead if k > 0 else s.ahead, s.h, state.last_dt[0], w)
@@ -69,7 +69,7 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
 
 @source
 def _converges(e, matrices, method, rule, s, w, state, step):
-    """Iterate to the points of a step: U, V and W are theirs then; False if there are none."""
+    """Iterate to the points of a step, which sets U, V and W; False on failure."""
     n, scratch, status, u0 = method.points.size, w.x[0], GO_ON, w.y[0]
     rates = w.gaps.size > 0 or matrices.dampers.active > 0
     multiply(matrices.M, u0, scratch)
@@ -81,7 +81,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     wanted = rule.tol * np.sqrt(state.energy[0]) + rough
     state.fresh[0], state.correction[0] = 0, -1.0
     if state.mixed_steps[0] > 0:
-        state.factors[0] = 0  # old ones have turned the beam
+        state.factors[0] = 0  # the beam has rotated since
     _start(e, matrices, method, s, w, state, step)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step, rates)
@@ -99,18 +99,18 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if not _correct(e.free, method, s, w, state):
             state.failure[0] = DEPENDENT
             return False
-        status = judged(state, wanted, rough, REUSED, CARRIED, False)
+        status = judged(state, wanted, rough, REUSED, MIXED, False)
         if status == GO_ON and state.fresh[0] > 0 and _is_lost(state):
-            state.mixed_steps[0], status = LASTING, RESTART  # its factors serve
+            state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
             body_gradients(e.body, w.origin, w.B)
         if status == RESTART:
             _start(e, matrices, method, s, w, state, step)
         elif status != GO_ON:
             break
         elif state.mixed_steps[0] > 0:
-            carry_by(e.body, e.copies, w.B, flat_points(w.R), w.own, w.carried)
+            linearised_by(e.body, e.copies, w.B, flat_points(w.R), w.constitutive, w.independent)
             if matrices.dampers.viscous > 0:
-                _carry_rates(e, method, s.h, w)
+                _add_rates(e, method, s.h, w)
     _states(e.free, method, s, w, step, True)
     if status != DONE and status != FAILED:
         state.failure[0] = NOT_CONVERGED
@@ -119,7 +119,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
 
 @source
 def _ahead(method, ahead, h, before, w):
-    """Where the iteration begins: the polynomial of the step before, at this one's points."""
+    """Initial guess: the polynomial of the last step at this one's points."""
     n, u0, v0, u, v = method.points.size, w.y[0], w.y[1], w.before[0], w.before[1]
     for k in range(n):
         guess, c = w.guess[k], h * method.points[k]
@@ -134,7 +134,7 @@ def _ahead(method, ahead, h, before, w):
 
 @source
 def _end(e, matrices, method, s, w, state, step):
-    """The end of the step into ``w.y``, and the work of damping; False if joints are dependent."""
+    """Set the end of the step in ``w.y``, and the work of damping; False for dependent joints."""
     n, dampers, first = method.points.size, matrices.dampers, step * (method.points.size + 1)
     t = s.times[first + n]
     u, v, a, f, scratch = w.y[0], w.y[1], w.y[2], w.x[0], w.x[2]
@@ -162,7 +162,7 @@ def _end(e, matrices, method, s, w, state, step):
         _balance(e, matrices, s, w, first + n)
     if joined:
         acceleration_of_joints(e.joints, motion, t, s.h, u, v, w.shares)
-        if not _meet(matrices.mass, e.free, w, a, not joined):  # J as for the velocity
+        if not _meet(matrices.mass, e.free, w, a, not joined):  # J of the velocity
             return False
         if ends:
             add_multiple(1.0, w.l[n - 1], w.shares)
@@ -173,10 +173,9 @@ def _end(e, matrices, method, s, w, state, step):
 
 @source
 def _balance(e, matrices, s, w, at):
-    """The acceleration at the end of the step by the forces there, without those of joints.
+    """The acceleration at the end of the step by its forces, without joints.
 
-    A method whose last point is the end has it from its points: there errors of the iteration are
-    not multiplied by the stiffness.
+    If the last point is the end, the points give it without amplifying errors by the stiffness.
     """
     u, v, a, f, Q, scratch = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
     constrained, t = row_of(s.constrained, at), s.times[at]
@@ -196,9 +195,9 @@ def _balance(e, matrices, s, w, at):
 
 @source
 def _close(e, matrices, s, w, motion, t, step):
-    """Move u to where joints are closed, the nearest in the norm of the mass, and v with it."""
+    """Project u onto the joints in the mass norm, and v onto their rates."""
     u, v, g, x = w.y[0], w.y[1], motion.g[0], w.x[3]
-    bends = e.joints.hk.size > 0 or e.joints.own > 0  # J depends on u, or on the time
+    bends = e.joints.hk.size > 0 or e.joints.custom > 0  # J depends on u or t
     turns = step == 0 or s.joints.g.shape[0] > 1
     for k in range(CLOSINGS):
         joint_directions(e.joints, g, t, u, w.end[0])
@@ -216,19 +215,16 @@ def _close(e, matrices, s, w, motion, t, step):
 
 @source
 def _meet(mass, free, w, x, anew):
-    """Change x so that J x becomes minus ``w.shares``, which become the multipliers for it.
-
-    Of ``J M^-1`` made anew, or of that of the last time.
-    """
+    """Project x onto J x = -``w.shares``, which become multipliers; J M^-1 is new if ``anew``."""
     J = w.end[0]
     return solve_joined(mass, J, J, free, anew, w.end[1], w.shared, w.shares, x)
 
 
 @source
 def _start(e, matrices, method, s, w, state, step):
-    """Where it begins; with carried stresses by the mean acceleration of the step before.
+    """Set the initial guess; in the mixed iteration from the mean acceleration of the last step.
 
-    A polynomial through points where a stiff beam vibrates leads far away.
+    A polynomial through the vibrations of a stiff beam extrapolates badly.
     """
     for k in range(w.Z.shape[0]):
         copy(w.guess[k], w.Z[k])
@@ -236,7 +232,7 @@ def _start(e, matrices, method, s, w, state, step):
     if state.mixed_steps[0] > 0:
         for k in range(w.R.shape[0]):
             copy(w.y[0], w.R[k])
-        body_stress(e.copies, flat_points(w.R), w.carried)
+        body_stress(e.copies, flat_points(w.R), w.independent)
         if step > 0 or s.begun > 0:
             v0, v = w.y[1], w.before[1]
             for k in range(w.Z.shape[0]):
@@ -247,14 +243,14 @@ def _start(e, matrices, method, s, w, state, step):
 
 @source
 def _is_lost(state):
-    """True if the first correction has more energy than the motion: it would stretch far."""
+    """True if the first correction has more energy than the motion."""
     return (state.mixed_steps[0] == 0 and state.last_correction[0] < 0.0
             and state.correction[0] > np.sqrt(state.energy[0]))
 
 
 @source
 def _states(free, method, s, w, step, rates):
-    """Displacements, accelerations and, if asked for, velocities of the points."""
+    """Set displacements, accelerations and, if ``rates``, velocities of the points."""
     u0, v0, n, N = w.y[0], w.y[1], method.points.size, free.size
     for k in range(n):
         U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
@@ -276,43 +272,42 @@ def _states(free, method, s, w, step, rates):
 
 @source
 def motion_at(joints, k):
-    """The joints' motion at a point."""
+    """The JointMotion at a point."""
     return JointMotion(row_of(joints.c, k), row_of(joints.g, k), joints.drives)
 
 
 @source
 def _internal(e, matrices, w, state):
-    """The internal forces of all points at once, into R; carried stresses are viscous ones too."""
-    U, f, missing, own, carried = flat_points(w.U), flat_points(w.R), w.missing, w.own, w.carried
+    """Internal forces of all points, into R; independent stresses include viscous ones."""
+    U, f, missing, constitutive = flat_points(w.U), flat_points(w.R), w.missing, w.constitutive
+    independent = w.independent
     if state.mixed_steps[0] > 0:
-        body_mixed(e.copies, False, U, U, f, carried, own)
+        body_mixed(e.copies, False, U, U, f, independent, constitutive)
         if matrices.dampers.viscous > 0:
             for k in range(w.U.shape[0]):
-                add_viscous_stress(e.viscous, e.body, e.copies, k, w.U[k], w.V[k], w.stresses, own)
+                add_viscous_stress(e.viscous, e.body, e.copies, k, w.U[k], w.V[k], w.stresses,
+                                   constitutive)
         for i in indices(missing.size):
-            missing[i] = own[i] - carried[i]
+            missing[i] = constitutive[i] - independent[i]
         add_force_by(e.body, e.copies, w.B, missing, f)
     else:
         body_force(e.copies, U, f)
 
 
 @source
-def _carry_rates(e, method, h, w):
-    """Add what the correction R makes of viscous stresses to those that are carried."""
+def _add_rates(e, method, h, w):
+    """Add the change of viscous stresses by the correction R to the independent stresses."""
     dv = w.x[0]
     for k in range(w.R.shape[0]):
         clear(dv)
         for j in range(w.R.shape[0]):
             add_multiple(method.first[k, j] / h, w.R[j], dv)
-        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origin, dv, w.stresses, w.carried)
+        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origin, dv, w.stresses, w.independent)
 
 
 @source
 def _residual(e, matrices, method, s, w, state, step, k):
-    """What is missing in the equation of motion at a point, and in the rates of joints.
-
-    R has the internal force.
-    """
+    """Set R, which has the internal force, to the residual at point k, and the joints' rates."""
     u, v, f, Q, d, scratch = w.U[k], w.V[k], w.R[k], w.x[0], w.x[1], w.x[2]
     at = step * (method.points.size + 1) + k
     t = s.times[at]
@@ -337,9 +332,9 @@ def _residual(e, matrices, method, s, w, state, step, k):
 
 @source
 def _correct(free, method, s, w, state):
-    """Correct Z and the multipliers; R becomes the correction. False if joints are dependent.
+    """Correct Z and the multipliers; R becomes the correction. False for dependent joints.
 
-    The velocities' place is scratch for it.
+    V is used as work array.
     """
     n, N, m, b, work, closing = (method.points.size, free.size, w.l.shape[1], w.J.shape[0], 0.0,
                                  0.0)
@@ -365,7 +360,7 @@ def _correct(free, method, s, w, state):
     for j in range(n):
         Z, R, d, l, share = w.Z[j], w.R[j], D[j], w.l[j], dl[j]
         work += np.dot(d, R)
-        for a in range(m):  # what closes them needs no residual
+        for a in range(m):
             closing += abs(np.dot(w.J[a], d) * share[a])
             l[a] += share[a]
         for i in indices(N):

@@ -1,30 +1,30 @@
-"""Time steps of every scheme.
+"""Time steps of all schemes but collocation.
 
-A step of size h leads from 0 to 1, with eq. (7)-(9) of Arnold and Bruls (2007)::
+A step of size h from 0 to 1 follows eq. (7)-(9) of Arnold and Bruls (2007)::
 
     M a_1 + f(u_1) + d(u_1, v_1) + J^T lambda = Q,   Phi(u_1) = 0
     u_1 = u_0 + h v_0 + h^2 ((1/2 - beta) w_0 + beta w_1)
     v_1 = v_0 + h ((1 - gamma) w_0 + gamma w_1)
     (1 - alpha_m) w_1 + alpha_m w_0 = (1 - alpha_f) a_1 + alpha_f a_0
 
-The energy-momentum scheme solves the same with ``beta = 1/2``, ``gamma = 1`` and no alpha: then
-``w_1`` is the acceleration in the middle of the step, where f and Q are means between 0 and 1, d
-is ``d((u_0 + u_1) / 2, (u_1 - u_0) / h)``, whose work is not negative, and J is that of the middle,
-or what else has ``J (u_1 - u_0) = Phi(u_1) - Phi(u_0)`` where Phi is not quadratic.
+The energy-momentum scheme is the case ``beta = 1/2``, ``gamma = 1``, no alpha: ``w_1`` is the
+acceleration in the middle of the step, f and Q are means over the step, the damping force is
+``d((u_0 + u_1) / 2, (u_1 - u_0) / h)``, whose work is not negative, and J is that of the middle, or
+a discrete gradient with ``J (u_1 - u_0) = Phi(u_1) - Phi(u_0)``.
 """
 
 import numpy as np
 
 from ..core.band import clear, copy, dot, solve_joined, total
-from ..beam.strain_energy import body_carry, body_stress, quadratic
+from ..beam.strain_energy import body_linearised, body_stress, quadratic
 from ..actions.contact.tables import PRESSURES
-from ..actions.forces.kernels import augment_contact, pace_contact
-from ..core.callbacks import own_solve
+from ..actions.forces.kernels import augment_contact, set_contact_rate
+from ..core.callbacks import call_solver
 from ..core.source import indices, source
 from ..actions.tables import constraint
-from .convergence import (AUGMENTED, CARRIED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON,
+from .convergence import (AUGMENTED, MIXED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON,
                           ITERATIONS, LASTING, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
-                          SYMMETRIC, TURNED, UNSETTLED, judged, round_off)
+                          SYMMETRIC, UNSYMMETRIC, UNSETTLED, judged, round_off)
 from .dampers import solve_rows
 from .end_of_step import accelerations, add_work, close_acceleration, end_velocity, finish, settle
 from .records import step_of
@@ -35,16 +35,15 @@ from .tangent import factorize_tangent, factors, tangent
 
 @source
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, works):
-    """Take steps from ``w.y`` and the multipliers in ``w.m`` on; returns how many were done.
+    """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded.
 
-    Written are of each step what obstacles keep, (n, k), u, v, the acceleration and the scheme's
-    acceleration, (n, 4, N), the multipliers at its end and where it took them, (n, 2, m), and the
-    work of damping up to its end, (n,).
+    Written for each step: contact history, (n, k); u, v, a and w, (n, 4, N); multipliers at the end
+    and where they were evaluated, (n, 2, m); work of damping, (n,).
     """
     contacts, taken = e.forces.contacts, np.empty(1)
     for n in range(rows.shape[0]):
         s = step_of(e.joints, rule, data, n)
-        if contacts.lasting >= PRESSURES:  # of several solutions its begin decides
+        if contacts.lasting >= PRESSURES:  # the solution depends on the initial guess
             state.factors[0], state.mixed_steps[0], state.fresh[0] = 0, 0, 0
         status = _iterate(e, matrices, rule, s, w, state)
         if status == DONE:
@@ -75,7 +74,7 @@ def _iterate(e, matrices, rule, s, w, state):
     status, left, most = GO_ON, ITERATIONS, AUGMENTED
     _start(e, w, state)
     if contacts.lasting > 0:
-        pace_contact(e.forces, s.dt)
+        set_contact_rate(e.forces, s.dt)
     while left > 0:
         left, most = left - 1, most - 1
         if state.factors[0] == 0:
@@ -116,7 +115,7 @@ def _iterate(e, matrices, rule, s, w, state):
 
 @source
 def _end(e, matrices, rule, s, w, state):
-    """Velocities, accelerations and multipliers of the last iterate; FAILED if there are none."""
+    """Set velocities, accelerations and multipliers of the last iterate; may be FAILED."""
     joined = w.m.l.size > 0
     if joined and not s.constant:
         directions(e.joints, rule, s, w)
@@ -129,9 +128,9 @@ def _end(e, matrices, rule, s, w, state):
 
 @source
 def _predict(free, M, rule, s, w, state):
-    """What does not depend on u_1, and where its iteration begins: by the acceleration at 0.
+    """Set all that does not depend on u_1, and the initial guess with the acceleration at 0.
 
-    Returns the round-off of a correction, and the size of one that is small enough.
+    Returns the round-off of a correction, and its tolerance.
     """
     h, u, guess, straight = s.dt, w.x.u, w.x.guess, w.x.straight
     base, speed, rest, constrained = w.x.base, w.x.speed, w.x.rest, w.x.constrained
@@ -147,10 +146,10 @@ def _predict(free, M, rule, s, w, state):
         guess[i] = (base[i] + d * a[i]) * free[i] + s.supports[0, i]
         straight[i] = (u0[i] + h * v0[i]) * free[i] + s.supports[0, i]
         u[i] = guess[i]
-    if rule.conserving > 0:  # what the velocity changes by
+    if rule.conserving > 0:  # from the change of velocity
         for i in indices(u.size):
             constrained[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
-    state.fresh[0], state.correction[0] = 0, -max(1.0, state.fresh[0])  # of the last step
+    state.fresh[0], state.correction[0] = 0, -max(1.0, state.fresh[0])
     free_velocity(free, rule, s, w)
     energy = max(state.energy[0], kinetic_energy(M, w.x.v, w.x.scratch))
     noise = 2.0 * abs(kinetic_energy(M, u, w.x.scratch))
@@ -160,17 +159,17 @@ def _predict(free, M, rule, s, w, state):
 
 @source
 def _start(e, w, state):
-    """Where the iteration begins; with carried stresses on a straight way."""
+    """Set the initial guess; in the mixed iteration a straight motion."""
     copy(w.x.straight if state.mixed_steps[0] > 0 else w.x.guess, w.x.u)
     copy(w.m.l0, w.m.l)
-    if state.mixed_steps[0] > 0 and state.factors[0] == 0:  # else those of the step before
+    if state.mixed_steps[0] > 0 and state.factors[0] == 0:  # otherwise those of the last step
         body_stress(e.body, w.y[0], w.stresses[3])
         clear(w.stresses[5])
 
 
 @source
 def _correct(joints, free, matrices, rule, s, w, state, anew):
-    """Correct u and the multipliers; FAILED if these are not determined."""
+    """Correct u and the multipliers; FAILED for dependent joints."""
     u, R, du, scratch = w.x.u, w.x.residual, w.x.du, w.x.scratch
     l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, factors(matrices, state), matrices.rows
     state.iterations[0] += 1
@@ -193,7 +192,7 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
                     out[i] = row[i] * free[i]
                 solve_rows(A, rows, out)
         if rule.solver > 0:
-            good = own_solve(rule.solver, s.t, u, l, R, phi, du, dl)
+            good = call_solver(rule.solver, s.t, u, l, R, phi, du, dl)
         else:
             good = solve_joined(A, w.J[0], w.J[1], free, anew, w.J[2], w.S, dl, du)
         if not good:
@@ -214,33 +213,34 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
 
 @source
 def _judged(e, matrices, s, w, state, wanted, rough):
-    """What the last correction tells, of iterations with carried stresses and without.
+    """Update the independent stresses and decide what to do after the correction.
 
-    A stiff and slender beam turned by old factors is stretched by what they take for bending: its
-    iteration wants ever new ones. Carried stresses, ``S = D (eps(u) + B(origin) du)``, are as far
-    off as the factors have turned, whatever D is.
+    If old factors rotate with respect to a stiff, slender beam, they take axial stretch for
+    bending, and Newton's iteration needs new ones all the time. Independent stresses, ``S = D
+    (eps(u) + B(origin) du)``, have an error of the rotation only, whatever D is.
     """
     du, scratch = w.x.du, w.x.scratch
     if state.mixed_steps[0] > 0:
         for i in indices(du.size):
             scratch[i] = s.stiffness_factor * du[i]
-        body_carry(e.body, w.x.ahead, scratch, w.stresses[4], w.stresses[3])
+        body_linearised(e.body, w.x.ahead, scratch, w.stresses[4], w.stresses[3])
         if matrices.dampers.viscous > 0:
             for i in indices(du.size):
                 scratch[i] = s.damping_factor * du[i]
-            body_carry(e.viscous, w.x.origin, scratch, w.stresses[6], w.stresses[5])
+            body_linearised(e.viscous, w.x.origin, scratch, w.stresses[6], w.stresses[5])
         size, before = state.correction[0], SLOW * state.last_correction[0]
         slow = ROUGH * rough < size and 0.0 < before < size
         if slow and state.fresh[0] > 0 and state.factors[0] == SYMMETRIC:
             state.mixed_steps[0] = 2 * LASTING
-    # where nothing but their place is off, and the last step was an easy one, it has to be good
+    # only the displacement of the factors is wrong, and the last step was easy: require more
     easy = state.last_correction[0] >= -1.0 and state.contraction[0] <= SLOW
-    later = state.factors[0] == TURNED and easy and quadratic(e.body) and _far(matrices.M, s, w)
-    return judged(state, wanted, rough, REUSED, CARRIED if state.fresh[0] > 0 else REUSED, later)
+    later = (state.factors[0] == UNSYMMETRIC and easy and quadratic(e.body)
+             and _far(matrices.M, s, w))
+    return judged(state, wanted, rough, REUSED, MIXED if state.fresh[0] > 0 else REUSED, later)
 
 
 @source
 def _far(M, s, w):
-    """True if a correction is not small against the way of a step, at the speed of its begin."""
+    """True if a correction is large compared with the motion in the step."""
     way = (FAR * s.dt)**2 * kinetic_energy(M, w.y[1], w.x.scratch)
     return kinetic_energy(M, w.x.du, w.x.scratch) > way

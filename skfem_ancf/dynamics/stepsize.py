@@ -1,4 +1,4 @@
-"""The automatic step size: what a step adds to the error, and events ahead."""
+"""Automatic step size."""
 
 from __future__ import annotations
 
@@ -13,32 +13,30 @@ from .base import Motion, Scheme, stored
 from .course import Lookahead
 from .integrator import Integrator
 
-#: The largest error of a point's displacement, over the root of the mean square that is added up:
-#: a tip moves twice as far as the mean, and errors grow on their way.
+#: Largest error of a point over the root mean square: the tip of a cantilever moves twice as far as
+#: the mean, and errors grow with time.
 LARGEST = 3.0
-#: Part of ``rtol`` that a single step may add.
+#: Fraction of ``rtol`` that a single step may add.
 SINGLE = 0.1
-#: Error, relative to its share, above which a step is taken again.
+#: Relative error above which a step is repeated.
 REJECTED = 1.2
-#: Growth of the step below which it keeps its size, and with it the factors.
+#: Growth of the step size below which the size, and the factors, stay.
 WORTH = 1.3
 
 
 class StepSize:
-    """Chooses steps so that no point is off by more than about ``rtol`` times the scene's size.
+    """Chooses steps so that the error of every point is about ``rtol`` times the size of the scene.
 
-    The error that a step adds may be its share of ``rtol``, in proportion to its size: error per
-    unit step. Errors are added up as root mean squares over the mass, and the largest of a point
-    is taken as :data:`LARGEST` times that. Of what a scheme estimates some things are taken out,
-    since they do not add up:
+    A step may add an error in proportion to its size (error per unit step). The error is a root
+    mean square weighted by mass, times :data:`LARGEST`. Parts of the estimate that do not
+    accumulate are removed:
 
-    * what supports undo, and joints but for that of a single step,
+    * what supports and joints undo (a single step counts in full),
     * what the step does not resolve, by the iteration matrix as a filter,
-    * what is damped away, by collocation,
-    * in schemes of second order, whose steps are short enough to follow a blow, vibrations whose
-      phase is lost within the motion whatever the tolerance asks, by two averages over the time W
-      in which they turn: after the time T a vibration of the frequency w has lost the phase
-      C w^3 dt^2 T, so W = (C dt^2 T)^(1 / 3) / 2. Steps of higher order are longer than W.
+    * what is damped, in collocation,
+    * in schemes of second order, vibrations whose phase is lost anyway, by two running averages
+      over the time W. After the time T a vibration of frequency w has the phase error C w^3 dt^2 T,
+      so W = (C dt^2 T)^(1 / 3) / 2.
 
     References
     ----------
@@ -50,8 +48,8 @@ class StepSize:
     def __init__(self, system: System, scheme: Scheme, rtol: float, t_start: float,
                  t_end: float) -> None:
         if not scheme.adaptive:
-            raise InputError(f"{scheme!r} does not estimate its error: give the step size dt, or "
-                             "take one of the package's schemes with dt='auto', all of which do")
+            raise InputError(f"{scheme!r} does not estimate its error: give a step size dt, or use "
+                             "a scheme of the package, all of which support dt='auto'")
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span, self._averaged = t_end - t_start, scheme.order <= 2
         self._mass = sum(b.total_mass for b in system.members)
@@ -63,7 +61,7 @@ class StepSize:
                 / (self.system.size * self.rtol))
 
     def error(self, integrator: Integrator, old: Motion, new: Motion, dt: float) -> float:
-        """What a step adds to the error, over what it may add."""
+        """The error that a step adds, over what it may add."""
         de = self.scheme.local_error(old, new, dt) * self.system.constraints.free
         for _ in range(self.scheme.filtered):
             de = self.scheme.resolved(integrator, de)
@@ -80,7 +78,7 @@ class StepSize:
             self._size(rate) * dt**(power - 1) * self.span, self._size(de) / SINGLE)
 
     def _free(self, y, de):
-        """What of a change of the displacement joints do not undo."""
+        """The increment after projection onto the joints."""
         s = self.system
         if not s.constraints.m or s.mass_solver.by_nodes:
             return de
@@ -88,11 +86,11 @@ class StepSize:
         return de + s.mass_solver(y.u, y.t, J)(np.zeros(s.N), -(J @ de))[0]
 
     def begin(self) -> None:
-        """Forget what was: at the start, and after a breakpoint."""
+        """Reset, at the start and after a breakpoint."""
         self._averages = np.zeros_like(self._averages)
 
     def next(self, error: float, dt: float, size: float) -> tuple[float, bool]:
-        """Size of the next step after one of dt, and whether this one is to be kept."""
+        """The next step size, and whether to accept the last step of size dt."""
         factor = 0.9 * max(error, 1e-300) ** (-1.0 / self.scheme.order)
         if error > REJECTED and dt > 1e-9 * self.span:
             return dt * max(0.2, min(0.8, factor)), False
@@ -104,9 +102,9 @@ class StepSize:
         return (max(size, new) if dt < 0.99 * size and factor >= 1.0 else new), True
 
     def arrays(self) -> dict[str, Array]:
-        """Arrays by name from which :meth:`load` goes on as if there had been no break."""
+        """Arrays for a checkpoint."""
         return {"averages": self._averages}
 
     def load(self, arrays: dict[str, Any]) -> None:
-        """Go on with what :meth:`arrays` gave."""
+        """Restore what :meth:`arrays` returned."""
         self._averages = stored(arrays, "averages", self._averages)

@@ -3,23 +3,23 @@
 import numpy as np
 
 from ..core.band import add_halves, add_multiple, clear, copy, factorize, fix
-from ..beam.strain_energy import add_turned, body_carry, body_stress, body_tangent
+from ..beam.strain_energy import add_unsymmetric, body_linearised, body_stress, body_tangent
 from ..actions.forces.kernels import (add_contact_tangent, add_rubbing_tangent, element_stiffness,
                                       put_between)
-from ..core.callbacks import own_solve
+from ..core.callbacks import call_solver
 from ..core.source import indices, source
 from ..actions.tables import add_load_stiffness, add_products
-from .convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, TURNED
+from .convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
 from .dampers import add_damping, factorize_rows
 from .residual import to_damping_velocity, to_middle
 
 
 @source
 def tangent(e, matrices, rule, s, w, state):
-    """The iteration matrix, with the stresses at the begin of the step, or means that are carried.
+    """Assemble the iteration matrix, with the stresses at the start, or mean independent stresses.
 
-    Those of an iterate may be far off: turning by a straight predictor stretches; and so may be
-    those that are carried to the end of the step, where stretching is not resolved.
+    Stresses of an iterate may be far off: a straight prediction of a rotation stretches the beam.
+    So may be independent stresses at the end of a step that does not resolve axial vibrations.
     """
     M, A, dampers, yes = matrices.M.flat, matrices.A.flat, matrices.dampers, w.x.u.size > 0
     stresses = w.stresses
@@ -29,7 +29,7 @@ def tangent(e, matrices, rule, s, w, state):
     else:
         body_stress(e.body, w.y[0], stresses[1])
         if dampers.viscous > 0:
-            body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
+            body_linearised(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
     to_middle(rule, w)
     copy(w.x.middle, w.x.origin)
     copy(w.x.middle, w.x.ahead)
@@ -49,7 +49,7 @@ def tangent(e, matrices, rule, s, w, state):
 
 @source
 def _add_elements(forces, matrices, s, w):
-    """Add the derivatives of force elements to the band, and to what is beside it."""
+    """Add the derivatives of force elements to the band and the low-rank rows."""
     if forces.start.size > 0:
         D = np.empty(forces.size)
         element_stiffness(forces, s.acting, w.x.middle, w.y[1],
@@ -61,7 +61,7 @@ def _add_elements(forces, matrices, s, w):
 
 @source
 def _add_obstacles(e, matrices, rule, s, w):
-    """Add the derivatives of contact to the band: of the iterate, as its velocity is."""
+    """Add the derivatives of contact at the iterate."""
     u, u0 = w.x.u, w.y[0]
     if rule.conserving > 0:
         add_contact_tangent(e.forces, s.acting, s.dt, u0, u, matrices.A)
@@ -75,31 +75,31 @@ def _add_obstacles(e, matrices, rule, s, w):
 
 @source
 def factors(matrices, state):
-    """The matrix that has the factors."""
-    return matrices.U if state.factors[0] == TURNED else matrices.A
+    """The factorised matrix."""
+    return matrices.U if state.factors[0] == UNSYMMETRIC else matrices.A
 
 
 @source
-def turning(matrices, state):
-    """True if the next factors are those of the matrix that is not symmetric."""
+def use_unsymmetric(matrices, state):
+    """True if the next factors are those of the unsymmetric matrix."""
     return state.mixed_steps[0] > LASTING and matrices.U.flat.size > 0
 
 
 @source
 def factorize_tangent(e, matrices, rule, s, w, state):
-    """Factors of the iteration matrix; False if it has none."""
+    """Factorise the iteration matrix; False on failure."""
     fix(matrices.A, e.fixed)
     state.factorizations[0] += 1
     state.factors[0] = SYMMETRIC
-    if rule.solver > 0:  # asked without a right-hand side: with what multipliers do at u
+    if rule.solver > 0:  # without right-hand side: factorise
         l, dl, none = w.m.l, w.m.dl, w.x.du[:0]
         for k in indices(l.size):
             dl[k] = s.stiffness_factor * l[k]
-        good = own_solve(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
+        good = call_solver(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:
-        if turning(matrices, state):
-            _turn(e, matrices, s, w)
-            state.factors[0] = TURNED
+        if use_unsymmetric(matrices, state):
+            _unsymmetric_tangent(e, matrices, s, w)
+            state.factors[0] = UNSYMMETRIC
         good = factorize(factors(matrices, state))
     if not good:
         state.factors[0], state.failure[0] = 0, SINGULAR
@@ -111,17 +111,16 @@ def factorize_tangent(e, matrices, rule, s, w, state):
 
 
 @source
-def _turn(e, matrices, s, w):
-    """The iteration matrix with the strains' derivatives at the end of the step, into U.
+def _unsymmetric_tangent(e, matrices, s, w):
+    """Set U, the iteration matrix with the strain derivatives at the end of the step.
 
-    A force in the middle ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. For A, which has
-    B(u_m) in place of B(u_1), both must be close: they are not where more strains are sampled than
-    the axis of a straight beam can stretch, as of cables of degree 5 and more, and what bends it
-    must undo the rest. Then the iteration by A contracts slowly, or not at all.
+    A mean force ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. A has B(u_m) instead of
+    B(u_1). They differ if more strains are sampled than the stretch of a straight axis can satisfy,
+    as in cables of degree 5 and above: then the iteration with A converges slowly or not at all.
     """
     U = matrices.U
     copy(w.x.u, w.x.ahead)
     clear(U.flat)
-    add_turned(e.body, w.x.middle, w.x.ahead, U)
+    add_unsymmetric(e.body, w.x.middle, w.x.ahead, U)
     add_halves(matrices.A, s.stiffness_factor, U)
     fix(U, e.fixed)

@@ -1,1 +1,1 @@
-"""The equations of a scene, and how they are solved."""
+"""The discrete equations of a scene and their linear solvers."""

@@ -1,4 +1,4 @@
-"""Where kernels run: in plain NumPy, or compiled where that pays."""
+"""The choice between NumPy and compiled kernels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.kernels.law import OWN
+from ..beam.kernels.law import CUSTOM
 from ..core import code_cache
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, expected, wanted
@@ -20,28 +20,27 @@ from .tables import Tables
 
 logger = logging.getLogger(__name__)
 
-#: What this process has compiled or loaded: functions by their names, and parts that they call.
+#: Compiled functions and parts of this process by name.
 LOADED: dict[str, Any] = {}
-#: What functions call by its address.
+#: Parts that are called by address.
 PARTS = "StrainTables", "elements", "contacts"
-#: Why Numba cannot be used though it is installed.
+#: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
-#: Seconds that compiling takes, about: kernels, force elements and contact, each if a scene has it,
-#: and what calls them; and loading what lies on disk.
+#: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
 COMPILING = {"StrainTables": 24.0, "elements": 3.0, "contacts": 12.0,
              "equilibrium": 14.0, "steps": 27.0, "evaluate": 2.0}
-#: The same for what is compiled where it is used, not beforehand.
+#: The same for functions that are compiled on first use only.
 WHERE_USED = {"collocate": 25.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
-#: Seconds that NumPy takes for an iteration, about, and what an element and a point of contact add.
+#: Approximate seconds of an iteration in NumPy, and of each element and point of contact in it.
 ITERATION, ELEMENT, POINT = 1e-3, 1.2e-5, 4e-6
-#: How many tasks of one size code that is kept on disk is assumed to serve.
+#: Number of equal tasks over which compiling should pay.
 SERVES = 5
 
 
 class Choice(NamedTuple):
-    """Which way a kernel runs, "plain", "loaded" or "compiled", and why."""
+    """"plain", "loaded" or "compiled", and the reason."""
 
     way: str
     reason: str
@@ -53,21 +52,10 @@ _IS_LOADED = Choice("loaded", "compiled code is loaded")
 class Backend:
     """Runs the kernels of a system.
 
-    The size of the task decides, which is known before it starts: the iterations that are expected
-    (:func:`~skfem_ancf.core.switch.expecting`), the elements, and the points of contact. What is
-    compiled already in this process is used at once. What lies on disk is loaded for a task for
-    which NumPy would take longer than loading takes. What has to be compiled first is compiled, and
-    kept on disk, for a task that pays for it in :data:`SERVES` runs.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-
-    Attributes
-    ----------
-    tables : Tables
-        The equations.
+    The choice depends on the size of the task before it starts: expected iterations
+    (:func:`~skfem_ancf.core.switch.expecting`), elements, and points of contact. Functions that are
+    loaded are used. Cached ones are loaded if NumPy would take longer than loading. Others are
+    compiled if that pays in :data:`SERVES` runs.
     """
 
     def __init__(self, system: Any) -> None:
@@ -77,11 +65,11 @@ class Backend:
         self._flat: tuple[Any, list[Any]] | None = None
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
-        elif system.forces.contacts.own:
-            self._plain = "a user-defined distance: SignedDistance"
-        elif any(pack.law.kind == OWN
+        elif system.forces.contacts.custom:
+            self._plain = "a user-defined distance (SignedDistance)"
+        elif any(pack.law.kind == CUSTOM
                  for pack in self.tables.plain.body.packs):
-            self._plain = ("a user-defined law in Python, where a "
+            self._plain = ("a user-defined law in Python; a "
                            "skfem_ancf.materials.PointwiseMaterial is compiled")
 
     @property
@@ -92,33 +80,21 @@ class Backend:
 
     @cached_property
     def linearised(self) -> Backend | None:
-        """What runs the kernels for :attr:`Tables.linearised`; None if the laws are linear."""
+        """The backend for :attr:`Tables.linearised`, or None."""
         tables = self.tables.linearised
         if tables is None:
             return None
         return self.with_tables(tables)
 
     def with_tables(self, tables: Tables) -> Backend:
-        """The same for other tables of the system, with its work arrays.
-
-        Parameters
-        ----------
-        tables
-            In place of its own.
-        """
+        """A copy for other tables, with the same work arrays."""
         backend = copy(self)
         backend.tables, backend._flat = tables, None
         vars(backend).pop("linearised", None)
         return backend
 
     def choose(self, name: str) -> Choice:
-        """The way of a kernel for the next call.
-
-        Parameters
-        ----------
-        name
-            A key of :data:`COMPILING`.
-        """
+        """The choice for the next call of a kernel, by its name."""
         choice = self._chosen(name)
         return choice if self._plain is None else Choice("plain", self._plain)
 
@@ -131,14 +107,14 @@ class Backend:
         if wanted() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == ["evaluate"]:
-            return Choice("compiled", "what it calls is loaded")
+            return Choice("compiled", "its parts are loaded")
         work = self.seconds(expected())
         if work < LOADING:
             return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, loading "
-                          f"compiled code {LOADING:g} s and more")
+                          f"compiled code at least {LOADING:g} s")
         missing = [part for part in missing if not code_cache.on_disk(part)]
         if not missing:
-            return Choice("compiled", f"compiled code lies on disk, NumPy would take about "
+            return Choice("compiled", f"compiled code is on disk, NumPy would take about "
                           f"{work:.2g} s for {_iterations()}")
         seconds, times = compiling(missing), SERVES if code_cache.can_keep() else 1
         if times * work >= seconds:
@@ -149,52 +125,32 @@ class Backend:
                       "skfem_ancf.equations.compile does it beforehand")
 
     def _missing(self, name):
-        """What of a kernel and of what it calls this process has not loaded."""
+        """Names of a kernel and its parts that are not loaded."""
         missing = [part for part in self.tables.parts if part not in LOADED]
         return missing if name in LOADED else [*missing, name]
 
     def seconds(self, iterations: float) -> float:
-        """How long NumPy takes for so many iterations, about.
-
-        Parameters
-        ----------
-        iterations
-            Their number.
-        """
+        """Approximate seconds of NumPy for a number of iterations."""
         system = self.tables.system
         elements = sum(beam.mesh.nelements for beam in system.beams)
         points = sum(len(group.first) for _, group in system.forces.contacts.groups)
         return iterations * (ITERATION + ELEMENT * elements + POINT * points)
 
     def workspace(self, make: Callable, *sizes: int) -> Any:
-        """Work arrays of a kernel, made once.
-
-        Parameters
-        ----------
-        make
-            A function of :class:`~skfem_ancf.equations.Equations` and the sizes.
-        *sizes
-            Numbers that the arrays depend on.
-        """
+        """Work arrays of a kernel, made once by ``make(equations, *sizes)``."""
         if make.__name__ not in self._workspaces:
             self._workspaces[make.__name__] = make(self.tables.plain, *sizes)
         return self._workspaces[make.__name__]
 
     def of(self, kernel: Callable) -> Callable:
-        """The function of a kernel for its equations, plain or compiled: it takes all but these.
-
-        Parameters
-        ----------
-        kernel
-            Its first argument takes the equations.
-        """
+        """A kernel bound to the equations, its first argument, in NumPy or compiled."""
         if self.choose(kernel.__name__).way == "plain":
             return self._in_numpy(kernel)
 
         def run(*args):
             try:
                 function, equations = self._load(kernel, args)
-            except Exception as error:  # of a user's function, or of a Numba that is not as known
+            except Exception as error:  # a user's function, or an incompatible Numba
                 self._give_up(kernel, error)
                 return self._in_numpy(kernel)(*args)
             return function(equations, *args)
@@ -212,13 +168,13 @@ class Backend:
 
     def _in_numpy(self, kernel):
         def run(*args):
-            with np.errstate(all="ignore"):  # what overflows is seen in the residual
+            with np.errstate(all="ignore"):  # overflow shows in the residual
                 return kernel(self.tables.plain, *args)
 
         return run
 
     def _load(self, kernel, args):
-        """The compiled function and the equations that it takes; says so where that takes long."""
+        """The compiled function and its equations; announces long compilations."""
         name = kernel.__name__
         if self._flat is None or name not in LOADED:
             from ..core.jit import entry
@@ -237,13 +193,7 @@ class Backend:
 
 
 def load_part(name: str, update: Callable[[str], None]) -> None:
-    """Compile one of :data:`PARTS`, or take it from disk.
-
-    Parameters
-    ----------
-    name, update
-        Of the part, and what is called with it then.
-    """
+    """Compile one of :data:`PARTS` or load it; calls ``update(name)``."""
     from . import loops
 
     if name not in LOADED:
@@ -253,13 +203,7 @@ def load_part(name: str, update: Callable[[str], None]) -> None:
 
 
 def compiling(names: Iterable[str]) -> float:
-    """Seconds that compiling takes, about.
-
-    Parameters
-    ----------
-    names
-        Keys of :data:`SECONDS`: kernels and what they call.
-    """
+    """Approximate seconds for compiling names of :data:`SECONDS`."""
     return sum(SECONDS[name] for name in names)
 
 
@@ -270,30 +214,22 @@ def _iterations():
 
 #: One thread at a time compiles.
 _LOCK = RLock()
-#: True while it is said that something is compiled.
+#: True while a compilation is announced.
 _announced = False
 
 
 @contextmanager
 def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
-    """Say on stderr what is compiled, about how long it takes, and how far it is.
+    """Announce on stderr what is compiled and for how long, with progress; not for cached names.
 
-    Parameters
-    ----------
-    names
-        Keys of :data:`SECONDS`. Of those on disk nothing is said.
-
-    Yields
-    ------
-    function
-        Of the name of what is done.
+    Yields a function that takes the name of a finished part.
     """
     global _announced
     names = {name for name in names if not code_cache.on_disk(name)}
     if not names or _announced:
         yield _nothing
         return
-    said = (f"compiling once, about {compiling(names):.2g} s, kept in {code_cache.folder()}"
+    said = (f"compiling once, about {compiling(names):.2g} s, cached in {code_cache.folder()}"
             if code_cache.can_keep() else f"compiling, about {compiling(names):.2g} s")
     logger.info("%s: %s", ", ".join(sorted(names)), said)
     _announced = True
@@ -309,5 +245,5 @@ def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
         _announced = False
 
 
-def _nothing(name):
-    """Nothing is said."""
+def _nothing(name):  # no announcement
+    pass

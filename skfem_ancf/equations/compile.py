@@ -1,4 +1,4 @@
-"""Compile everything and keep it on disk: ``python -m skfem_ancf.equations.compile``."""
+"""Compile all kernels and cache them on disk: ``python -m skfem_ancf.equations.compile``."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ from ..core.switch import VARIABLE, compiled_off
 
 
 def main() -> None:
-    """Solve a small scene in statics and in time, compiled: its types are those of every scene."""
+    """Solve a small scene in statics and in time; its types are those of every scene."""
     os.environ[VARIABLE] = "1"
     import numpy as np
 

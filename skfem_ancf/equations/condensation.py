@@ -1,12 +1,11 @@
-"""Static condensation: members of a frame are condensed to their ends, those to the nodes.
+"""Static condensation of frames: members are condensed to their ends, ends to the nodes.
 
-An end has the unknowns of its node, x, y and the rotation of the section, and unknowns of its own:
-the stretch of the section's direction, and what an element has besides. In the frame of its
-direction the first three are those of the node, up to the residual of the node's equations.
-So no multiplier is unknown: they are the forces left at the ends.
+An end shares x, y and the rotation of the section with its node; its other unknowns, such as the
+stretch of the section's direction, are eliminated. In a frame along this direction the shared
+unknowns are those of the node plus the residual of the joint equations. Multipliers are therefore
+not unknowns: they are the residual forces at the ends.
 
-Statics, modes and motions use the same factors. In a motion kernels ask for them by a handle, see
-:mod:`skfem_ancf.core.callbacks`.
+Statics, modes and time integration use the same factors.
 """
 
 from __future__ import annotations
@@ -28,64 +27,47 @@ logger = logging.getLogger(__name__)
 
 #: A pivot that small beside the diagonal is round-off.
 LOST = 1e-13
-#: Unknowns that an end shares with its node.
+#: Number of unknowns that an end shares with its node.
 SHARED = 3
-#: Members whose matrices are made at once, so that what they are made of takes little memory.
+#: Number of members that are assembled together, to limit the memory.
 CHUNK = 1024
-#: Contraction of a refinement and what round-off may leave, up to which factors are kept; the same
-#: of new ones.
-KEPT, NEW = (0.05, 1e-12), (0.5, 1e-6)
-#: Length of a refinement at most, and its accuracy.
+#: Largest contraction and largest residual of a refinement with old factors, and with new ones.
+OLD, NEW = (0.05, 1e-12), (0.5, 1e-6)
+#: Largest number of refinements, and their accuracy.
 REFINEMENTS, EXACT = 50, 1e-14
 #: What is left of the equations, over their right side, where nothing can be refined.
 ROUND_OFF = 1e-12
-#: Corrections where more iterations follow.
+#: Number of refinements within an iteration.
 ROUGHLY = 2
 
 
 class Group(NamedTuple):
-    """Chains of one beam with equally many elements, at most :data:`CHUNK`.
+    """At most :data:`CHUNK` members of one beam with equally many elements."""
 
-    Attributes
-    ----------
-    members
-        Their numbers among the chains of all beams, shape (M,).
-    first
-        First coordinate of each, shape (M,).
-    nd, elements
-        Coordinates of a node, elements of a chain.
-    """
-
-    members: Array
-    first: Array
-    nd: int
-    elements: int
+    members: Array  # numbers among the members of all beams, (M,)
+    first: Array  # first DOF of each, (M,)
+    nd: int  # DOFs of a node
+    elements: int  # elements of a member
 
     @property
     def ends(self) -> Array:
-        """Numbers of the starts and the ends of the chains, shape (2, M)."""
+        """Numbers of the first and last ends, shape (2, M)."""
         return 2 * self.members + np.array([[0], [1]])
 
     @property
     def places(self) -> Array:
-        """Numbers of the coordinates of each chain, shape (M, (elements + 1) nd)."""
+        """DOFs of each member, shape (M, (elements + 1) nd)."""
         return self.first[:, None] + np.arange((self.elements + 1) * self.nd)
 
     @property
     def end_places(self) -> Array:
-        """The same of their first and last nodes, shape (M, 2 nd)."""
+        """DOFs of the first and last nodes, shape (M, 2 nd)."""
         return self.first[:, None] + np.append(*np.arange(self.nd) + [
             [0], [self.elements * self.nd]])
 
 
 def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
-    """The chains of all beams in groups.
-
-    Parameters
-    ----------
-    beams, slices
-        The beams, and the coordinates of each.
-    """
+    """Group the members of all beams, whose DOFs are the slices."""
     out, number = [], 0
     for beam, s in zip(beams, slices):
         first, last = chain_ends(beam).T
@@ -98,31 +80,11 @@ def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
 
 
 class Condensed:
-    """Factors of ``[K + sum l H, J^T; J, 0]`` of a frame.
+    """Factors of ``[K + sum l H, J^T; J, 0]`` of a frame, J and H the joints' derivatives.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System` of a frame that can be condensed.
-    K
-        The matrix of the beams, which is filled before :meth:`factorize`.
-
-    Other Parameters
-    ----------------
-    u, t, multipliers
-        Where the joints are linearised: displacement (N,), time, multipliers (m,).
-    b, R, phi
-        Right-hand sides: forces (N,), and what the equations of the nodes should change by, (m,);
-        or columns of them, which together take half as long.
-    du, dm
-        Take the solution, shapes (N,) and (m,).
-
-    Attributes
-    ----------
-    size : int
-        Unknowns of the nodes.
-    at : tuple of ndarray
-        Displacement (N,) and multipliers (m,) at which it was factorised.
+    K is the matrix of the beams, which is assembled before :meth:`factorize`. ``size`` is the
+    number of unknowns of the nodes; ``at`` are the displacement (N,) and multipliers (m,) of the
+    factors.
     """
 
     def __init__(self, system: Any, K: BandMatrix) -> None:
@@ -135,17 +97,17 @@ class Condensed:
         number = np.empty(unknown.shape, dtype=np.int64)
         number[order] = np.cumsum(unknown[order]).reshape(-1, 3) - 1
         self.size = int(np.sum(unknown))
-        # unknown of each end's x, y and rotation; one behind the last where there is none
+        # unknowns of x, y and rotation of each end; `size` stands for none
         unknowns = np.where(unknown, number, self.size)[nodes.nodes]
         unknowns[nodes.hinged, 2] = self.size
         at = unknowns.reshape(-1, 6)
         i, j = (np.broadcast_to(x, (len(at), 6, 6)).ravel() for x in (at[:, :, None], at[:, None]))
         self._inside = np.flatnonzero((i < self.size) & (j < self.size))
-        #: where the entries of the members go in the matrix of the nodes
+        #: rows and columns of the members' entries in the matrix of the nodes
         self._entries = tuple(x[self._inside].astype(np.int32) for x in (i, j))
         self._moves = _Moves(nodes)
         rows = np.flatnonzero(at < self.size)
-        #: displacements of the ends by those of the nodes
+        #: displacements of the ends from those of the nodes
         self._follow = sparse.csr_array((np.ones(len(rows)), (rows, at.ravel()[rows])),
                                         (at.size, self.size))
         self._gather = self._follow.T.tocsr()
@@ -158,11 +120,11 @@ class Condensed:
         return self._nodes is not None
 
     def forget(self) -> None:
-        """Have no factors."""
+        """Discard the factors."""
         self._parts, self._nodes = [], None
 
     def _unknown(self):
-        """Whether x, y and the rotation of a node are unknown, (number, 3)."""
+        """Whether x, y and the rotation of a node are unknowns, (number, 3)."""
         out = ~self.nodes.held
         out[np.setdiff1d(np.arange(len(out)), self.nodes.nodes)] = False  # no line ends there
         rigid = np.zeros(len(out), dtype=bool)
@@ -173,7 +135,7 @@ class Condensed:
     # factors
 
     def factorize(self, u: Array, multipliers: Array) -> None:
-        """Factorise what the matrix holds; of one that is not symmetric its symmetric part.
+        """Factorise at a displacement (N,) and multipliers (m,), with the symmetric part of K.
 
         Raises
         ------
@@ -188,13 +150,13 @@ class Condensed:
         S, self._parts, self._nodes = np.empty((len(hinged), 6, 6)), [], None  # no two at once
         for group, bases in zip(self.groups, self._bases):
             self._parts.append(_Part(group, K, bases, turns, moments, hinged[group.members], S))
-        #: displacements of the ends by the equations of the nodes, multipliers by forces
+        #: end displacements from the residual of the joints; the transpose gives multipliers
         self._moved = self._moves(turns, scales)
         self._pushed = self._moved.T
         self._ends, self._nodes = S, self._factors(S)
 
     def _moments(self, multipliers, scales):
-        """How rotation and stretch of each end are coupled by the multipliers of the rotations."""
+        """Coupling of rotation and stretch of each end by the multipliers of the rotations."""
         out, follower = np.zeros(len(self.nodes.nodes)), self.nodes.turned
         value = self.nodes.split(multipliers)[1] * scales
         np.add.at(out, self.nodes.leader[follower], -value)
@@ -213,11 +175,11 @@ class Condensed:
         return A.diagonal(), lu
 
     def inertia(self) -> Inertia:
-        """Signs of the eigenvalues of the tangent on the tangent space of the joints."""
+        """Inertia of the tangent on the null space of J."""
         found = [part.inertia() for part in self._parts]
         negative, singular = sum(x.negative for x in found), any(x.singular for x in found)
         diagonal, lu = self._nodes
-        # asked for here only, as these factors are copies
+        # lu.U makes a copy
         pivots = diagonal if lu is None else lu.U.diagonal()[lu.perm_c] / np.abs(diagonal)
         for ratio in [pivots, *(np.sign(part.pivots) for part in self._parts)]:
             negative += int(np.sum(ratio < 0.0))
@@ -227,12 +189,12 @@ class Condensed:
     # solution
 
     def solve(self, b: Array, phi: Array) -> tuple[Array, Array]:
-        """Solve with the factors.
+        """Solve for forces b (N,) and constraint residuals phi (m,), or for columns of both.
 
         Returns
         -------
         x, multipliers
-            Of these shapes.
+            In the shapes of b and phi.
         """
         lu, k = self._nodes[1], b[:1].size
         v, x = (self._moved @ phi.reshape(-1, k)).reshape(-1, 6, k), np.zeros((len(b), k))
@@ -247,9 +209,9 @@ class Condensed:
         multipliers = self._pushed @ (f - self._ends @ v).reshape(-1, k)
         return x.reshape(b.shape), multipliers.reshape(phi.shape)
 
-    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                  dm: Array) -> bool:
-        """Solve; without right-hand sides factorise. False if that fails."""
+    def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                   dm: Array) -> bool:
+        """Solve, or factorise if R is empty; False on failure."""
         try:
             if len(R):
                 du[:], dm[:] = self.solve(R, phi)
@@ -262,22 +224,11 @@ class Condensed:
 
 
 class CondensedMass:
-    """Solves with the mass matrix of a frame and the joints as they are at a displacement.
+    """Solves with the mass matrix of a frame and its joints at any displacement.
 
-    The factors are those of an earlier displacement, refined, and computed again where that takes
-    long.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System` of a frame that can be condensed.
-
-    Attributes
-    ----------
-    at : ndarray or None
-        Displacement at which it was factorised, shape (N,).
-    lag : float
-        By how much the joints' forces act before the end of a step.
+    The factors of an earlier displacement are used with iterative refinement, and replaced when it
+    converges too slowly. ``lag`` is the time from the instant of the joint forces to the end of a
+    step.
     """
 
     def __init__(self, system: Any) -> None:
@@ -288,17 +239,13 @@ class CondensedMass:
         self._last: tuple[float, Array, Array] | None = None
 
     def factorize(self, u: Array) -> None:
-        """Make factors at a displacement (N,)."""
+        """Factorise at a displacement (N,)."""
         self.at = u.copy()
         self._condensed.factorize(self.at, 0.0 * self._condensed.at[1])
 
     def forget(self, factors: bool = True) -> None:
-        """Begin again: what is solved next does not depend on what was solved before.
-
-        Parameters
-        ----------
-        factors
-            On the factors neither: False, if they are those of the same displacement.
+        """Discard the last solution and, by default, the factors, so that results do not depend on
+        them.
         """
         self._last = None
         if factors:
@@ -306,33 +253,18 @@ class CondensedMass:
 
     def solve(self, u: Array, t: float, b: Array, rate: Array, forces: Any = None,
               scale: float = 0.0, most: int = REFINEMENTS) -> tuple[Array, Array]:
-        """x and l with ``M x + J^T l = b`` and ``J1 x = rate``.
+        """Solve ``M x + J^T l = b``, ``J1 x = rate`` for x (N,) and l (m,).
 
-        Parameters
-        ----------
-        u, t
-            Where J1 is taken, shape (N,), and when.
-        b, rate
-            Shapes (N,) and (m,).
-        forces
-            J, sparse, shape (m, N); J1 by default.
-        scale
-            A norm of x below which it need not be exact.
-        most
-            Corrections after which it is exact enough.
-
-        Returns
-        -------
-        x, l
-            Shapes (N,) and (m,).
+        J1 is the joint Jacobian at u (N,) and t; J is ``forces``, sparse (m, N), or J1. ``scale``
+        is a norm of x to which the accuracy is relative, ``most`` the number of refinements.
         """
         J1 = self._condensed.nodes.derivative(u, t)
         J = (J1 if forces is None else forces).T
-        # another iterate of this instant begins with what the last one has found
+        # another iterate at this instant starts from the last solution
         start = self._last[1:] if self._last is not None and self._last[0] == t else None
         rules, found = (scale, most), None
         if self.at is not None:
-            found = self._refined(J, J1, start, b, rate, rules, *KEPT)
+            found = self._refined(J, J1, start, b, rate, rules, *OLD)
         if found is None:
             self.factorize(u)
             found = self._refined(J, J1, start, b, rate, rules, *NEW)
@@ -342,10 +274,7 @@ class CondensedMass:
         return found
 
     def _refined(self, J, J1, start, b, rate, rules, contraction, rough):
-        """The solution by the factors that there are; None where it does not contract so fast.
-
-        J is the transpose of what it is elsewhere.
-        """
+        """The refined solution with the current factors, or None; J is transposed here."""
         (x, l), before, (scale, most) = start or (0.0, 0.0), np.inf, rules
         for k in range(most):
             missing = b, rate
@@ -364,22 +293,13 @@ class CondensedMass:
             before = step
         return (x, l) if most < REFINEMENTS else None
 
-    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                  dm: Array) -> bool:
-        """By how much R, velocities or accelerations, has to change so that joints stay closed.
+    def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                   dm: Array) -> bool:
+        """Project velocities or accelerations R (N,) onto the joints at u and t.
 
-        Parameters
-        ----------
-        t, u
-            Time and displacement, shape (N,), at which they are closed.
-        multipliers
-            Shape (m,); (0,) where a few corrections will do, as more iterations follow.
-        R, phi
-            What is changed, and by what its product with the joints' derivatives should change,
-            shapes (N,) and (m,).
-        du, dm
-            The change and its multipliers, shapes (N,) and (m,). Before, du is the displacement at
-            which the joints' forces act, at a time :attr:`lag` before t.
+        ``phi`` (m,) is the required change of J R. ``du`` is the displacement of the joint forces
+        on entry; the change is returned in du (N,) and dm (m,). With empty ``multipliers`` a few
+        refinements suffice, since more iterations follow.
         """
         try:
             J = None
@@ -394,7 +314,7 @@ class CondensedMass:
 
 
 def _order(nodes):
-    """Numbers of the nodes in an order in which sparse factors stay sparse."""
+    """Node numbers in a fill-reducing order."""
     (i, j), n = nodes.nodes.reshape(-1, 2).T, len(nodes.held)
     one = np.ones(len(i))
     links = sparse.coo_array((np.append(one, one), (np.append(i, j), np.append(j, i))), (n, n))
@@ -403,13 +323,7 @@ def _order(nodes):
 
 
 class _Moves:
-    """How far the equations of the nodes, where they are open, move ends from their nodes.
-
-    Parameters
-    ----------
-    nodes
-        The :class:`~skfem_ancf.actions.joints.nodes.Nodes`.
-    """
+    """Displacements of ends relative to their nodes, by residuals of the joint equations."""
 
     def __init__(self, nodes: Nodes) -> None:
         self._turned, self._leading = nodes.turned, nodes.leader[nodes.turned]
@@ -423,19 +337,19 @@ class _Moves:
             ends = np.flatnonzero((number[nodes.nodes] >= 0) & ~((k == 2) & nodes.hinged))
             rows, columns, first = ([*rows, 3 * ends + k],
                                     [*columns, number[nodes.nodes[ends]]], first + len(held))
-        #: of the last, whose rotation is held, the ends that lead
+        #: leading ends of those whose rotation is prescribed
         self._held = nodes.leader[ends]
         self._at = np.concatenate(rows), np.concatenate(columns)
         self._shape = 3 * len(nodes.nodes), first
 
     def scales(self, turns: Array) -> Array:
-        """Of the equations of ends that follow a rotation, by the turns (ends,) of all."""
+        """Scales of the equations of ends that follow a rotation, from the turns (ends,) of all."""
         return (np.conj(turns[self._turned]) * turns[self._leading]).real
 
     def __call__(self, turns: Array, scales: Array) -> sparse.csr_array:
-        """The displacements (3 ends,) for what equations (m,) should change by.
+        """Matrix from residuals (m,) to end displacements (3 ends,).
 
-        The transpose takes forces (3 ends,), negative, to multipliers (m,).
+        Its transpose maps negative end forces to multipliers.
         """
         values = np.ones(len(self._at[0]))
         values[:self._following] = -1.0
@@ -445,17 +359,10 @@ class _Moves:
 
 
 class _Basis:
-    """Unknowns of the ends of a group's members on one side.
+    """Basis of the DOFs of the ends ``ends`` (M,) of a group's members on one side.
 
-    Displacements along x and y, the rotation of the section with all that gives its direction, the
-    stretches of that along itself, and what is left.
-
-    Parameters
-    ----------
-    nodes
-        The :class:`~skfem_ancf.actions.joints.nodes.Nodes`.
-    group, ends
-        The members, and the numbers of these ends, shape (M,).
+    Its vectors are displacements along x and y, the rotation of the section, stretches of the
+    section's direction along itself, and the rest.
     """
 
     def __init__(self, nodes: Nodes, group: Group, ends: Array) -> None:
@@ -464,7 +371,7 @@ class _Basis:
         self._c, self._ends, self._start = nodes.weights[ends][:, first], ends, nodes.start[ends]
         self._at, n, nd = places, len(places), group.nd
         self._size = np.sum(self._c**2, axis=1)
-        # directions in which the weighted sum does not change
+        # null space of the weights
         self._others = np.linalg.qr(self._c[:, :, None], mode="complete")[0][:, :, 1:]
         self._template = np.zeros((nd, nd))
         self._template[0, 0] = self._template[1, 1] = 1.0
@@ -472,7 +379,7 @@ class _Basis:
         self._template[np.setdiff1d(np.arange(nd), used), 2 + 2 * n:] = np.eye(nd - 2 - 2 * n)
 
     def __call__(self, turns: Array) -> Array:
-        """Displacements of the coordinates for these unknowns, shape (M, nd, nd)."""
+        """The basis as matrices, shape (M, nd, nd)."""
         d = turns[self._ends] * self._start
         self._length, n, x = np.abs(d), len(self._at), self._at
         along, out = d / self._length, np.repeat(self._template[None], len(d), axis=0)
@@ -485,7 +392,7 @@ class _Basis:
         return out
 
     def add_curvature(self, moments: Array, K: Array) -> None:
-        """Add what multipliers do to rotation and stretch to matrices (M, nd, nd)."""
+        """Add the coupling of rotation and stretch by multipliers to matrices (M, nd, nd)."""
         coupling = (moments[self._ends] / self._length)[:, None] * self._c
         n = len(self._at)
         K[:, 2, 3:3 + n] += coupling
@@ -493,27 +400,11 @@ class _Basis:
 
 
 class _Part:
-    """A group's members with their inner coordinates eliminated.
+    """A group's members with their inner DOFs eliminated.
 
-    Parameters
-    ----------
-    group
-        The :class:`Group`.
-    K
-        Tangent of all beams.
-    bases
-        The :class:`_Basis` of both sides.
-    turns, moments
-        Of all ends, as the bases take them, shape (ends,).
-    hinged
-        Whether the members' starts and ends are, shape (M, 2): their rotations are their own.
-    S
-        What is left of all members, shape (members, 6, 6); that of these is set.
-
-    Attributes
-    ----------
-    pivots
-        Of the rotations of hinged ends, shape (k,).
+    ``bases`` are those of both sides; ``turns`` and ``moments`` (ends,) are their arguments;
+    ``hinged`` (M, 2) marks free rotations. The condensed matrices are stored in ``S``
+    (members, 6, 6). ``pivots`` (k,) belong to the eliminated rotations of hinged ends.
     """
 
     def __init__(self, group: Group, K: BandMatrix, bases: Sequence[_Basis], turns: Array,
@@ -523,7 +414,7 @@ class _Part:
         D, C = _blocks(K, group)
         nd, n = group.nd, group.elements
         first, to_first, last = D[:, 0], C[:, 0], D[:, 1]
-        #: inner nodes: matrix, its inverse, that by the displacements of the start and the next one
+        #: of each inner node: matrix, inverse, and response to the first and the next node
         self._inner: list[tuple[Array, Array, Array]] = []
         for k in range(1, n):
             A, inverse = last, _inverse(last)
@@ -548,7 +439,7 @@ class _Part:
         X = _solved(A, inverse, np.concatenate([W, own], axis=2))
         W = W.transpose(0, 2, 1)
         rest = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W @ X[:, :, :6]
-        #: forces at the ends, and displacements where these are held, by those on both end nodes
+        #: forces and displacements at the ends from loads on both end nodes
         self._forces = shared - W @ X[:, :, 6:]
         self._flexibility = own.transpose(0, 2, 1) @ X[:, :, 6:]
         self.pivots = np.concatenate([self._release(np.flatnonzero(turning), 3 * k + 2, rest)
@@ -556,7 +447,7 @@ class _Part:
         S[group.members] = rest
 
     def _release(self, some, k, S):
-        """Eliminate rotation k of some members too, which is their own; returns the pivots."""
+        """Eliminate the free rotation k of some members; returns the pivots."""
         row, force = S[some, k], self._forces[some, k]
         pivot = row[:, k].copy()
         if not np.all(pivot):
@@ -569,7 +460,7 @@ class _Part:
         return pivot
 
     def inertia(self) -> Inertia:
-        """Signs of the eigenvalues of what was eliminated."""
+        """Inertia of the eliminated matrices."""
         negative, singular = 0, False
         for A in [*(A for A, *_ in self._inner), self._outer]:
             size = 1.0 / np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))
@@ -579,14 +470,14 @@ class _Part:
                 if np.min(pivots) > SMALL:
                     continue
             except np.linalg.LinAlgError:
-                logger.debug("lines give way between their ends")
+                logger.debug("members buckle between their ends")
             values = np.linalg.eigvalsh(A)
             negative += int(np.sum(values < 0.0))
             singular = singular or bool(np.any(np.abs(values) < LOST))
         return Inertia(negative, singular)
 
     def reduce(self, b: Array) -> Array:
-        """Forces (M, 6, k) at the ends from those on the coordinates, columns (N, k)."""
+        """Condense loads, columns (N, k), to end forces (M, 6, k)."""
         nd, columns = self.group.nd, b.shape[1]
         f = b[self._places].reshape(len(self._places), -1, nd, columns)
         known = []
@@ -600,7 +491,7 @@ class _Part:
         return self._forces @ outer
 
     def expand(self, v: Array, x: Array) -> None:
-        """All displacements x (N, k) from those at the ends, (M, 6, k), after :meth:`reduce`."""
+        """All displacements x (N, k) from those of the ends (M, 6, k), after :meth:`reduce`."""
         nd, places = self.group.nd, self._places
         ends = self._forces.transpose(0, 2, 1) @ v + self._flexibility @ self._known[-1]
         x[self.group.end_places] = ends
@@ -611,7 +502,7 @@ class _Part:
 
 
 def _beside(matrices):
-    """Two matrices (M, nd, k) as blocks of one, (M, 2 nd, 2 k)."""
+    """Block diagonal (M, 2 nd, 2 k) of two matrices (M, nd, k)."""
     M, nd, k = matrices[0].shape
     out = np.zeros((M, 2, nd, 2, k))
     out[:, 0, :, 0], out[:, 1, :, 1] = matrices
@@ -619,14 +510,14 @@ def _beside(matrices):
 
 
 def _inverse(A):
-    """The inverse of symmetric matrices, in units in which their diagonals are one."""
+    """Inverses of symmetric matrices, scaled to unit diagonals."""
     size = np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))
     scale = size[:, :, None] * size[:, None]
     return np.linalg.inv(A / scale) / scale
 
 
 def _solved(A, inverse, B):
-    """A^-1 B, as accurate as by factors: of what an inverse alone gives A leaves too much."""
+    """A^-1 B with one refinement, as accurate as by factors."""
     X = inverse @ B
     return X + inverse @ (B - A @ X)
 
@@ -637,14 +528,11 @@ def _between(S, A, T):
 
 
 def _blocks(K, group):
-    """Of chains the matrices of nodes (M, elements + 1, nd, nd), and those between neighbours.
-
-    The latter, (M, elements, nd, nd), have the rows of the right node.
-    """
+    """Diagonal blocks (M, elements + 1, nd, nd) and subdiagonal blocks of members."""
     nd, n, ld = group.nd, group.elements, K.band.ld
     a, b = np.arange(nd)[:, None], np.arange(nd)
     low, high = np.minimum(a, b), np.maximum(a, b)
-    # columns of the band, node by node
+    # columns of the band by node
     nodes = K.band.flat.reshape(-1, ld)[group.places].reshape(-1, n + 1, nd * ld)
     D, C = nodes.take(low * ld + high - low, axis=2), nodes[:, :n].take(b * ld + nd + a - b, axis=2)
     return D, C

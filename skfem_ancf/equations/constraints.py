@@ -1,4 +1,4 @@
-"""Supports and joints: fixed degrees of freedom, and equations with multipliers."""
+"""Supports and joints: fixed degrees of freedom, and equations with Lagrange multipliers."""
 
 from __future__ import annotations
 
@@ -25,60 +25,48 @@ from .mobility import advice, free_rigid_motions, who
 from .redundancy import repeated, shared
 from .signature import DENSE, FREE, first_dependent
 
-#: Multipliers whose derivatives are dense matrices, at most.
+#: Largest number of multipliers with dense Jacobians.
 FEW = 96
-#: By how much equations left out may be open, over their sizes.
+#: Largest relative residual of redundant equations.
 OPENED = 1e-5
-#: What is kept of the joints, and changes where equations are left out.
-KEPT_OF_JOINTS = "slopes", "seconds", "tabled", "_still", "_at_rest", "frame", "_limited"
-#: No rows, columns and values.
+#: Cached properties that change when redundant equations are removed.
+CACHED = "slopes", "seconds", "tabled", "_still", "_at_rest", "frame", "_limited"
+#: Empty rows, columns and values.
 _NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
 
 class Constraints:
     """The supports and joints of a scene.
 
-    Joints that only fix coordinates are eliminated like supports; the others are equations
-    ``Phi(u, t) = 0`` with multipliers.
+    Joints that only fix degrees of freedom are eliminated like supports; the others are equations
+    ``Phi(u, t) = 0`` with multipliers. Methods take a displacement u (N,), a time t and multipliers
+    (m,); sparse matrices are rows, columns and values (k,).
 
     Parameters
     ----------
     members, slices
-        The beams and behind them the rigid bodies, in order, and the coordinates of each.
+        Beams, rigid bodies and domains, and their degrees of freedom.
     size
-        Length of all beams together.
+        Size of the scene.
     fixed, values
-        Numbers of the fixed coordinates and their displacements at full load, shape (n,).
+        Fixed degrees of freedom and their displacements at full load, shape (n,).
     joints
-        Joints, already bound.
+        Bound joints.
     stiffness
-        A function that returns that of force elements in the reference configuration, sparse, (N,
-        N); None where there are none.
-
-    Other Parameters
-    ----------------
-    u, v, t
-        Displacement and a direction or velocity, shape (N,), and time; with 0 and 1 those at both
-        ends of a step.
-    multipliers
-        Of the equations, shape (m,).
-    load
-        Factor on prescribed displacements.
-    rows, columns, values
-        Entries of a matrix, shape (k,).
+        A function that returns the stiffness of force elements in the reference configuration,
+        sparse (N, N), or None.
 
     Attributes
     ----------
     all_joints, joints : list
-        The joints, and those with multipliers.
+        All joints, and those with multipliers.
     N, m : int
-        Number of degrees of freedom and of multipliers.
-    fixed
-        Numbers of the coordinates that supports and joints fix, shape (n,).
-    given
-        Their displacements at full load, without what joints prescribe, shape (n,).
+        Numbers of degrees of freedom and of multipliers.
+    fixed, given
+        Degrees of freedom that supports and joints fix, and their displacements at full load
+        without prescribed motions of joints, shape (n,).
     free, mask
-        For each coordinate whether it is free, as truth values and as 1 or 0; shape (N,).
+        Whether a degree of freedom is free, as bool and as float, shape (N,).
     """
 
     def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
@@ -88,13 +76,13 @@ class Constraints:
         self.N = slices[-1].stop
         self._independent = self.passing = False
         self._eliminate(fixed, values, joints)
-        #: numbers of equations left out, and those of each joint
+        #: redundant equations, and those of each joint
         self._left_out = np.zeros(0, dtype=int)
         self._unasked: list[tuple[Joint, Array, Array]] = []
         self._leave_out()
 
     def _eliminate(self, fixed, values, joints):
-        """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
+        """Sort joints into those that fix degrees of freedom and those with multipliers."""
         self.free = np.ones(self.N, dtype=bool)
         self.free[fixed] = False
         self.fixed, self.given = np.array(fixed, np.int64), np.array(values, float)
@@ -121,8 +109,7 @@ class Constraints:
                 clash = np.sort(dofs[~self.free[dofs]])
                 raise SupportError(
                     f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
-                    "another joint fixes already: remove one of them, as the second of two "
-                    "clamps at one place")
+                    "another joint fixes already: remove one of them")
             self._fixing.append((joint, first, factors))
             self.free[dofs] = False
             fixed.append(dofs)
@@ -134,7 +121,7 @@ class Constraints:
         self._moving = [item for item in self._fixing if item[0].moving]
 
     def _leave_out(self):
-        """Leave out equations of joints that repeat others, and say so."""
+        """Remove redundant equations of joints, with a warning."""
         if not self.joints or self.condensable:
             return
         self._independent = self._apart or self._dependent() is None
@@ -160,32 +147,26 @@ class Constraints:
                 parts.append(Part(joint, np.setdiff1d(np.arange(m), out)))
         more = f" and {len(said) - 4} more" if len(said) > 4 else ""
         warnings.warn(
-            f"{len(found)} of {self.m} equations of joints repeat others or supports: "
-            f"{', '.join(said[:4])}{more}. The scene moves as without them; joint_force shares "
-            "the forces by least squares", ModelWarning, stacklevel=5)
+            f"{len(found)} of {self.m} equations of joints are redundant, they repeat others or "
+            f"supports: {', '.join(said[:4])}{more}. They do not change the motion; joint_force "
+            "returns the least-squares forces", ModelWarning, stacklevel=5)
         self._whole = copy(self)
         self.joints, self.m = parts, self.m - len(found)
         self._left_out, self._unasked = found, unasked
-        for name in KEPT_OF_JOINTS:
+        for name in CACHED:
             vars(self).pop(name, None)
 
     def describe_dof(self, k: int) -> str:
-        """What coordinate number k is, in words."""
+        """Name of the degree of freedom number k."""
         b = int(np.searchsorted([s.start for s in self.slices], k, side="right")) - 1
         member, k = self.members[b], k - self.slices[b].start
         node = "" if isinstance(member, RigidBody) else f" of node {k // member.nd}"
         return f"{member.dofnames[k % member.nd]}{node}{who(self.members, b)}"
 
-    # fixed coordinates
+    # fixed degrees of freedom
 
     def values(self, load: float, t: float | None = None) -> Array:
-        """Displacements of the fixed coordinates at a load factor and a time.
-
-        Returns
-        -------
-        ndarray
-            Shape (nfixed,).
-        """
+        """Displacements of the fixed DOFs (nfixed,) at a load factor and a time."""
         values = load * self.given + self._held
         for joint, first, factors in self._moving:
             phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
@@ -193,7 +174,7 @@ class Constraints:
         return values
 
     def values_at(self, times: Array) -> Array:
-        """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
+        """Displacements of the fixed DOFs at full load, at times (n,): (n, nfixed)."""
         values = np.tile(self.given + self._held, (len(times), 1))
         for joint, first, factors in self._moving:
             values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
@@ -201,14 +182,14 @@ class Constraints:
 
     @cached_property
     def moves(self) -> bool:
-        """True if a fixed coordinate has a displacement that is not zero, now or later."""
+        """True if a fixed DOF has a nonzero displacement at any time."""
         return bool(self._moving) or bool(np.any(self.given + self._held))
 
     # equations of joints
 
     @cached_property
     def coordinate_sizes(self) -> Array:
-        """What coordinates change by where the scene moves by its size, shape (N,)."""
+        """Typical magnitudes of the DOFs when the scene moves by its size, shape (N,)."""
         out = np.concatenate([member.sizes for member in self.members])
         if len(self.members) > 1:
             for member, s in zip(self.members, self.slices):
@@ -216,20 +197,14 @@ class Constraints:
         return out
 
     def equation_sizes(self, rows: Array, columns: Array, values: Array) -> Array:
-        """The residual of equations where one of their coordinates changes by its size.
-
-        Returns
-        -------
-        ndarray
-            Shape (m,): the size of the scene where there is no such coordinate.
-        """
+        """Typical magnitudes of the equations (m,); the size of the scene for empty rows."""
         out = np.zeros(self.m)
         np.maximum.at(out, rows, np.abs(values) * self.coordinate_sizes[columns])
         out[out == 0.0] = self.size
         return out
 
     def constraint(self, u: Array, t: float | None) -> Array:
-        """Phi of the joints with multipliers, shape (m,)."""
+        """Phi, shape (m,)."""
         if not self.tabled:
             return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
         rows, columns, values = self._slopes_at(t)
@@ -239,23 +214,20 @@ class Constraints:
 
     @cached_property
     def seconds(self) -> tuple[Array, ...]:
-        """Second derivatives of Phi in the reference configuration: equation, row, column, value.
-
-        As :meth:`~skfem_ancf.actions.joints.Joint.second_entries` of the joints has them.
-        """
+        """Second derivatives of Phi in the reference configuration: equation, i, j, value."""
         if not self.joints:
             return (*2 * _NO_ENTRIES[:1], *_NO_ENTRIES[1:])
         return self._in_order([joint.second_entries(self.N) for joint in self.joints])
 
     @cached_property
     def tabled(self) -> bool:
-        """True if :attr:`slopes`, :attr:`seconds` and offsets give Phi and its derivatives."""
+        """True if Phi is quadratic and given by :attr:`slopes`, :attr:`seconds` and offsets."""
         if all(map(ours, self.joints)):
             return all(joint.tabled for joint in self.joints)
         return self._quadratic_at((0.0, 0.37))
 
     def _quadratic_at(self, times: Iterable[float]) -> bool:
-        """True if Phi and its derivative are those of the tables: user-defined ones may not be."""
+        """Test user-defined joints against the tables at a random displacement."""
         sizes = self.coordinate_sizes
         of_equations, rng = self.equation_sizes(*self.slopes), np.random.default_rng(0)
         k, i, j, v = self.seconds
@@ -273,7 +245,7 @@ class Constraints:
 
     @cached_property
     def _still(self):
-        """Phi in the reference configuration, and whether its derivative there never changes."""
+        """Phi in the reference configuration, and whether its Jacobian there is constant."""
         offset = [joint.offset(np.zeros(1), self.N)[0] for joint in self.joints]
         return np.concatenate([np.zeros(0), *offset]), not any(j.turning for j in self.joints)
 
@@ -294,60 +266,47 @@ class Constraints:
         return any(joint.moving for joint in self.joints)
 
     def full_jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
-        """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
-
-        Sparse where the multipliers are many.
-        """
+        """J = dPhi/du for all DOFs, shape (m, N); sparse unless :attr:`few`."""
         return (self.to_dense if self.few else self._to_sparse)(*self._entries(u, t))
 
     def to_dense(self, rows: Array, columns: Array, values: Array) -> Array:
-        """A matrix (m, N) by its entries (k,)."""
+        """A dense matrix (m, N) from its entries."""
         J = np.zeros((self.m, self.N))
         np.add.at(J, (rows, columns), values)
         return J
 
     def _to_sparse(self, rows: Array, columns: Array, values: Array) -> sparse.csr_array:
-        """The same as a scipy.sparse array."""
         return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
 
     def sparse_jacobian(self, u: Array, t: float) -> sparse.csr_array:
-        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
+        """:meth:`full_jacobian` in CSR format."""
         return self._to_sparse(*self._entries(u, t))
 
     def jacobian_entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """Rows, columns and values (k,) of :meth:`jacobian`; entries of one place are summed."""
+        """Entries of :meth:`jacobian`; duplicates are summed."""
         rows, columns, values = self._entries(u, t)
         return rows, columns, values * self.mask[columns]
 
     @cached_property
     def slopes(self) -> tuple[Array, ...]:
-        """Rows, columns, values of :meth:`full_jacobian` in the reference configuration at time 0.
-
-        As :meth:`~skfem_ancf.actions.joints.Joint.slope_entries` of the joints has them.
-        """
+        """Entries of :meth:`full_jacobian` in the reference configuration at time 0."""
         found = [joint.slope_entries(np.zeros(1), self.N) for joint in self.joints]
         return self._in_order((rows, columns, values[0]) for rows, columns, values in found)
 
     @cached_property
     def _at_rest(self):
-        """The matrix of :attr:`slopes`, sparse where the coordinates are many."""
+        """The matrix of :attr:`slopes`, dense if it is small."""
         return (self.to_dense if self.few and self.N <= DENSE else self._to_sparse)(*self.slopes)
 
     def _entries(self, u, t):
-        """Rows, columns and values of :meth:`full_jacobian`."""
+        """Entries of :meth:`full_jacobian`."""
         if not self.tabled:
             return self._in_order(joint.entries(u, t) for joint in self.joints)
         (k, i, j, v), slopes = self.seconds, self._slopes_at(t)
         return tuple(np.append(a, b) for a, b in zip(slopes, (k, i, v * u[j])))
 
     def _in_order(self, entries: Iterable[tuple]) -> tuple[Array, ...]:
-        """Tables of the joints one behind the other, their rows those of all equations.
-
-        Parameters
-        ----------
-        entries
-            For each joint rows and other columns, arrays of one shape (k,).
-        """
+        """Concatenate the entries of all joints, with row numbers of all equations."""
         first, parts = 0, []
         for joint, (rows, *others) in zip(self.joints, entries):
             parts.append((first + rows, *others))
@@ -355,21 +314,21 @@ class Constraints:
         return _joined(parts or [_NO_ENTRIES])
 
     def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
-        """As :meth:`full_jacobian`, zero at fixed coordinates."""
+        """:meth:`full_jacobian` with zero columns at fixed DOFs."""
         return (self.to_dense if self.few else self._to_sparse)(*self.jacobian_entries(u, t))
 
     def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
+        """v^T Phi'' v, shape (m,)."""
         return np.concatenate([np.zeros(0), *(joint.quadratic(u, t, v) for joint in self.joints)])
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> sparse.csr_matrix:
-        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
+        """sum_k multipliers[k] d^2 Phi_k / du^2 between free DOFs, sparse (N, N)."""
         i, j, v = self.curvature_entries(u, t, multipliers)
         return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
 
     def curvature_entries(self, u: Array, t: float | None,
                           multipliers: Array) -> tuple[Array, Array, Array]:
-        """Rows, columns and values of :meth:`curvature`."""
+        """Entries of :meth:`curvature`."""
         i, j, v = self._curvature(u, t, multipliers)
         return i, j, v * (self.free[i] & self.free[j])
 
@@ -382,32 +341,31 @@ class Constraints:
         return _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
 
     def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
-        """Discrete gradients of :meth:`constraint` in a step, shape (m, N)."""
+        """Discrete gradients of Phi from u0 to u1, shape (m, N)."""
         return self.to_dense(*self._in_order(
             joint.mean_entries(u0, u1, t) for joint in self.joints))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
-        """What joints turn by in a step, see :meth:`~skfem_ancf.actions.joints.Joint.mean_turning`.
-        """
+        """The correction of conserving steps for joints that are not quadratic, shape (N,)."""
         parts = zip(self.joints, self.multipliers_of(multipliers))
         return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
                    np.zeros(self.N))
 
     @cached_property
     def _limited(self) -> list[Joint]:
-        """Joints that may be lost."""
+        """Joints with a limited range."""
         return [joint for joint in self.joints if type(joint).lost is not Joint.lost]
 
     def lost(self, u: Array) -> str:
-        """Which joint cannot hold in a converged state, and why; "" if all can."""
+        """Why a joint cannot act in a converged state, or ""."""
         for joint, out, size in self._unasked:
             if (np.abs(joint.value(u, 0.0)[out]) > OPENED * size).any():
-                return f"{joint!r} cannot hold beside the other joints: it contradicts them here"
+                return f"{joint!r} contradicts the other joints in this position"
         return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
 
     def first_lost(self, rows: Array) -> tuple[int, str]:
-        """How many states one after the other joints can hold, and why not the next one."""
+        """How many of consecutive states (n, N) the joints allow, and why not the next one."""
         for k, u in enumerate(rows if self._limited or self._unasked else ()):
             text = self.lost(u)
             if text:
@@ -415,7 +373,7 @@ class Constraints:
         return len(rows), ""
 
     def multipliers_of(self, multipliers: Array) -> list[Array]:
-        """The multipliers joint by joint: a list in the order of :attr:`joints`."""
+        """Split the multipliers by joint."""
         if not self.joints:
             return []
         ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
@@ -423,23 +381,9 @@ class Constraints:
 
     def joint_force(self, joint: Joint, multipliers: Array, reaction: Array, u: Array,
                     t: float) -> Array:
-        """What a joint does to its first beam, in the order of ``joint.equations``.
+        """Force of a joint on its first beam, one number for each of ``joint.equations``.
 
-        Parameters
-        ----------
-        joint
-            One of the scene's, as it was given.
-        multipliers
-            Of the equations, shape (m,).
-        reaction
-            Force of the supports on the coordinates, shape (N,).
-        u, t
-            Where joints act: displacement of the coordinates, shape (N,), and time.
-
-        Returns
-        -------
-        ndarray
-            A number for each equation.
+        ``reaction`` (N,) are the forces of the supports.
         """
         if len(self._left_out):
             whole = self._whole
@@ -459,57 +403,48 @@ class Constraints:
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
-    def force_on(self, held: Array, multipliers: Array) -> tuple[Array, Array]:
-        """What joints do that hold these coordinates alone by equations that do not change.
-
-        They are as supports, which coordinates along the axes would be fixed for.
-
-        Parameters
-        ----------
-        held
-            Truth values of the coordinates, shape (N,).
-        multipliers
-            Of the equations, shape (m,).
+    def force_on(self, selected: Array, multipliers: Array) -> tuple[Array, Array]:
+        """Support-like forces: of constant joints that involve only selected DOFs (N,).
 
         Returns
         -------
         force, touched
-            The force on the coordinates, shape (N,), and which of them these joints hold.
+            The force on the DOFs, and whether a DOF belongs to such a joint, shape (N,).
         """
         force, touched, zero = np.zeros(self.N), np.zeros(self.N, dtype=bool), np.zeros(self.N)
         for joint, part in zip(self.joints, self.multipliers_of(multipliers)):
             if joint.constant:
                 rows, columns, values = joint.entries(zero, 0.0)
-                if held[columns].all():
+                if selected[columns].all():
                     np.subtract.at(force, columns, values * part[rows])
                     touched[columns] = True
         return force, touched
 
-    # what is held
+    # independence and rigid motions
 
     def require_motion(self) -> None:
-        """Raise InputError if something is given in proportion to the load of statics."""
+        """Raise InputError if a settlement is proportional to the load factor of statics."""
         if self.frame is not None and np.any(self.frame.settled.numbers):
             node, k = np.argwhere(self.frame.settled.numbers)[0]
             value = self.frame.settled.numbers[node, k]
             raise InputError(
-                f"node {node} is displaced by {HELD[k]}={value:g}, which grows with the load of a "
-                "static solution: for a motion give a function of time, as "
-                f"frame.settle({node}, {HELD[k]}=lambda t: {value:g} * min(t, 1.0)); or lambda t: "
-                f"{value:g} if it stays as it was in the static state at the start")
+                f"node {node} is displaced by {HELD[k]}={value:g}, in proportion to the load of "
+                "a static solution. In a motion it has to be a function of time, such as "
+                f"frame.settle({node}, {HELD[k]}=lambda t: {value:g} * min(t, 1.0)), or lambda t: "
+                f"{value:g} if the motion starts from the displaced static state")
 
     def _dependent(self):
-        """The first equation that those before it hold, see :func:`.signature.first_dependent`."""
+        """The first dependent equation, see :func:`.signature.first_dependent`."""
         zero = np.zeros(self.N)
         return first_dependent(self._at_rest * self.coordinate_sizes, self.free,
                                lambda: self.constraint(zero, 0.0))
 
     def require_independent_joints(self) -> None:
-        """Raise SupportError if joints contradict each other or the supports, or depend on them."""
+        """Raise SupportError if equations of joints and supports are dependent."""
         if self._independent or not self.joints or self.condensable:
             return
         found = self._dependent()
-        self._independent = found is None  # nothing of it changes in the life of a system
+        self._independent = found is None
         if found is None:
             return
         k, gap = found
@@ -518,21 +453,21 @@ class Constraints:
         kind = "repeats" if abs(gap) <= 1e-9 * size else "contradicts"
         if self.passing and kind == "repeats":
             raise SupportError(f"{joint!r}, equation {equation!r}, depends in this position on "
-                               "what the supports and the joints before it hold: begin in "
-                               "another one, or solve in time with scene.integrate")
+                               "the supports and the joints before it: start from another "
+                               "position, or solve in time with scene.integrate")
         raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
-                           "joints before it hold already: remove one of them")
+                           "joints before it prescribe already: remove one of them")
 
     @property
     def _apart(self):
-        """True if no coordinate of an equation of joints is held or in another one."""
+        """True if each DOF of the joints is free and occurs in one equation only."""
         rows, columns, values = self.slopes
         return (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
                 and bool(self.free.take(columns).all()) and bool(values.all()))
 
     @property
     def few(self) -> bool:
-        """True if derivatives of the equations are dense matrices."""
+        """True if Jacobians are dense matrices."""
         return self.frame is None and self.m <= FEW
 
     @cached_property
@@ -542,22 +477,22 @@ class Constraints:
 
     @property
     def condensable(self) -> bool:
-        """True if nothing holds but the nodes of a frame."""
+        """True if the nodes of a frame are the only constraints."""
         return self.frame is not None and len(self.joints) == 1 and not len(self.fixed)
 
     def free_rigid_motions(self) -> list[str]:
-        """Descriptions of the rigid motions that nothing holds, one string each."""
+        """Descriptions of unconstrained rigid motions."""
         return free_rigid_motions(self, self._at_rest, self._stiffness)
 
     def require_supports(self) -> None:
-        """Raise SupportError if a rigid motion is free, or joints are not independent."""
+        """Raise SupportError if a rigid motion is unconstrained, or joints are dependent."""
         self.require_independent_joints()
         if self.missing_supports:
             raise SupportError(self.missing_supports)
 
     @cached_property
     def missing_supports(self) -> str:
-        """The rigid motions that are free, and what would hold them, in words; or empty."""
+        """The unconstrained rigid motions and a support to add, in words; or ""."""
         free = self.free_rigid_motions()
         if not free:
             return ""
@@ -569,7 +504,7 @@ class Constraints:
 
     @cached_property
     def adrift(self) -> bool:
-        """True if nothing holds a translation of the whole scene, so that no load can either."""
+        """True if a translation of the whole scene is unconstrained."""
         if self._stiffness is not None or not self.missing_supports:
             return False
         whole = np.concatenate([member.rigid_motions()[:, :2] for member in self.members])
@@ -579,12 +514,12 @@ class Constraints:
 
 
 def _joined(parts):
-    """Rows, columns and values of several tables, one behind the other."""
+    """Concatenate rows, columns and values of several tables."""
     return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts)))
 
 
 def _fixes(joint, zero):
-    """Coordinates that the equations of a joint fix, and their factors; None if it does more."""
+    """DOFs that a joint fixes, and their factors; None if it does more than that."""
     rows, dofs, factors = joint.entries(zero, 0.0)
     if len(rows) != len(joint.equations) or not factors.all():
         return None

@@ -1,8 +1,7 @@
-"""The linear systems of a scene: ``[K, J^T; J, 0] [x; l] = [b; c]``, and the signature of K.
+"""Linear systems ``[K, J^T; J, 0] [x; l] = [b; c]`` of a scene, and their inertia.
 
-Four ways, by what there is beside the band of the beams: LAPACK alone; a Schur complement for a
-few multipliers of beams that their supports hold; sparse LU on the null space of J for others;
-static condensation for frames.
+There are four ways: LAPACK for a band matrix alone; a Schur complement for few multipliers and a
+definite K; sparse LU on the null space of J; static condensation for frames.
 """
 
 from __future__ import annotations
@@ -23,25 +22,14 @@ from .signature import determinant_sign
 
 logger = logging.getLogger(__name__)
 
-#: Pivots of a positive definite matrix, over its diagonal, at least.
+#: Smallest relative pivot of a definite matrix.
 SURE = 1e-10
 
 
 class LinearSolver:
     """Factorises the tangent of a system with its supports and joints, and solves with it.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`, which has to live as long.
-
-    Other Parameters
-    ----------------
-    u, t, multipliers
-        Where the joints are linearised: displacement (N,), time, multipliers (m,).
-    residual, phi
-        Right-hand sides: forces (N,), of which those at fixed degrees of freedom are ignored, and
-        what the equations of joints should change by, (m,).
+    The joints are linearised at a displacement u (N,), a time t and multipliers (m,).
     """
 
     def __init__(self, system: Any) -> None:
@@ -52,23 +40,25 @@ class LinearSolver:
 
     @property
     def coupled(self) -> bool:
-        """True if the equations have more than a band: multipliers, or elements far apart."""
+        """True if the matrix is more than a band: multipliers, or force elements between distant
+        nodes.
+        """
         return bool(self._system.constraints.joints) or self._system.forces.far
 
     @cached_property
     def condensed(self) -> Condensed | None:
-        """What condenses a frame to its nodes; None of other scenes, and where more is coupled."""
+        """The condensed form of a frame, or None."""
         s = self._system
         if not s.constraints.condensable or not s.symmetric or s.forces.far:
             return None
         return Condensed(s, s.K)
 
     def assembled_at(self, u: Array, t: float) -> None:
-        """Note where the band has been assembled: displacement (N,), and load factor or time."""
+        """Store the displacement (N,) and time (or load factor) of the assembled band."""
         self._at = np.array(u), float(t)
 
     def _far_entries(self):
-        """What force elements have outside of the band, at free degrees of freedom."""
+        """Entries of force elements outside of the band, at free DOFs."""
         s = self._system
         i, j, w, place = s.forces.far_entries()
         if not len(i):
@@ -79,7 +69,7 @@ class LinearSolver:
         return i, j, w * D[place] * (free[i] & free[j])
 
     def multiply(self, v: Array) -> Array:
-        """The assembled tangent times a vector (N,), before :meth:`factorize`."""
+        """The assembled tangent times v (N,), before :meth:`factorize`."""
         out = self._system.K.multiply(v)
         if self._system.forces.far:
             i, j, values = self._far_entries()
@@ -87,7 +77,7 @@ class LinearSolver:
         return out
 
     def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
-        """Fix the supports in the tangent and factorise it, with the joints where there are any.
+        """Fix the supports in the tangent and factorise it with the joints.
 
         Raises
         ------
@@ -116,17 +106,11 @@ class LinearSolver:
                 self._joined = Schur(s.K, J, constraints)
                 return
             except np.linalg.LinAlgError:
-                logger.debug("joints hold what the supports leave free")
+                logger.debug("the band is not definite without the joints")
         self._joined = NullSpace(s.K, J, entries, constraints, self._pattern)
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
-        """Solve with the factors.
-
-        Returns
-        -------
-        du, multipliers
-            The increments; the second is empty without joints.
-        """
+        """Solve for forces (N,) and constraint residuals (m,); returns x and multipliers."""
         s = self._system
         b, none = residual * s.constraints.mask, np.zeros(0)
         if not self.coupled:
@@ -135,9 +119,9 @@ class LinearSolver:
         assert solver is not None
         return solver.solve(b, none if phi is None else phi)
 
-    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                  dm: Array) -> bool:
-        """Factorise and solve for an iteration of kernels; False if that fails."""
+    def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                   dm: Array) -> bool:
+        """Factorise and solve within a kernel; False on failure."""
         try:
             self.factorize(u, t, multipliers)
             du[:], dm[:] = self.solve(R, phi)
@@ -147,11 +131,9 @@ class LinearSolver:
         return True
 
     def inertia(self) -> Inertia:
-        """Signs of the eigenvalues of the tangent that :meth:`factorize` has factorised.
+        """Inertia of the factorised tangent at the free DOFs, on the null space of J.
 
-        Of the free degrees of freedom, and with joints on the tangent space of their equations:
-        how many directions there are in which the scene gives way. Of a tangent that is not
-        symmetric they are those of its symmetric part.
+        An unsymmetric tangent is replaced by its symmetric part.
 
         Examples
         --------
@@ -176,10 +158,7 @@ class LinearSolver:
         return solver.inertia()
 
     def determinant_sign(self) -> int:
-        """The sign of the determinant of what :meth:`inertia` counts: 1 or -1.
-
-        -1 is an odd number of negative eigenvalues, of a tangent that is not symmetric too.
-        """
+        """Sign of the determinant of the matrix of :meth:`inertia`, but of the unsymmetric one."""
         if not self.coupled:
             return self._system.K.determinant_sign()
         if isinstance(self._joined, NullSpace):
@@ -187,22 +166,19 @@ class LinearSolver:
         return -1 if self.inertia().negative % 2 else 1
 
     def take_factors(self) -> None:
-        """Note that an iteration has left factors of its last tangent."""
+        """Adopt the factors that a kernel left in the band."""
         if not self.coupled:
             self._system.K.take_factors()
 
     def forget(self) -> None:
-        """Note that the factors are none of the last solution."""
+        """Discard all factors."""
         self._system.K.clear()
         self._joined = None
         if self.condensed is not None:
             self.condensed.forget()
 
     def stays(self) -> bool:
-        """True if the factors left by an iteration say that no direction gives way.
-
-        Those of its last tangent, which is that of the solution but for the last correction.
-        """
+        """True if the last factors of an iteration show a definite tangent."""
         if not self.coupled:
             return self._system.K.definite
         known = self._joined if self.condensed is None else self.condensed.ready
@@ -210,25 +186,15 @@ class LinearSolver:
 
 
 class Schur:
-    """Factors of ``[K, J^T; J, 0]`` by those of a positive definite band matrix.
+    """Factors of ``[K, J^T; J, 0]`` by those of a positive definite band matrix K.
 
-    Equations of neighbouring degrees of freedom, as of a clamp at an angle, are added to the matrix
-    with a stiffness w: ``K + J^T w J`` has the same solution x, and l less by w c.
-
-    Parameters
-    ----------
-    K
-        A :class:`~skfem_ancf.core.linalg.BandMatrix` with its supports fixed.
-    J
-        Rows, columns and values of J, shapes (k,).
-    constraints
-        The :class:`~skfem_ancf.equations.constraints.Constraints`.
+    Equations between neighbouring DOFs, such as a clamp at an angle, are added to K with a
+    stiffness w: ``K + J^T w J`` has the same solution x, and l is smaller by w c.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the matrix is not positive definite, as that of a beam that only joints hold; K is as it
-        was.
+        If the matrix is not positive definite; K is unchanged.
     """
 
     def __init__(self, K: BandMatrix, J: Any, constraints: Any) -> None:
@@ -248,11 +214,11 @@ class Schur:
         self._S = self._J @ self._Y
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
-        """x (n,) and l (m,) for right-hand sides (n,) and (m,)."""
+        """Solve for right-hand sides b (n,) and c (m,); returns x and l."""
         x = self._K.solve(b)
         l = np.linalg.solve(self._S, self._J @ x - c)
         return x - self._Y @ l, l + self._weights * c
 
     def inertia(self) -> Inertia:
-        """That of K where J x = 0."""
+        """Inertia of K on the null space of J."""
         return Inertia(0, False)

@@ -1,4 +1,4 @@
-"""Forces and energies to first and second order about a displacement: what linear theory solves."""
+"""Forces and energies to first and second order about a displacement, for linear theory."""
 
 from __future__ import annotations
 
@@ -11,28 +11,12 @@ from .system import System
 
 
 def linear_force(system: System, base: Array, d: Array, load: float = 1.0) -> Array:
-    """The internal force in statics, linearised about a displacement; shape (N,).
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    base, d
-        The displacement, and what is added to it, shape (N,).
-    load
-        The load factor.
-    """
+    """f(base) + K(base) d, the linearised internal force in statics, shape (N,)."""
     return system.internal_force(base, None, load) + _stiffness_times(system, base, d, load)
 
 
 def linear_energy(system: System, base: Array, d: Array, load: float = 1.0) -> float:
-    """The strain energy, and the potential of force elements, to second order.
-
-    Parameters
-    ----------
-    system, base, d, load
-        As for :func:`linear_force`, shape (N,).
-    """
+    """Strain energy and potential of force elements to second order in d (N,)."""
     if base.any() or system.forces.elements:
         second = 0.5 * d @ _stiffness_times(system, base, d, load)
     else:
@@ -42,22 +26,17 @@ def linear_energy(system: System, base: Array, d: Array, load: float = 1.0) -> f
 
 
 def linear_external_force(system: System, base: Array, d: Array) -> Array:
-    """The force of all loads in statics at full size, linearised as it is solved with.
+    """The linearised force of all loads at full load, shape (N,).
 
-    That loads of the package follow the body is of second order in small displacements from the
-    reference configuration. A user-defined load may depend on these otherwise, as a spring does.
-
-    Parameters
-    ----------
-    system, base, d
-        As for :func:`linear_force`, shape (N,).
+    About the reference configuration the stiffness of the package's follower loads is neglected, as
+    in linear theory; that of user-defined loads counts.
     """
     out, at_rest = np.array(system.external_force(base)), not base.any()
     for one in system.loads:
         s, stiff = system.of(one), not one.constant and not (at_rest and not one.first_order)
-        if at_rest and one.pushes:  # of laws that are not linear
-            pushed, (factor, acting) = cast("Any", one), one.acting(None)
-            out[s] += pushed.beam.kernel.scatter(pushed.small_forces(pushed.at_rest)) - (
+        if at_rest and one.eigen_stresses:  # eigenstrain of nonlinear laws
+            load, (factor, acting) = cast("Any", one), one.acting(None)
+            out[s] += load.beam.kernel.scatter(load.small_forces(load.at_rest)) - (
                 factor * acting.force(base[s]))
         if stiff:
             factor, acting = one.acting(None)
@@ -67,7 +46,7 @@ def linear_external_force(system: System, base: Array, d: Array) -> Array:
 
 
 def _stiffness_times(system, base, d, load):
-    """The tangent of the internal force times a vector; sums of strains, where it can be."""
+    """The tangent of the internal force times d, by strains where possible."""
     out, at_rest = np.zeros(system.N), not base.any()
     if not d.any():
         return out

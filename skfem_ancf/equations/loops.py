@@ -1,4 +1,4 @@
-"""Large parts of compiled code, each behind an address: kernels, force elements, contact, laws."""
+"""Large parts of compiled code behind addresses: kernels, force elements, contact, laws."""
 
 from functools import cache
 from typing import Annotated, Any
@@ -40,8 +40,8 @@ def evaluate_points(law, strain, out):
     _call_law(law.address, (law.constants, strain, out))
 
 
-def own_evaluate(handle, strain, out):
-    out[:] = np.nan  # scenes with such laws run in NumPy
+def custom_evaluate(handle, strain, out):
+    out[:] = np.nan  # never called: such scenes run in NumPy
 
 
 def run_kinds(tables, what, y, w, factor, out):
@@ -54,7 +54,7 @@ def run_contacts(tables, asked, u, v, out):
     _call_contacts(tables.address, (tables, asked, u, v, out))
 
 
-#: What is compiled by itself: a function, and the annotations of its arguments.
+#: Separately compiled functions, with annotations of their arguments.
 PARTS = {"StrainTables": (evaluate, _STRAIN), "elements": (of_kinds, _KINDS),
          "contacts": (of_contacts, _CONTACTS)}
 
@@ -67,15 +67,13 @@ def part(name: str) -> int:
 
 @cache
 def law(function: Any) -> int:
-    """The address of a material law; one of another package is compiled in each process."""
+    """The address of a material law; laws outside of the package are not cached on disk."""
     return address(_of_points(compiled(function)), _LAW,
                    f"_{function.__module__}_{function.__qualname__}", ours(function))
 
 
 def _of_points(point):
-    """What a function of the strain gives at all points: energies, stresses or moduli, as long as
-    ``out`` is.
-    """
+    """Energies, stresses or moduli (by ``len(out)``) of a pointwise function at all points."""
     def of_points(constants, strain, out):
         for p in range(strain.shape[1]):
             for e in range(strain.shape[2]):
@@ -94,7 +92,7 @@ def _of_points(point):
 
 
 def flat(plain: Equations) -> tuple[Equations, list[Words]]:
-    """The equations as compiled code takes them, and what has to live as long as they do."""
+    """The equations for compiled code, and the objects that must live as long."""
     words: list[Words] = []
     forces, loads = plain.forces, plain.loads
     body = _flat_body(plain.body, words)
@@ -102,8 +100,8 @@ def flat(plain: Equations) -> tuple[Equations, list[Words]]:
         forces = forces._replace(contacts=forces.contacts._replace(address=part("contacts")))
     if forces.number > 0:
         forces = forces._replace(address=part("elements"))
-    if len(loads.pushes):
-        loads = loads._replace(pushed=_flat_body(loads.pushed, words))
+    if len(loads.eigenstrains):
+        loads = loads._replace(eigenstrained=_flat_body(loads.eigenstrained, words))
     viscous, copies = (body if x is plain.body else _flat_body(x, words)
                        for x in (plain.viscous, plain.copies))
     return plain._replace(body=body, viscous=viscous, copies=copies, forces=forces,

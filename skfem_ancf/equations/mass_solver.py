@@ -1,4 +1,4 @@
-"""Solves with the mass matrix of a scene, its supports and its joints; damping of single modes."""
+"""Linear systems with the mass matrix; modal damping."""
 
 from __future__ import annotations
 
@@ -16,43 +16,35 @@ from ..core.linalg import BandMatrix, dense
 from ..core.types import Array
 from .condensation import CondensedMass
 
-#: Equations of the nodes of a frame above which steps of a motion eliminate them.
+#: Number of joint equations above which time integration condenses a frame.
 MANY = 48
 
 
 class MassSolver:
-    """A function of b (N,) and rate (m,): x and l with ``M x + J^T l = b`` and ``J x = rate``.
-
-    The first at free degrees of freedom; x is zero at fixed ones.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`, which has to live as long.
-    """
+    """Solves ``M x + J^T l = b``, ``J x = rate`` at free DOFs; x is zero at fixed ones."""
 
     def __init__(self, system: Any) -> None:
         self._system = proxy(system)
 
     @cached_property
     def factors(self) -> BandMatrix:
-        """The factors of the mass matrix with its supports fixed; made once."""
+        """Factors of the mass matrix with its supports fixed."""
         s = self._system
         M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
         fix(M.band, s.constraints.fixed)
         if not factorize(M.band):
             if s.forces.masses:
-                raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
-                                 f"of {shown(s.forces.masses)} is too large beside the beams")
+                raise InputError("the mass matrix is singular to round-off: a mass or inertia of "
+                                 f"{shown(s.forces.masses)} is too large compared with the beams")
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         M.take_factors()
         if not self.by_nodes and M.definite:
-            M.to_cholesky()  # solved with by LAPACK at once; kernels have those of the band
+            M.to_cholesky()  # for LAPACK; kernels use the band
         return M
 
     @cached_property
     def by_nodes(self) -> bool:
-        """True if steps of a motion condense a frame to its nodes; few equations are a border."""
+        """True if time integration condenses a frame to its nodes."""
         s = self._system
         return (s.constraints.condensable and not s.forces.far and s.constraints.m > MANY
                 and not len(s.damping.modal))
@@ -63,14 +55,9 @@ class MassSolver:
 
     def __call__(self, u: Array, t: float, J: Any = None
                  ) -> Callable[[Array, Array], tuple[Array, Array]]:
-        """The solver at one place and time.
+        """A function of b (N,) and rate (m,) that returns x and l, at one displacement and time.
 
-        Parameters
-        ----------
-        u, t
-            Where the joints are linearised, shape (N,), and when.
-        J
-            ``constraints.full_jacobian`` there, shape (m, N), where it is known.
+        J is ``constraints.full_jacobian(u, t)`` if known.
         """
         if self.by_nodes:
             mass = self._condensed
@@ -93,27 +80,14 @@ class MassSolver:
             x = M.solve(b * free)
             multipliers = J @ x - rate
             if not solve_dependent(S.copy(), multipliers):
-                raise np.linalg.LinAlgError("the joints hold nothing in this state")
+                raise np.linalg.LinAlgError("the joints are dependent in this state")
             return x - Y @ multipliers, multipliers
 
         return solve
 
 
 class ModalDamping:
-    """The damping of single modes.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`, which has to live as long.
-    rest_modes
-        As of the system.
-
-    Attributes
-    ----------
-    rows
-        The force that resists v is ``(rows @ v) @ rows``, shape (k, N).
-    """
+    """Damping of single modes: the force on a velocity v is ``(rows @ v) @ rows``, rows (k, N)."""
 
     def __init__(self, system: Any,
                  rest_modes: Callable[[Any, int], tuple[Array, Array]] | None) -> None:
@@ -126,11 +100,11 @@ class ModalDamping:
             self.rows = np.ascontiguousarray(rows[weights > 0.0])
 
     def force(self, v: Array) -> Array:
-        """What resists the velocity v, shape (N,)."""
+        """The damping force for a velocity v, shape (N,)."""
         return (self.rows @ v) @ self.rows
 
     def acceleration(self, v: Array) -> Array:
-        """The acceleration whose inertia is :meth:`force`, shape (N,)."""
+        """M^-1 times :meth:`force`, shape (N,)."""
         return (self.rows @ v) @ self._shapes
 
     @cached_property

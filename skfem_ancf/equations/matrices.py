@@ -1,4 +1,4 @@
-"""The matrices of a scene in a state, sparse, for custom solvers."""
+"""Sparse matrices of a scene in a state, for custom solvers."""
 
 from __future__ import annotations
 
@@ -16,26 +16,25 @@ from .strain_tangent import load_stiffness
 
 
 class SceneMatrices(NamedTuple):
-    """The equations of a scene, linearised in a state.
+    """The linearised equations of a scene in a state.
 
-    ``M u'' + D u' + K u + J^T l = force`` holds for changes of displacement u and multipliers l
-    from the state, with ``J u = 0``, of the free degrees of freedom ``scene.free``; N is the number
-    of all. At an equilibrium the force is ``J^T`` times the multipliers there, and the reaction of
-    the supports.
+    ``M u'' + D u' + K u + J^T l = force``, ``J u = 0`` for changes of displacement u and
+    multipliers l from the state, at the free degrees of freedom ``scene.free`` of all N. At an
+    equilibrium the force is that of joints and supports.
 
     Attributes
     ----------
     M
-        The mass matrix, (N, N), in CSR format; None where a material has no density.
+        Mass matrix, (N, N), in CSR format; None if a material has no density.
     D
-        The derivative of the force by the velocity, with the opposite sign, (N, N).
+        Damping matrix, (N, N): minus the derivative of the force by the velocity.
     K
-        The tangent stiffness, (N, N): the derivative of the force by the displacement, with the
-        opposite sign, stress, loads and multipliers of the state included.
+        Tangent stiffness, (N, N): minus the derivative of the force by the displacement, with the
+        stress, loads and multipliers of the state.
     force
-        Loads less internal and damping force, shape (N,).
+        Loads minus internal and damping force, shape (N,).
     J
-        The derivative of the constraints of joints by the displacement, (m, N).
+        Jacobian of the joint equations, (m, N).
     """
 
     M: Any
@@ -46,7 +45,7 @@ class SceneMatrices(NamedTuple):
 
 
 def matrices_of(system: Any, state: Any) -> SceneMatrices:
-    """The SceneMatrices of a :class:`~skfem_ancf.equations.system.System` in a State of it."""
+    """The SceneMatrices of a System in one of its States."""
     u, v, t, tables = np.array(state.u), state.v, state.t, system.backend.tables
     time = state.load if t is None else t
     K = load_stiffness(system, u, state.load, t) + system.constraints.curvature(

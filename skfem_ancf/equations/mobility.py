@@ -1,4 +1,4 @@
-"""Rigid motions that neither supports nor joints hold, in words."""
+"""Unconstrained rigid motions and their description."""
 
 from __future__ import annotations
 
@@ -15,15 +15,7 @@ from .signature import DENSE, null_space, row_sizes, unit_rows
 
 
 def who(members: Any, k: int) -> str:
-    """Which beam or body is number k, for messages.
-
-    Parameters
-    ----------
-    members
-        The beams and rigid bodies of a scene.
-    k
-        The number.
-    """
+    """Name of beam or body number k for messages."""
     member = members[k]
     for kind, name in ((RigidBody, "rigid body"), (Domain, "domain")):
         if isinstance(member, kind):
@@ -33,16 +25,10 @@ def who(members: Any, k: int) -> str:
 
 def free_rigid_motions(constraints: Any, joints: Any,
                        stiffness: Callable[[], Any] | None) -> list[str]:
-    """Descriptions of the rigid motions that nothing holds, one string each.
+    """Descriptions of the rigid motions that no support, joint or force element constrains.
 
-    Parameters
-    ----------
-    constraints
-        :class:`~skfem_ancf.equations.constraints.Constraints`.
-    joints
-        The derivative of their joints in the reference configuration, shape (m, N).
-    stiffness
-        A function that returns that of force elements there, sparse; or None.
+    ``joints`` is the Jacobian (m, N) in the reference configuration; ``stiffness`` returns the
+    sparse stiffness of force elements there, or is None.
     """
     c = constraints
     motions, of_joints, bodies = _motions(c, joints)
@@ -59,11 +45,10 @@ def free_rigid_motions(constraints: Any, joints: Any,
 
 
 def _motions(c, joints):
-    """Rigid motions of the bodies, what joints hold of them, and who they are, a function.
+    """Rigid motions of the bodies (N, 3 n), J times them, and a function that names the bodies.
 
-    Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
-    columns of a body are two translations and the rotation, in units of its size; dense arrays
-    of few degrees of freedom.
+    Bodies are beams, rigid bodies and, in a frame, rigidly connected parts. Each has two
+    translations and a rotation in units of its size. Small matrices are dense.
     """
     if c.frame is not None:
         return _motions_of_frame(c, joints)
@@ -81,7 +66,6 @@ def _motions(c, joints):
 
 
 def _motions_of_frame(c, joints):
-    """The same, of a frame."""
     frame, origin = c.frame, c.members[0].origin
     parts = frame.parts()
     of_part, values, first = np.zeros(c.N, dtype=int), [], 0
@@ -99,14 +83,14 @@ def _motions_of_frame(c, joints):
 
 
 def _sparse(values, of_body):
-    """Motions (N, 3) of the bodies that degrees of freedom belong to, as a matrix."""
+    """Rigid motions (N, 3) of the bodies as a sparse matrix."""
     n = len(values)
     return sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
                              3 * np.arange(n + 1)), shape=(n, 3 * int(of_body.max() + 1)))
 
 
 def advice(constraints: Any) -> str:
-    """What would hold a scene, in words; see :func:`free_rigid_motions`."""
+    """A support to add, in words."""
     if constraints.frame is not None:
         points = constraints.frame.net.points
         x = "({:.6g}, {:.6g})".format(*points[:, np.lexsort(points)[0]])
@@ -124,7 +108,7 @@ def advice(constraints: Any) -> str:
 
 
 def _describe(v, bodies):
-    """A rigid motion of bodies (who, origin, size) in words."""
+    """Describe a rigid motion of bodies (name, origin, size)."""
     parts = []
     for k, (who, origin, size) in enumerate(bodies):
         a, b, c = v[3 * k:3 * k + 3]

@@ -10,15 +10,7 @@ from .system import System
 
 
 def momentum(system: System, v: Array) -> Array:
-    """Linear momentum of a velocity, shape (2,).
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    v
-        Velocity of the degrees of freedom, shape (N,).
-    """
+    """Linear momentum of a velocity (N,), shape (2,)."""
     p, total = system.mass.multiply(v), np.zeros(2)
     for member, s in zip(system.members, system.slices):  # a unit translation moves r alone
         total += (member.rigid_motions()[:, :2].T @ p[s] if isinstance(member, Domain) else
@@ -27,15 +19,7 @@ def momentum(system: System, v: Array) -> Array:
 
 
 def angular_momentum(system: System, u: Array, v: Array) -> float:
-    """Angular momentum about the origin.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u, v
-        Displacement and velocity, shape (N,).
-    """
+    """Angular momentum about the origin, for displacement and velocity (N,)."""
     p, total = system.mass.multiply(v), 0.0
     for member, s in zip(system.members, system.slices):
         q, pb = (member.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)

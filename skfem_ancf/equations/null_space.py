@@ -1,7 +1,7 @@
-"""Factors of ``[K, J^T; J, 0]`` on the null space of J, where joints are many or hold the beams.
+"""Factors of ``[K, J^T; J, 0]`` on the null space of J, for many joints or an indefinite K.
 
-Each equation of a joint gives one degree of freedom by others: ``x = T y + x_0`` with ``J T = 0``.
-What is left, ``T^T K T``, is symmetric if K is, and its pivots have the signs of its eigenvalues.
+Each joint equation eliminates a DOF: ``x = T y + x_0`` with ``J T = 0``. The reduced matrix
+``T^T K T`` is symmetric if K is, and its pivots give the inertia.
 """
 
 from __future__ import annotations
@@ -20,31 +20,23 @@ from .signature import DEPENDENT, inertia_of, members
 
 logger = logging.getLogger(__name__)
 
-#: Degrees of freedom up to which an inertia is that of a dense matrix.
+#: Largest number of DOFs for the inertia of a dense matrix.
 DENSE = 100
-#: Of a residual over its largest term, above which factors without pivoting are not trusted.
+#: Largest relative residual of factors without pivoting.
 ROUGH = 1e-8
 
 
 class Block(NamedTuple):
-    """Groups of equations, of one size, that have no degree of freedom in common.
+    """Groups of equations of one size without a common DOF."""
 
-    Attributes
-    ----------
-    rows, columns
-        Numbers of the equations and of the degrees of freedom of each group, (g, k) and (g, c).
-    entries, places
-        Which entries of J are theirs, and where these go in a flat array of shape (g, k, c).
-    """
-
-    rows: Array
-    columns: Array
-    entries: Array
-    places: Array
+    rows: Array  # equations of each group, (g, k)
+    columns: Array  # DOFs of each group, (g, c)
+    entries: Array  # numbers of the entries of J in these groups
+    places: Array  # their positions in a flat array of shape (g, k, c)
 
 
 def blocks(rows: Array, columns: Array, m: int, n: int) -> list[Block]:
-    """The equations of the entries (k,) of a matrix (m, n), in groups that are independent."""
+    """Independent groups of the rows of a matrix (m, n) with entries (k,)."""
     links = sparse.coo_array((np.ones(len(rows)), (rows, m + columns)), (m + n, m + n))
     number, group = connected_components(links, directed=False)
     (all_rows, row), (all_columns, column) = (members(x, number) for x in (group[:m], group[m:]))
@@ -63,31 +55,31 @@ def blocks(rows: Array, columns: Array, m: int, n: int) -> list[Block]:
 
 
 def eliminated(A: Array) -> tuple[Array, Array, Array]:
-    """Reduced row echelon forms of matrices (g, k, c), by complete pivoting.
+    """Reduced row echelon forms of matrices (g, k, c), with complete pivoting.
 
     Returns
     -------
     pivots
-        The column of each row's pivot, (g, k).
+        The pivot column of each row, (g, k).
     R, M
-        ``M A = R``, (g, k, c) and (g, k, k): R has a 1 in each pivot, alone in its column.
+        ``M A = R``, (g, k, c) and (g, k, k): each pivot of R is 1 and alone in its column.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the rows depend on each other.
+        If the rows are dependent.
     """
     g, k, c = A.shape
     size = np.max(np.abs(A), axis=2, initial=0.0)
     if not np.all(size):
-        raise np.linalg.LinAlgError("a joint holds what supports hold")
+        raise np.linalg.LinAlgError("a joint repeats a support")
     R = np.concatenate([A / size[:, :, None], np.broadcast_to(np.eye(k), (g, k, k))], axis=2)
     each, pivots, left = np.arange(g), np.empty((g, k), int), np.ones((g, k, 1))
     for _ in range(k):
         row, column = np.divmod(np.argmax(np.abs(R[:, :, :c] * left).reshape(g, -1), axis=1), c)
         pivot = R[each, row, column]
         if np.any(np.abs(pivot) <= DEPENDENT):
-            raise np.linalg.LinAlgError("the joints are not independent in this state")
+            raise np.linalg.LinAlgError("the joints are dependent in this state")
         R[each, row] /= pivot[:, None]
         factor = R[each, :, column]
         factor[each, row] = 0.0
@@ -97,7 +89,7 @@ def eliminated(A: Array) -> tuple[Array, Array, Array]:
 
 
 class Pattern:
-    """Where a sparse matrix has entries, which are the same in each iteration."""
+    """The sparsity pattern of a matrix, cached over iterations."""
 
     def __init__(self) -> None:
         self._band = np.zeros(0, bool)
@@ -105,7 +97,7 @@ class Pattern:
         self._blocks: Any = None
 
     def of_band(self, K: BandMatrix) -> tuple[Any, Any, Any]:
-        """Rows, columns and values of a band matrix, zeros included that were others before."""
+        """Rows, columns and values of a band matrix, with zeros that were nonzero before."""
         flat = K.band.flat
         used = flat != 0.0
         if len(self._band) != len(used):
@@ -119,14 +111,14 @@ class Pattern:
         return np.append(i, j[below]), np.append(j, i[below]), np.append(flat[at], flat[at[below]])
 
     def blocks(self, rows: Array, columns: Array, m: int, n: int) -> list[Block]:
-        """The :func:`blocks` of J, which are those of the last call if its entries are."""
+        """The :func:`blocks` of J, cached."""
         of = self._blocks
         if of is None or not (np.array_equal(of[0], rows) and np.array_equal(of[1], columns)):
             of = self._blocks = rows, columns, blocks(rows, columns, m, n)
         return of[2]
 
     def csc(self, i: Array, j: Array, values: Array, n: int) -> sparse.csc_array:
-        """The matrix (n, n) of some entries (k,), which are summed."""
+        """The matrix (n, n) of entries (k,); duplicates are summed."""
         of = self._of
         if of is None or len(of[0]) != len(i) or not (
                 np.array_equal(of[0], i) and np.array_equal(of[1], j)):
@@ -140,16 +132,7 @@ class Pattern:
 class NullSpace:
     """Sparse factors of ``[K, J^T; J, 0]``.
 
-    Parameters
-    ----------
-    K
-        A :class:`~skfem_ancf.core.linalg.BandMatrix` with its supports fixed.
-    J, entries
-        Rows, columns and values of J, and of what K has outside of the band, shapes (k,).
-    constraints
-        The :class:`~skfem_ancf.equations.constraints.Constraints`.
-    pattern
-        That of the last matrix of this system.
+    ``entries`` are those of K outside of the band K; ``pattern`` is the last one of the system.
     """
 
     def __init__(self, K: BandMatrix, J: Any, entries: Any, constraints: Any,
@@ -171,7 +154,7 @@ class NullSpace:
         self._lu, self._plain = self._factors(K.symmetric)
 
     def _basis(self, given):
-        """The matrix whose columns span the null space of J, (n, n - m)."""
+        """A basis (n, n - m) of the null space of J."""
         free = np.flatnonzero(~given)
         number = np.cumsum(~given) - 1
         parts = [(free, number[free], np.ones(len(free)))]
@@ -182,7 +165,7 @@ class NullSpace:
         return sparse.csc_array((v, (i, j)), shape=(len(given), len(free)))
 
     def _factors(self, symmetric):
-        """Factors, and whether all their pivots are on the diagonal."""
+        """LU factors, and whether all pivots are on the diagonal."""
         if symmetric:
             try:
                 lu = splu(self._reduced, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
@@ -194,7 +177,7 @@ class NullSpace:
         return splu(self._reduced), False
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
-        """x (n,) and l (m,) for right-hand sides (n,) and (m,)."""
+        """Solve for right-hand sides b (n,) and c (m,); returns x and l."""
         x, b, T = np.zeros(self._shape[1]), self._sizes * b, self._T
         for block, at, _, M in self._groups:
             x[at] = (M @ c[block.rows][:, :, None])[:, :, 0]
@@ -216,11 +199,11 @@ class NullSpace:
         return self._sizes * x, l
 
     def reduced(self) -> Any:
-        """K where J x = 0, sparse of many degrees of freedom."""
+        """K on the null space of J, dense if small."""
         return self._reduced.toarray() if self._shape[1] <= DENSE else self._reduced
 
     def inertia(self) -> Inertia:
-        """That of K, of its symmetric part, where J x = 0."""
+        """Inertia of the symmetric part of K on the null space of J."""
         if self._plain:
             pivots, diagonal = self._lu.U.diagonal()[self._lu.perm_c], self._reduced.diagonal()
             if np.all(pivots > SMALL * np.abs(diagonal)):

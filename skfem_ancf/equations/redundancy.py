@@ -1,4 +1,4 @@
-"""Equations of joints that repeat others in all positions the joints allow."""
+"""Redundant equations of joints."""
 
 from __future__ import annotations
 
@@ -10,35 +10,29 @@ from scipy import sparse
 from ..core.types import Array
 from .signature import DEPENDENT, groups
 
-#: Part of the largest rest of a row beside those kept, from which on the first one is kept.
+#: Relative size of a remainder, compared with the largest, from which a row may be the next pivot.
 MUCH = 0.5
-#: Size of the motion, relative to the sizes of coordinates, after which the rank is asked again.
+#: Relative size of the trial motion.
 MOVED = 3e-3
-#: By how much equations may be open that others hold, relative to their sizes.
+#: Largest relative residual of closed equations.
 CLOSED = 1e-10
-#: Corrections at most.
+#: Largest number of Newton corrections.
 CORRECTIONS = 12
 
 
 def repeated(constraints: Any) -> tuple[Array | None, bool]:
-    """The equations of joints that repeat others, or None where that cannot be said of all.
+    """The redundant equations of joints.
 
-    An equation repeats others if its row of the Jacobian is a sum of theirs at the start and after
-    a small random motion that the joints allow, and if it is closed where they are. A linkage that
-    starts in a position in line has such rows at the start alone. None of what takes part may move
-    with time.
-
-    Parameters
-    ----------
-    constraints
-        :class:`~skfem_ancf.equations.constraints.Constraints` with all equations.
+    An equation is redundant if its row of J is a linear combination of others, at the start and
+    after a small random motion that the joints allow, and if it is closed. A linkage in a singular
+    position has such rows at the start only. No equation involved may depend on time.
 
     Returns
     -------
     ndarray or None
-        Numbers of the equations, increasing; None where equations depend on others otherwise.
+        Increasing numbers of the equations; None if there are dependent equations of another kind.
     bool
-        True if the others do so in this position alone, and are closed in it.
+        True if these are dependent in this position only, and closed there.
     """
     c, found, passing = constraints, [], False
     start = np.zeros(c.N)
@@ -49,7 +43,7 @@ def repeated(constraints: Any) -> tuple[Array | None, bool]:
     driven[c.fixed[c.given != 0.0]] = True
     for joint, first, factors in c._moving:
         driven[c.fixed[first:first + len(factors)]] = True
-    # what one coordinate does to an equation may be zero at the start
+    # entries may be zero at the start only
     move = np.random.default_rng(0).uniform(-MOVED, MOVED, c.N) * c.free
     pattern = abs(J) + abs(_scaled(c, start + c.coordinate_sizes * move))
     for rows, _, _ in groups(pattern * c.free):
@@ -81,25 +75,10 @@ def repeated(constraints: Any) -> tuple[Array | None, bool]:
 
 
 def shared(J: sparse.csr_array, multipliers: Array, left: Array, inner: Array) -> Array:
-    """The smallest multipliers with the same forces, of equations that repeat each other.
+    """The smallest multipliers (m,) with the same forces as given ones.
 
-    Those inside of bodies may be as large as they like.
-
-    Parameters
-    ----------
-    J
-        The rows of all equations, of unit size, shape (m, N).
-    multipliers
-        Of unit rows, shape (m,), zero for equations left out.
-    left
-        Numbers of these, shape (k,).
-    inner
-        Truth values of equations that are of a body alone, shape (m,).
-
-    Returns
-    -------
-    ndarray
-        Shape (m,).
+    Multipliers of internal equations (``inner``, bool (m,)) are not minimised; ``left`` are the
+    redundant equations.
     """
     out = multipliers.copy()
     for rows, columns, A in groups(J):
@@ -113,7 +92,7 @@ def shared(J: sparse.csr_array, multipliers: Array, left: Array, inner: Array) -
 
 
 def _scaled(c, u):
-    """The Jacobian in units of the coordinates' and the equations' sizes, sparse."""
+    """The Jacobian in units of DOFs and equations, sparse."""
     sizes = c.equation_sizes(*c.slopes)
     return sparse.csr_array(
         sparse.diags_array(1.0 / sizes) @ c.sparse_jacobian(u, 0.0)
@@ -121,7 +100,7 @@ def _scaled(c, u):
 
 
 def _basis(A):
-    """Numbers of rows that span all rows: the first one of those with much left, one by one."""
+    """Rows that span all rows, by pivoted Gram-Schmidt."""
     kept: list[int] = []
     A = A.copy()
     for _ in range(min(A.shape)):
@@ -132,13 +111,13 @@ def _basis(A):
         k = int((left >= MUCH * left.max()).argmax())
         q = A[k] / left[k]
         kept.append(k)
-        for _ in range(2):  # once more for the round-off of the first time
+        for _ in range(2):  # reorthogonalise
             A -= np.outer(A @ q, q)
     return np.sort(np.array(kept, dtype=int))
 
 
 def _beside(c, start, move, rows, rank):
-    """A position beside the start in which some equations of this rank are closed, or None."""
+    """A position near the start in which equations of this rank are closed, or None."""
     found = _closed(c, start, rows, rank)
     if found is None:
         return None
@@ -148,10 +127,7 @@ def _beside(c, start, move, rows, rank):
 
 
 def _closed(c, u, rows, rank):
-    """Where Newton's method closes some equations of this rank, and an orthonormal basis of them.
-
-    None if it does not, or if their rank is larger there.
-    """
+    """Close equations of this rank by Newton's method; position and row space, or None."""
     sizes = c.equation_sizes(*c.slopes)[rows]
     for _ in range(CORRECTIONS):
         A, phi = _scaled(c, u)[rows].toarray() * c.free, c.constraint(u, 0.0)[rows] / sizes

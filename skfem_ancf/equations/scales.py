@@ -1,4 +1,4 @@
-"""Energies of a scene by which round-off is judged."""
+"""Energy scales of a scene, for round-off."""
 
 from __future__ import annotations
 
@@ -13,13 +13,7 @@ EPS = float(np.finfo(float).eps)
 
 
 class Scales:
-    """Energies of a system that no displacement enters, and the round-off that follows from them.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`, which has to live as long.
-    """
+    """Energy scales of a system that do not depend on a displacement."""
 
     def __init__(self, system: Any) -> None:
         self._system = proxy(system)
@@ -33,10 +27,7 @@ class Scales:
 
     @cached_property
     def energy_of_bodies(self) -> float:
-        """What springs and loads do to rigid bodies over the scene's size; zero with others.
-
-        One where there are neither: a mechanism that is driven, in which no force has a unit.
-        """
+        """Energy scale of springs and loads for rigid bodies alone, else 0; 1 without any force."""
         s = self._system
         if s.beams or s.domains:
             return 0.0
@@ -47,15 +38,15 @@ class Scales:
 
     @cached_property
     def strain_noise(self) -> float:
-        """The root of the energy of strains that are round-off: eps times modulus times volume."""
+        """Root of the energy of strains of size eps: eps sqrt(modulus times volume)."""
         return EPS * sqrt(self.energy_of_strains)
 
     @cached_property
     def work_noise(self) -> float:
-        """The root of the work of a correction that is round-off.
+        """Root of the work of a correction that is round-off.
 
-        A displacement of the scene's size is known to eps times that size, its gradient in an
-        element to that over the element's length; the stiffness is that of the beam's mean section.
+        The round-off of displacements is eps times the size of the scene, that of their gradients
+        is larger by one over the length of an element.
         """
         s = self._system
         if not s.beams and not s.domains:
@@ -67,14 +58,14 @@ class Scales:
 
     @cached_property
     def force_noise(self) -> float:
-        """As :attr:`work_noise`, of a residual: it sums the round-off of all degrees of freedom."""
+        """:attr:`work_noise` of a residual, which sums the round-off of all DOFs of a node."""
         return self.work_noise * sqrt(max(b.nd for b in self._system.members))
 
     @cached_property
     def bending_eigenvalue(self) -> float:
-        """omega^2 of the slowest bending that a beam as long as the scene could have.
+        """omega^2 of the slowest bending of a beam as long as the scene, about.
 
-        Of rigid bodies alone that of all their mass on one spring, or swinging by all loads.
+        For rigid bodies, that of their total mass on one spring of the scene's stiffness.
         """
         s = self._system
         if not s.beams:
@@ -85,11 +76,7 @@ class Scales:
 
     @cached_property
     def inertia_of_places(self) -> float:
-        """The mass times places and directions, squared; zero where no joint knows them.
-
-        Of rigid bodies, whose directions are unit vectors, and where functions of time are places:
-        joints close to eps times these, however little has moved.
-        """
+        """Mass times squared positions, for the round-off of joints of bodies and of motions."""
         s = self._system
         if not s.bodies and not s.constraints.drives:
             return 0.0

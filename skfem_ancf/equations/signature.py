@@ -13,46 +13,44 @@ from scipy.sparse.linalg import splu
 from ..core.linalg import SMALL, Inertia, beside_zero, dense
 from ..core.types import Array
 
-#: Rest of a row beside those before it, relative to the row, that is round-off.
+#: Relative remainder of a dependent row.
 DEPENDENT = 1e-9
-#: Smallest over largest singular value of what is held that is round-off.
+#: Ratio of singular values that is zero to round-off.
 FREE = 1e-9
-#: Entries of L, of a matrix of unit diagonal, from which its pivots are not trusted.
+#: Largest entry of L, with a unit diagonal of the matrix, for trusted pivots.
 LARGEST = 1e6
-#: Columns up to which singular values, and equations that depend on others, are found by dense
-#: matrices.
+#: Largest number of columns for dense matrices.
 DENSE = 300
-#: Vectors of a null space that are looked for where it is not dense, and iterations for them.
+#: Largest number of null vectors of a sparse matrix, and number of iterations for them.
 MOST, ITERATIONS = 8, 6
 
 
 def first_dependent(J: Array | sparse.csr_array, free: Array,
                     phi: Callable[[], Array]) -> tuple[int, float] | None:
-    """The first equation that those before it hold already, or None.
+    """The first row of J (m, N) that depends on those before it at free DOFs, or None.
 
-    The rows of J fall apart into groups without a common coordinate. In each group QR
-    orthogonalises the rows in their order: what is left of a row is on the diagonal of R.
+    The rows are split into groups without a common column; each is orthogonalised by QR in order.
 
     Parameters
     ----------
     J
         Shape (m, N).
     free
-        Truth values of the coordinates that supports leave free, shape (N,).
+        Whether a DOF is free, shape (N,).
     phi
-        Returns the residual of each equation, shape (m,).
+        A function that returns the residuals (m,).
 
     Returns
     -------
     tuple or None
-        The number of the equation, and its residual where those before it are met.
+        The number of the row, and its residual when those before it are met.
     """
     size = np.sqrt((J * J).sum(axis=1))
     first = None
     for rows, _, A in groups(J * free):
         if first is not None and rows[0] > first[0]:
             continue
-        R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # and below it, what is not asked
+        R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # in the upper triangle
         rest, k = np.zeros(len(rows)), min(R.shape)
         rest[:k] = np.abs(R.diagonal())
         small = rest <= DEPENDENT * size[rows]
@@ -65,13 +63,13 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
 
 
 def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
-    """The rows of a sparse matrix in groups without a common column; of a dense one all at once.
+    """Split the rows of a sparse matrix into groups without a common column.
 
     Yields
     ------
     rows, columns, A
-        Numbers of the rows, increasing, of the columns that are not zero in all of them, and the
-        dense matrix between both.
+        Increasing row numbers, numbers of nonzero columns, and the dense submatrix. A dense matrix
+        is one group.
     """
     if isinstance(J, np.ndarray):
         columns, = J.any(axis=0).nonzero()
@@ -93,7 +91,7 @@ def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
 
 
 def members(group: Array, number: int) -> tuple[list[Array], Array]:
-    """The members of each group, and the place that each member has in its group."""
+    """Members of each group, and the position of each member in its group."""
     order, count = np.argsort(group, kind="stable"), np.bincount(group, minlength=number)
     place, ends = np.empty(len(group), dtype=int), np.cumsum(count)
     place[order] = np.arange(len(group)) - np.repeat(ends - count, count)
@@ -103,21 +101,21 @@ def members(group: Array, number: int) -> tuple[list[Array], Array]:
 def inertia_of(A: Array | sparse.csr_array) -> Inertia:
     """The :class:`~skfem_ancf.core.linalg.Inertia` of a symmetric matrix.
 
-    Of a sparse one from the signs of the pivots of ``L D L^T``, by Sylvester's law.
+    For a sparse matrix it follows from the pivots of ``L D L^T``, by Sylvester's law.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If there are no factors with pivots on the diagonal.
+        If the matrix has no factors with diagonal pivots.
     """
     size = np.abs(A.diagonal())
-    if not len(size):  # joints and supports leave nothing free
+    if not len(size):
         return Inertia(0, False)
     size[size == 0.0] = np.max(size)
     if isinstance(A, np.ndarray):
         root = np.sqrt(size)
         values = np.linalg.eigvalsh(A / (root[:, None] * root))
-        largest = max(1.0, values[-1])  # of its size is their round-off
+        largest = max(1.0, values[-1])  # scale of the round-off
         return beside_zero(lambda shift: int(np.sum(values < -shift * largest)))
     if is_definite(A):
         return Inertia(0, False)
@@ -127,7 +125,7 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
 
 
 def is_definite(A: sparse.csr_array) -> bool:
-    """True if a sparse symmetric matrix is positive definite, beyond round-off."""
+    """True if a sparse symmetric matrix is positive definite beyond round-off."""
     size = A.diagonal()
     if np.any(size <= 0.0):
         return False
@@ -139,7 +137,7 @@ def is_definite(A: sparse.csr_array) -> bool:
 
 
 def _pivots(A):
-    """The pivots of a symmetric matrix of unit diagonal; entries of L that grow are refused."""
+    """Pivots of a symmetric matrix with unit diagonal; LinAlgError if they are unreliable."""
     for order in ("MMD_AT_PLUS_A", "COLAMD"):
         try:
             lu = splu(A.tocsc(), order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -151,28 +149,25 @@ def _pivots(A):
 
 
 def determinant_sign(A: Array | sparse.csr_array) -> int:
-    """The sign of the determinant of a matrix: 1 or -1."""
+    """The sign of the determinant: 1 or -1."""
     if isinstance(A, np.ndarray):
         return -1 if np.linalg.slogdet(A)[0] < 0.0 else 1
     lu, one = splu(A.tocsc()), sparse.eye(A.shape[0], format="csr")
     odd = np.sum(lu.U.diagonal() < 0.0)
-    for order in (lu.perm_r, lu.perm_c):  # a cycle of k is k - 1 exchanges
+    for order in (lu.perm_r, lu.perm_c):  # parity: a cycle of length k is k - 1 exchanges
         odd += len(order) - connected_components(one[order])[0]
     return -1 if odd % 2 else 1
 
 
 def row_sizes(A: Array | sparse.csr_array) -> Array:
-    """The largest absolute value of each row of a matrix (m, n), shape (m,)."""
+    """The largest absolute value of each row, shape (m,)."""
     if isinstance(A, np.ndarray) or not A.nnz:
         return np.zeros(A.shape[0]) if not A.size else np.abs(A).max(axis=1)
     return np.asarray(abs(A).max(axis=1).toarray()).ravel()
 
 
 def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
-    """The rows of a matrix scaled to a largest entry of 1, without those that are zero.
-
-    Rows for slopes have another unit than rows for positions.
-    """
+    """Scale rows to a largest entry of 1 and drop zero rows."""
     size = row_sizes(A)
     keep = size > 0.0
     if not keep.all():
@@ -181,17 +176,9 @@ def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
 
 
 def null_space(H: Array | sparse.csr_array) -> Array:
-    """Vectors that span the null space of a matrix, as rows; of a large one some.
+    """Orthonormal vectors (k, n) of the null space of H (r, n), whose rows have unit size.
 
-    Parameters
-    ----------
-    H
-        Shape (r, n), rows of about unit size; sparse where n is above :data:`DENSE`.
-
-    Returns
-    -------
-    ndarray
-        Shape (k, n); with more than :data:`DENSE` columns at most :data:`MOST`.
+    With more than :data:`DENSE` columns at most :data:`MOST` vectors are found.
     """
     n = H.shape[1]
     if not H.shape[0]:
@@ -199,7 +186,7 @@ def null_space(H: Array | sparse.csr_array) -> Array:
     if n <= DENSE:
         _, sigma, V = np.linalg.svd(np.linalg.qr(dense(H), mode="r"))
         return V[int(np.sum(sigma > FREE * sigma[0])):]
-    # inverse iteration with H^T H + small^2, whose condition number is the square of this one's
+    # inverse iteration with H^T H + small^2, in a form with the root of its condition number
     small = 0.1 * FREE
     lu = splu(sparse.bmat([[small * sparse.eye(H.shape[0]), H],
                                   [H.T, -small * sparse.eye(n)]], format="csc"))
@@ -209,7 +196,7 @@ def null_space(H: Array | sparse.csr_array) -> Array:
     _, sigma, V = np.linalg.svd(np.linalg.qr(H @ X, mode="r"))
     largest = np.sqrt(sparse.linalg.norm(H, 1) * sparse.linalg.norm(H, np.inf))
     X = X @ V[sigma <= FREE * largest].T
-    # as few beams in each vector as there may be
+    # sparse vectors, with few beams in each
     _, R, pivots = scipy.linalg.qr(X.T, mode="economic", pivoting=True)
     k = len(R)
     out = np.empty((k, n))

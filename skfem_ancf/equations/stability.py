@@ -1,4 +1,4 @@
-"""The verdict on the stability of an equilibrium."""
+"""Stability of an equilibrium."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from ..core.types import Array
 
 logger = logging.getLogger(__name__)
 
-#: Stiffness that holds what supports leave free, over that of the loads.
-HELD = 1e-6
-#: Difference of motions of nodes that are one, over the largest.
+#: Smallest stiffness of unconstrained motions, relative to that of the loads.
+STABILISING = 1e-6
+#: Largest relative difference of nodal displacements in a rigid translation.
 SAME = 0.2
-#: Forces that are zero, over those that a strain of one would cause.
+#: Relative size of forces that are zero.
 NOTHING = 1e-20
-#: Largest difference of a tangent from its transpose, relative, that is round-off.
+#: Largest relative asymmetry that is round-off.
 ROUND_OFF = 1e-10
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the tangent says of an equilibrium.
+    """The stability of an equilibrium.
 
     Attributes
     ----------
     stability : str
-        "stable", "unstable", "singular" where an eigenvalue is zero to round-off, or "undecided"
-        where the loads have no potential and the tangent does not tell.
+        "stable", "unstable", "singular" (an eigenvalue is zero to round-off), or "undecided" (the
+        loads have no potential, and the symmetric part of the tangent is indefinite).
     negative_pivots : int
-        Number of negative eigenvalues of the tangent at free coordinates, on the tangent space of
-        the joints; of its symmetric part where loads have no potential.
+        Number of negative eigenvalues of the tangent at free degrees of freedom, on the null space
+        of the joint Jacobian; of its symmetric part if loads have no potential.
     note : str
-        What the verdict does not say; empty where it says all.
+        Limits of the verdict, or "".
     """
 
     stability: str
@@ -52,27 +52,18 @@ class Verdict:
         return f"{out}, {self.note}" if self.note else out
 
 
-FOLLOWS = "against divergence: the loads have no potential, and flutter is not seen in statics"
-RUBS = "with friction as it is, sticking or slipping: it has no potential, and flutter is not seen"
+FOLLOWS = "against divergence: the loads have no potential, and statics cannot detect flutter"
+RUBS = "with the current stick and slip: friction has no potential, flutter is not detected"
 
 
 def verdict(system: Any, u: Array, load: float, multipliers: Array,
             t: float | None = None) -> Verdict:
-    """The :class:`Verdict` on an equilibrium, from the tangent there.
+    """The :class:`Verdict` on an equilibrium u (N,) with multipliers (m,).
 
-    Where the loads have no potential (a pressure with free edges) the tangent K is not symmetric.
-    An odd number of negative eigenvalues, det K < 0, then is a motion that grows without
-    oscillating: unstable. A symmetric part that is positive definite excludes any such motion. In
-    between the tangent does not tell, and flutter needs the masses: see ``scene.modes``.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u, multipliers
-        Displacement (N,) and multipliers (m,).
-    load, t
-        Load factor, and the time of joints that move; the load factor by default.
+    Without a potential, as for a pressure with free edges, the tangent K is unsymmetric. det K < 0
+    (an odd number of negative eigenvalues) means divergence: unstable. A positive definite
+    symmetric part excludes it. All else is undecided, and flutter depends on the mass: see
+    ``scene.modes``.
     """
     try:
         system.assemble(u, load)
@@ -84,7 +75,7 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
 
 
 def verdict_of_factors(system: Any) -> Verdict:
-    """As :func:`verdict`, from the tangent that has been factorised."""
+    """The :class:`Verdict` from the factorised tangent."""
     negative, singular = system.solver.inertia()
     rubs = system.forces.contacts.anchored
     who = "friction or loads have" if rubs else "the loads have"
@@ -94,28 +85,18 @@ def verdict_of_factors(system: Any) -> Verdict:
         return Verdict("unstable", negative, f"by divergence: {who} no potential")
     if negative:
         return Verdict("undecided", negative, f"{who} no potential, and only the symmetric "
-                       "part of the tangent is indefinite: scene.modes tells")
+                       "part of the tangent is indefinite: see scene.modes")
     return Verdict("singular" if singular else "stable", 0, RUBS if rubs else FOLLOWS)
 
 
 def _is_symmetric(system):
-    """True if the tangent of loads that follow is symmetric all the same."""
+    """True if the tangent of follower loads happens to be symmetric."""
     skew, size = system.K.skew_size(system.constraints.coordinate_sizes * system.constraints.mask)
     return skew <= ROUND_OFF * size
 
 
 def has_potential(system: Any, u: Array, load: float) -> bool:
-    """True if the tangent is symmetric: the loads have a potential, or act like such.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u
-        Displacement of the coordinates, shape (N,).
-    load
-        Load factor.
-    """
+    """True if the tangent at u (N,) is symmetric."""
     if system.symmetric:
         return True
     system.assemble(u, load)
@@ -123,40 +104,23 @@ def has_potential(system: Any, u: Array, load: float) -> bool:
     return _is_symmetric(system)
 
 
-def holds(system: Any, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
-    """True unless the equilibrium that an iteration has just found is unstable.
+def not_unstable(system: Any, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
+    """True unless the equilibrium that an iteration just found is unstable.
 
-    The factors of the last iterate mostly answer at little cost; what they do not affirm is asked
-    of the tangent at the solution.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u, multipliers
-        The equilibrium, shapes (N,) and (m,).
-    load, t
-        Load factor, and the time of joints that move.
+    The last factors usually decide; otherwise the tangent is factorised at the solution.
     """
     try:
         if system.solver.stays():
             return True
     except NO_FACTORS:
-        logger.debug("the last factors do not tell")
+        logger.debug("the last factors do not decide")
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
 
-def is_held(system: Any, u: Array, multipliers: Array) -> bool:
-    """True if loads or obstacles hold an equilibrium of a scene whose supports leave it free.
+def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
+    """True if loads or obstacles stabilise a scene with unconstrained rigid motions.
 
-    Its tangent has to be positive definite, and not by round-off alone.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u, multipliers
-        The equilibrium at full load, shapes (N,) and (m,).
+    The tangent at u (N,) must be positive definite beyond round-off.
     """
     force, _ = system.assemble(u)
     fix(system.K.band, system.constraints.fixed)
@@ -165,7 +129,7 @@ def is_held(system: Any, u: Array, multipliers: Array) -> bool:
     acting = np.max(loads * weights)
     if acting * system.size <= NOTHING * system.scales.energy_of_strains:
         return False
-    least = HELD * acting / (system.size * max(1.0, np.sum(weights)))
+    least = STABILISING * acting / (system.size * max(1.0, np.sum(weights)))
     system.K.add_diagonal(-least * weights)
     try:
         system.solver.factorize(u, 1.0, multipliers)
@@ -175,15 +139,7 @@ def is_held(system: Any, u: Array, multipliers: Array) -> bool:
 
 
 def motion_in_words(system: Any, u: Array, v: Array) -> str:
-    """Which member moves most along the direction v of the coordinates, and how, in words.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u, v
-        Displacement, and a direction, shape (N,) both.
-    """
+    """Describe a direction v (N,) at a displacement u (N,): which member moves most, and how."""
     def nodes(member, s):
         return np.reshape(v[s], (-1, member.nd))[:, :2]
 
@@ -207,16 +163,7 @@ def motion_in_words(system: Any, u: Array, v: Array) -> str:
 
 
 def weak_at_rest(system: Any) -> str:
-    """Why a scene gives way without any load, if its strain energy is to blame; else empty.
-
-    A spring may push a scene out of rest, and a way leads down from there. Where a formulation
-    subtracts a part of the energy and leaves less than nothing, none does.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    """
+    """Why a scene is unstable without load because of an indefinite strain energy, or ""."""
     at_rest = np.zeros((3, 1))
     names = sorted({beam.formulation.name for beam in system.beams for term in beam.terms
                     if np.linalg.eigvalsh(term.law.moduli(at_rest)[..., 0])[0] < 0.0})
@@ -225,37 +172,25 @@ def weak_at_rest(system: Any) -> str:
     found = verdict(system, np.zeros(system.N), 0.0, np.zeros(system.constraints.m))
     if found.stability != "unstable":
         return ""
-    return (f"the scene gives way at rest, without any load ({found}): the strain energy of "
+    return (f"the scene is unstable without load ({found}): the strain energy of "
             f"formulation {', '.join(map(repr, names))} is not positive for this order of the "
-            "element and this Poisson ratio. The formulations 'assumed' (the default) and "
-            "'continuum' have a positive one; so has a smaller nu or order")
+            "element and this Poisson ratio. Use formulation 'assumed' (the default) or "
+            "'continuum', a smaller nu or a smaller order")
 
 
 def potential(system: Any, u: Array, load: float, turned: Array | None = None) -> float:
-    """The total potential: strain energy less the work of the loads.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    u
-        Displacement of the coordinates, shape (N,).
-    load
-        Load factor.
-    turned
-        As of :meth:`~skfem_ancf.equations.system.System.load_potential`, shape (k,).
-    """
+    """Total potential at u (N,): strain energy minus the work of the loads."""
     return system.strain_energy(u, load) + load * system.load_potential(u, turned=turned)
 
 
 def largest_displacement(system: Any, du: Array) -> float:
-    """The largest displacement of a node, of changes of the DOFs (..., N)."""
+    """The largest displacement of a node, for displacements (..., N)."""
     places = np.nonzero(position_weights(system))[0]
     return float(np.hypot(*du[..., places].reshape(-1, 2).T).max(initial=0.0))
 
 
 def position_weights(system: Any) -> Array:
-    """One at the positions of the nodes, zero at other coordinates, shape (N,)."""
+    """One at nodal positions, zero at other DOFs, shape (N,)."""
     weights = np.zeros(system.N)
     for beam, s in zip(system.members, system.slices):
         weights[s].reshape(-1, beam.nd)[:, :2] = 1.0

@@ -30,7 +30,7 @@ from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
 from .backend import Backend
 from .constraints import Constraints
-from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
+from .evaluation import FORCE, LINEARISED, MEAN, TANGENT, VISCOUS, evaluate
 from .linear_solver import LinearSolver
 from .mass_solver import MassSolver, ModalDamping
 from .scales import Scales
@@ -39,36 +39,29 @@ from .scales import Scales
 class System:
     """The discrete equations of a scene.
 
-    The unknown is the displacement ``u`` of all degrees of freedom from the reference
-    configuration, beam after beam, and a multiplier for each equation of a joint:
+    The unknowns are the displacement ``u`` of all degrees of freedom from the reference
+    configuration, and a multiplier for each equation of a joint:
     ``M u'' + f(u) + J^T lambda = load Q(u)``, ``Phi(u, t) = 0``, ``J = dPhi / du``.
 
     Parameters
     ----------
-    beams
-        The beams, in order.
-    loads
-        The loads of all beams.
+    beams, loads, bodies, domains
+        Beams, loads, rigid bodies and domains. DOFs are numbered in the order beams, bodies,
+        domains.
     fixed, values
-        Numbers of the fixed degrees of freedom and their displacements at full load, shape (n,).
-    joints
-        Joints, already bound.
+        Fixed degrees of freedom and their displacements at full load, shape (n,).
+    joints, elements
+        Bound joints and force elements.
     damping
         A :class:`~skfem_ancf.materials.damping.Damping`, or None.
-    elements
-        Force elements, already bound.
-    bodies
-        Rigid bodies, whose degrees of freedom come behind those of the beams.
-    domains
-        Domains, whose degrees of freedom come last.
     rest_modes
         ``rest_modes(system, k)`` returns k angular frequencies above those of rigid motions about
-        the reference configuration, and their shapes (k, N); modal damping asks for them.
+        the reference configuration, and their shapes (k, N), for modal damping.
 
     Other Parameters
     ----------------
     u, v, t
-        Displacement and velocity, shape (N,), and time; None is full size of loads.
+        Displacement and velocity, shape (N,), and time; None for loads at full size.
     load
         Load factor of statics.
 
@@ -76,19 +69,14 @@ class System:
     ----------
     members : list
         Beams, rigid bodies and domains, with ``slices`` of the degrees of freedom.
-    constraints : Constraints
-        Supports and joints.
-    forces : Forces
-        Force elements.
     symmetric : bool
-        The tangent is symmetric, as all loads and force elements have a potential.
+        True if all loads and force elements have a potential.
     items : tuple or None
-        What acts, as it was given, for pictures; None of a copy in another process.
+        The actions as the user gave them, for plots; None in a copy in another process.
     units : tuple of str or None
-        Units of force and length, for pictures and files.
+        Units of force and length, for plots and files.
     clock : float or None
-        The time at which statics takes functions of time, see :meth:`stopped_at`; None for full
-        size of loads.
+        The time of functions of time in statics, see :meth:`stopped_at`; None for full load.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
@@ -121,9 +109,9 @@ class System:
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         if self.damping.stiffness and domains:
-            raise InputError("damping(stiffness=...) resists rates of strains, which the forms of "
-                             f"{domains[0]!r} do not know: give beams KelvinVoigt(time) as their "
-                             "damping=, and the scene damping(modal=...) or damping(mass=...)")
+            raise InputError("damping(stiffness=...) acts on strain rates, which the forms of "
+                             f"{domains[0]!r} do not have: give beams damping=KelvinVoigt(time), "
+                             "and the scene damping(modal=...) or damping(mass=...)")
         self._rest_modes = rest_modes
         self.items: tuple[Any, ...] | None = None
         self.units: tuple[str, str] | None = None
@@ -137,7 +125,6 @@ class System:
                 self._varying.append(load)
 
     def __getstate__(self):
-        """What it was made of: work arrays and factors are made again."""
         return self._given
 
     def __setstate__(self, given):
@@ -147,46 +134,46 @@ class System:
         return self
 
     def __deepcopy__(self, memo):
-        return self  # it is the same equations, however many states have them
+        return self
 
     def of(self, load_or_member: Load | Beam | RigidBody | Domain) -> slice:
-        """The slice of the degrees of freedom of a member, or of a load's."""
+        """The DOFs of a member, or of the member of a load."""
         return self.slices[self._index[id(getattr(load_or_member, "beam", load_or_member))]]
 
-    # what belongs to it, made when it is asked for
+    # parts
 
     @cached_property
     def points(self) -> Points:
-        """What finds material points."""
+        """Location of material points."""
         frame = self.constraints.frame
         return Points(self.beams, self.slices, self.members[len(self.beams):],
                       None if frame is None else frame.lines)
 
     @cached_property
     def backend(self) -> Backend:
-        """What runs kernels on the tables of this system, in NumPy or compiled."""
+        """Runs kernels in NumPy or compiled."""
         return Backend(self)
 
     @cached_property
     def scales(self) -> Scales:
-        """Energies and their round-off."""
+        """Energy scales and round-off."""
         return Scales(self)
 
     @cached_property
     def solver(self) -> LinearSolver:
-        """What factorises :attr:`K` with supports and joints, and solves with it."""
+        """Solves with :attr:`K`, supports and joints."""
         return LinearSolver(self)
 
     @cached_property
     def mass_solver(self) -> MassSolver:
-        """What solves with the mass matrix, supports and joints."""
+        """Solves with the mass matrix, supports and joints."""
         return MassSolver(self)
 
     # loads
 
     @contextmanager
     def stopped_at(self, t: float) -> Iterator[None]:
-        """Statics takes functions of time at the time t."""
+        """Evaluate functions of time at t in statics."""
         before, self.clock = self.clock, t
         try:
             yield
@@ -204,15 +191,10 @@ class System:
 
     def load_potential(self, u: Array, t: float | None = None,
                        turned: Array | None = None) -> float:
-        """Potential of the loads; loads without one count as zero.
+        """Potential of the loads; loads without a potential count as zero.
 
-        Parameters
-        ----------
-        u, t
-            As for :meth:`external_force`, shape (N,).
-        turned
-            The angles by which the sections of moments have turned, in the order of these, shape
-            (k,); by default those of u, of which whole turns are counted along a beam only.
+        ``turned`` (k,) are the rotations of the sections of moments, with whole turns; by default
+        those of u.
         """
         t, total, number = self.clock if t is None else t, 0.0, count()
         for load in self.loads:
@@ -225,7 +207,7 @@ class System:
 
     @property
     def varies(self) -> bool:
-        """True if supports or loads may ask functions of time."""
+        """True if supports or loads may depend on time."""
         return bool(self._varying) or self.constraints.moves
 
     # beams and force elements
@@ -238,30 +220,30 @@ class System:
         return self._evaluate(FORCE, u, load=load, t=t)
 
     def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
-        """The internal force whose work from u0 to u1, shape (N,), is the change of the energy."""
+        """The internal force (N,) whose work from u0 to u1 is the change of the strain energy."""
         return self._evaluate(MEAN, u0, u1, t=t)
 
     def strain_energy(self, u: Array, t: float = 1.0) -> float:
-        """Strain energy of all beams, and the potential of force elements."""
+        """Strain energy of beams and potential of force elements."""
         return float(self.energy_of_beams(u) + self.energy_of_forces(u, t))
 
     def energy_of_beams(self, u: Array) -> Any:
-        """The beams' part of :meth:`strain_energy`: of u (N,) a number, of (k, N) an array (k,)."""
+        """Strain energy of the beams: for u (N,) a number, for (k, N) an array (k,)."""
         return sum(b.kernel.energy(u[..., s]) for b, s in zip(self.beams, self.slices))
 
     def energy_of_forces(self, u: Array, t: float = 1.0) -> float:
-        """The force elements' part of :meth:`strain_energy`."""
+        """Potential of the force elements."""
         if not self.forces.elements:
             return 0.0
         return self.forces.potential(self.backend.tables.plain.forces, u, t)
 
     def inverted(self, u: Array) -> bool:
-        """True if a body is turned inside out somewhere."""
+        """True if an element is turned inside out."""
         return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices)
                    if b.has_sections) or any(d.inverted(u[self.of(d)]) for d in self.domains)
 
     def folded(self, u: Array) -> bool:
-        """True if the axis turns back within an element of a beam."""
+        """True if the axis folds back within an element."""
         return any(folded(b, u[s]) for b, s in zip(self.beams, self.slices))
 
     def stiffness_at_rest(self) -> sparse.csr_array:
@@ -271,7 +253,7 @@ class System:
         return sparse.csr_array((v, (i, j)), shape=(self.N, self.N))
 
     def _holding(self):
-        """The stiffness that may hold what supports leave free."""
+        """Stiffness that may constrain rigid motions: of force elements and user-defined loads."""
         K = self.stiffness_at_rest()
         for load in filter(_holds, self.loads):
             first, (i, j, v) = self.of(load).start, load.stiffness(np.zeros(load.beam.N))
@@ -288,21 +270,20 @@ class System:
 
     @property
     def viscous(self) -> bool:
-        """True if a beam resists the rates of its strains."""
+        """True if a beam has viscous damping."""
         return any(time > 0.0 for time in self.retardation)
 
     @property
     def damped(self) -> bool:
-        """True if something resists velocities."""
+        """True if a force depends on velocities."""
         return self.viscous or bool(self.damping) or self.forces.resists
 
     @cached_property
     def modal_damping(self) -> ModalDamping:
-        """The damping of single modes."""
         return ModalDamping(self, self._rest_modes)
 
     def damping_force(self, u: Array, v: Array, t: float | None = None) -> Array:
-        """The force that resists the velocity v at u, shape (N,)."""
+        """The damping force at u and v, shape (N,)."""
         force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
         if self.forces.resists:
             add_resisting_force(self.backend.tables.plain.forces, 0.0 if t is None else t, u, v,
@@ -315,19 +296,19 @@ class System:
 
     @property
     def bandwidth(self) -> int:
-        """Subdiagonals of the tangent and of the mass matrix."""
+        """Number of subdiagonals of tangent and mass matrix."""
         return max([2 * b.nd - 1 for b in self.members] + [d.bandwidth for d in self.domains])
 
     def new_band(self) -> BandMatrix:
-        """An empty band matrix of the scene."""
+        """A zero band matrix."""
         return BandMatrix(self.N, self.bandwidth, self.symmetric)
 
     @cached_property
     def mass(self) -> BandMatrix:
-        """The mass matrix; assembled once."""
+        """The mass matrix."""
         M = self.new_band()
         for beam, s in zip(self.beams, self.slices):
-            for first in range(0, beam.mesh.nelements, 1024):  # bounds the memory
+            for first in range(0, beam.mesh.nelements, 1024):  # to limit the memory
                 part = slice(first, first + 1024)
                 M.add_elements(beam.mass_elements(part), s.start, beam.nd, beam.mesh.t[0, part])
         for mass in self.forces.masses:
@@ -339,31 +320,28 @@ class System:
 
     @cached_property
     def K(self) -> BandMatrix:
-        """The tangent within the band, filled by :meth:`assemble`."""
+        """The tangent within the band, set by :meth:`assemble`."""
         return self.new_band()
 
-    def assemble(self, u: Array, load: float = 1.0, carried: Array | None = None,
+    def assemble(self, u: Array, load: float = 1.0, independent: Array | None = None,
                  geometric: bool = True, t: float | None = None) -> tuple[Array, Array]:
-        """Internal force, and the tangent of the residual into :attr:`K`.
+        """Assemble the tangent of the residual in :attr:`K`.
 
         Parameters
         ----------
         u
             Displacement, shape (N,).
-        load
-            Factor on the loads, which may have a stiffness.
-        carried
-            Stresses (n,) for the geometric part, as :meth:`carried_stress` returns them.
+        load, t
+            Load factor and time of the loads, which may have a stiffness.
+        independent
+            Independent stresses (n,) for the geometric part, see :meth:`linearised_stress`.
         geometric
-            Include the geometric part, and the stiffness of loads that follow the body. Both grow
-            with the load: linear theory has none of them.
-        t
-            Time, for loads with an amplitude.
+            Include the geometric part and the stiffness of follower loads; linear theory does not.
 
         Returns
         -------
         force, stresses
-            The internal force (N,), and the stresses (n,) that :meth:`carried_stress` takes.
+            The internal force (N,), and the stresses (n,).
         """
         self._require_displacement(u)
         t = self.clock if t is None else t
@@ -371,15 +349,15 @@ class System:
         self.solver.assembled_at(u, load if t is None else t)
         stresses = self.backend.tables.stresses
         if not geometric:
-            carried = np.zeros_like(stresses)
-        force = self._evaluate(TANGENT, u, None, load, t, (stresses, carried), geometric)
+            independent = np.zeros_like(stresses)
+        force = self._evaluate(TANGENT, u, None, load, t, (stresses, independent), geometric)
         return force, stresses
 
-    def carried_stress(self, u: Array, stresses: Array, du: Array) -> Array:
-        """Stresses (n,) at u, shape (N,), carried to ``u + du`` by linearisation."""
-        carried = np.zeros_like(stresses)
-        self._evaluate(CARRY, u, du, stresses=(stresses, carried))
-        return carried
+    def linearised_stress(self, u: Array, stresses: Array, du: Array) -> Array:
+        """Stresses (n,) at u, linearised to ``u + du``: S + C B(u) du."""
+        independent = np.zeros_like(stresses)
+        self._evaluate(LINEARISED, u, du, stresses=(stresses, independent))
+        return independent
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=(None, None), geometric=True):
         """Run :func:`~skfem_ancf.equations.evaluation.evaluate`; returns the force."""
@@ -391,16 +369,16 @@ class System:
         if what == TANGENT and t is not None and self._varying:
             factors = load * tables.factors(np.array([t]))[0]
         none = tables.stresses if stresses[1] is None else None
-        of, carried = (none if x is None else x for x in stresses)
+        of, independent = (none if x is None else x for x in stresses)
         force = np.zeros(self.N)
         self.backend.of(evaluate)(what, u, v, factors, time, float(load),
-                                  stresses[1] is not None, of, carried, force)
+                                  stresses[1] is not None, of, independent, force)
         return force
 
     def _require_displacement(self, u):
         if u.shape != (self.N,):
-            raise InputError(f"the displacement of the scene's coordinates has shape ({self.N},), "
-                             f"got {u.shape}; the state of another mesh?")
+            raise InputError(f"the displacement must have the shape ({self.N},), got {u.shape}: "
+                             "is it the state of another mesh?")
 
 
 def _holds(load):
@@ -408,6 +386,6 @@ def _holds(load):
 
 
 def _extent(bodies):
-    """How far bodies reach."""
+    """The largest extent of rigid bodies."""
     corners = np.concatenate([body.outline_at(np.zeros(body.N)) for body in bodies], axis=1)
     return float(np.max(np.ptp(corners, axis=1)))

@@ -1,4 +1,4 @@
-"""The equations of a scene as tables that kernels take."""
+"""Tables of the equations of a scene, the arguments of kernels."""
 
 from copy import copy
 from functools import cached_property, partial
@@ -8,7 +8,7 @@ from weakref import ref
 import numpy as np
 
 from ..core.band import Band
-from ..beam.strain_energy import (BEGIN, KIND, FlatBody, body_of, copies_of, pushed_body_of,
+from ..beam.strain_energy import (BEGIN, KIND, FlatBody, body_of, copies_of, eigenstrain_body_of,
                                   stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.law import LINEAR
@@ -21,72 +21,40 @@ from ..actions.tables import JointTables, LoadTables
 from .user_defined import UserDefined
 from ..core.types import Array
 
-#: Of a scene without them.
+#: Empty tables.
 _NO_INTS = np.zeros(0, np.int64)
 _NO_JOINTS = JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
                          np.zeros(0), 0)
 _NO_MOMENTS = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
                          np.zeros(0), _NO_INTS)
 _NO_BODY = FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64))
-_NO_PUSHES = np.zeros((0, 0))
+_NO_EIGENSTRAINS = np.zeros((0, 0))
 
 
 class Equations(NamedTuple):
-    """A scene for kernels.
+    """The equations of a scene for kernels."""
 
-    Attributes
-    ----------
-    body
-        A :class:`~skfem_ancf.beam.strain_energy.Body`; a ``FlatBody`` for compiled code.
-    loads, joints
-        :class:`~skfem_ancf.actions.tables.LoadTables`,
-        :class:`~skfem_ancf.actions.tables.JointTables`.
-    fixed, free
-        Fixed coordinates, and for each one 1 or 0.
-    K
-        The band for the tangent, work space.
-    forces
-        :class:`~skfem_ancf.actions.forces.kernels.ForceTables`.
-    viscous
-        As ``body``, of what resists the rates of strains; the same where nothing does.
-    copies
-        As ``body``, of several times all coordinates, one behind the other; see
-        :meth:`Tables.copied`, the same where nobody has asked.
-    sizes
-        Those of the coordinates, see
-        :attr:`skfem_ancf.equations.constraints.Constraints.coordinate_sizes`.
-    """
-
-    body: Annotated[Any, FlatBody]
+    body: Annotated[Any, FlatBody]  # strain energy: a Body, or a FlatBody for compiled code
     loads: LoadTables
     joints: JointTables
-    fixed: I1
-    free: F1
-    K: Band
-    viscous: Annotated[Any, FlatBody]
+    fixed: I1  # numbers of fixed DOFs
+    free: F1  # 1 for free DOFs, else 0
+    K: Band  # work: the tangent
+    viscous: Annotated[Any, FlatBody]  # as body, of viscous stresses; body itself without any
     forces: ForceTables
-    copies: Annotated[Any, FlatBody]
-    sizes: F1
+    copies: Annotated[Any, FlatBody]  # as body, for several displacements, see Tables.copied
+    sizes: F1  # Constraints.coordinate_sizes
 
 
 class Tables:
-    """The tables of a system, and what of them depends on time.
+    """The tables of a system, and their time-dependent parts.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-
-    Attributes
-    ----------
-    plain : Equations
-        What the functions of :mod:`skfem_ancf.core.source` take.
-    motion_varies, turns : bool
-        A joint moves with time; its derivative in the reference configuration does.
+    ``plain`` are the Equations for NumPy; ``motion_varies`` is True if a joint moves with time,
+    ``turns`` if its Jacobian in the reference configuration does.
     """
 
     def __init__(self, system: Any) -> None:
-        # the system has the tables: without a circle both go when nobody asks for them any more
+        # a weak reference, since the system refers to the tables
         self._system = ref(system)
         self._user_defined: UserDefined | None = None
         self._sort(system.loads)
@@ -101,33 +69,32 @@ class Tables:
 
     @property
     def system(self) -> Any:
-        """Whose they are."""
         system = self._system()
         assert system is not None
         return system
 
     def _sort(self, loads):
-        # of the constant kind, moments, linear ones, stress-free strains, others
+        # constant loads, moments, linear loads, eigenstrains, others
         self._loads: list[list[Any]] = [[], [], [], [], []]
         for load in loads:
             self._loads[_kind(load)].append(load)
 
     @property
     def asks(self) -> bool:
-        """True if kernels ask the system in Python, by its handle."""
+        """True if kernels call user-defined items in Python."""
         plain = self.plain
-        return bool(plain.loads.own or plain.joints.own or plain.forces.own)
+        return bool(plain.loads.custom or plain.joints.custom or plain.forces.custom)
 
     @cached_property
     def parts(self) -> list[str]:
-        """What of :data:`skfem_ancf.equations.loops.PARTS` the scene has."""
+        """The parts of :data:`skfem_ancf.equations.loops.PARTS` that the scene uses."""
         forces = self.plain.forces
         return [*["StrainTables"] * (len(self.plain.body.packs) > 0),
                 *["elements"] * (forces.number > 0), *["contacts"] * (forces.contacts.number > 0)]
 
     @cached_property
     def linearised(self) -> "Tables | None":
-        """The same with laws of constant moduli, those without strain; None if all are such."""
+        """Tables with the linearised laws at zero strain; None if all laws are linear."""
         body = self.plain.body
         if all(t.law.kind == LINEAR for t in body.packs):
             return None
@@ -135,23 +102,23 @@ class Tables:
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
 
     def copied(self, n: int) -> "Tables":
-        """The same with ``n`` copies of all coordinates, whose forces a kernel finds together."""
+        """Tables for n displacements at once."""
         return self.with_equations(self.plain._replace(
             copies=copies_of(self.plain.body, n, self.system.N)))
 
     def with_equations(self, plain: Equations) -> "Tables":
-        """The same with other numbers."""
+        """A copy with other equations."""
         tables = copy(self)
         tables.plain = plain
         return tables
 
     def _forces(self):
         s = self.system
-        return s.forces.tables(s.K.position, s.symmetric, self.handle if s.forces.own else 0)
+        return s.forces.tables(s.K.position, s.symmetric, self.handle if s.forces.custom else 0)
 
     @property
     def handle(self) -> int:
-        """What kernels know the user-defined items by."""
+        """The handle of the user-defined items."""
         if self._user_defined is None:
             self._user_defined = UserDefined(self.system, self._loads[-1])
             self._handle = handle_of(self._user_defined)
@@ -159,7 +126,7 @@ class Tables:
 
     @property
     def stresses(self) -> Array:
-        """Room for the stresses of all beams."""
+        """A work array for the stresses of all beams."""
         return np.zeros(self._stress_size)
 
     @cached_property
@@ -170,16 +137,16 @@ class Tables:
 
     def _load_tables(self):
         s = self.system
-        steady, turning, linear, pushing, others = self._loads
+        steady, turning, linear, eigen, others = self._loads
         self._rows = [load for load in steady if load.amplitude is not None]
         vectors = np.zeros((1 + len(self._rows) + len(linear), s.N))
         vectors[0] = s.constant_force
         for row, load in enumerate(self._rows, 1):
             vectors[row, s.of(load)] += load.force(None)
-        pushed = self._pushed(pushing)
+        eigenstrains = self._eigenstrains(eigen)
         if not linear:
             return LoadTables(vectors, self._moments(turning), _NO_INTS, _NO_INTS, np.zeros(0),
-                              _NO_INTS, *pushed, self.handle if others else 0)
+                              _NO_INTS, *eigenstrains, self.handle if others else 0)
         entries, first = [[np.zeros(0)] * 4], len(vectors) + len(turning)
         for k, load in enumerate(linear):
             zero, at = np.zeros(load.beam.N), s.of(load)
@@ -188,21 +155,22 @@ class Tables:
             entries.append((at.start + i, at.start + j, v, np.full(len(v), first + k)))
         i, j, v, k = (np.concatenate(column) for column in zip(*entries))
         return LoadTables(vectors, self._moments(turning), *(x.astype(np.int64) for x in (i, j)),
-                          v.astype(float), k.astype(np.int64), *pushed,
+                          v.astype(float), k.astype(np.int64), *eigenstrains,
                           self.handle if others else 0)
 
-    def _pushed(self, loads):
-        """The beams with stress-free strains, and these, a row for each load."""
+    def _eigenstrains(self, loads):
+        """The beams with eigenstrains, and a row of these for each load."""
         if not loads:
-            return _NO_BODY, _NO_PUSHES
+            return _NO_BODY, _NO_EIGENSTRAINS
         of = {id(load.beam): load.beam for load in loads}
         beams = list(of.values())
-        body = pushed_body_of(beams, [self.system.of(beam) for beam in beams])
+        body = eigenstrain_body_of(beams, [self.system.of(beam) for beam in beams])
         first = np.cumsum([0, *(len(beam.kernel.tables) for beam in beams)])[:-1]
         begins = dict(zip(of, body.table[first, BEGIN]))
         rows = np.zeros((len(loads), stress_size(body)))
         for row, load in zip(rows, loads):
-            begin, values = begins[id(load.beam)], np.concatenate([x.ravel() for x in load.pushes])
+            begin = begins[id(load.beam)]
+            values = np.concatenate([x.ravel() for x in load.eigen_stresses])
             row[begin:begin + len(values)] = values
         return body, rows
 
@@ -214,7 +182,7 @@ class Tables:
         start = np.zeros((n, 2))
         for k, load in enumerate(turning):
             size, first = load.dofs.shape[1], self.system.of(load).start
-            dofs[k] = first + load.dofs[:, :1]  # what is left over has no weight
+            dofs[k] = first + load.dofs[:, :1]  # padding, with weight zero
             dofs[k, :, :size], c[k, :size] = first + load.dofs, load.c
             start[k] = load.direction(np.zeros(load.beam.N))
         opposite = np.full(n, -1, dtype=np.int64)
@@ -227,12 +195,12 @@ class Tables:
 
     @property
     def _columns(self):
-        """The load of each factor; None for all that are constant."""
-        _, turning, linear, pushing, _ = self._loads
-        return [None, *self._rows, *linear, *turning, *linear, *pushing]
+        """The load of each factor; None for the constant loads."""
+        _, turning, linear, eigen, _ = self._loads
+        return [None, *self._rows, *linear, *turning, *linear, *eigen]
 
     def factors(self, times: Array) -> Array:
-        """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
+        """Load factors at times (n,), shape (n, k), or one row if constant."""
         varying, n = self._amplitudes
         out = np.empty((len(times) if varying else 1, n))
         out.fill(1.0)
@@ -242,7 +210,7 @@ class Tables:
 
     @cached_property
     def _amplitudes(self):
-        """Functions of factors that vary, with their numbers, and the number of all factors."""
+        """Numbers and functions of time-dependent factors, and the number of all factors."""
         columns = self._columns
         return [(k, partial(sample, load.amplitude, name="amplitude"))
                 for k, load in enumerate(columns)
@@ -250,18 +218,13 @@ class Tables:
 
     @cached_property
     def prestressed(self) -> bool:
-        """True if the first tangent has other factors of loads, see :meth:`static_factors`."""
+        """True if a load acts as prestress in the first tangent, see :meth:`static_factors`."""
         return any(load.prestress for load in [*self._loads[2], *self._loads[3]])
 
     def static_factors(self, scale: float, before: float | None = None) -> Array:
-        """Factors of the loads in statics, where an amplitude counts as one; shape (k,).
+        """Load factors (k,) in statics at the load factor ``scale``.
 
-        Parameters
-        ----------
-        scale
-            The load factor.
-        before
-            That of the state to start from, for the first tangent, of loads that prestress.
+        ``before`` is the load factor of the initial state, for prestress in the first tangent.
         """
         out = scale * self._at_rest
         if before is None or not self.prestressed:
@@ -273,16 +236,13 @@ class Tables:
         return out
 
     def linear_factors(self, scale: float) -> Array:
-        """As :meth:`static_factors` for the stiffness of loads in linear theory: of the user's own.
-
-        That the package's loads follow the body is of second order there.
-        """
+        """Load factors for the load stiffness in linear theory: of user-defined loads only."""
         own = [load is not None and load.first_order for load in self._columns]
         return np.where(own, self.static_factors(scale), 0.0)
 
     @cached_property
     def _at_rest(self):
-        """Factors of the loads in statics at full load."""
+        """Load factors in statics at full load."""
         return np.array([1.0 if load is None else load.at_rest for load in self._columns])
 
     # joints
@@ -302,35 +262,32 @@ class Tables:
 
     @property
     def linear_joints(self) -> bool:
-        """True if the equations of joints are linear in the coordinates, the same at all times."""
+        """True if the joint equations are linear and constant in time."""
         joints = self.plain.joints
-        return not (len(joints.hk) or joints.own or self.motion_varies)
+        return not (len(joints.hk) or joints.custom or self.motion_varies)
 
     def offsets(self, times: Array) -> Array:
-        """c of all joints at the times, shape (n, m)."""
+        """c of all joints at times (n,), shape (n, m)."""
         s = self.system
         if not s.constraints.joints:
             return np.zeros((len(times), 0))
         return _beside([joint.offset(times, s.N) for joint in s.constraints.joints])
 
     def slopes(self, times: Array) -> Array:
-        """g of all joints at the times, shape (n, k); of one row where none turns."""
+        """g of all joints at times (n,), shape (n, k), or one row if constant."""
         s = self.system
         if not self.turns:
             return self._slope
         return _beside([joint.slope_entries(times, s.N)[2] for joint in s.constraints.joints])
 
     def driven(self, times: Array) -> Array:
-        """c of all joints at the times and behind them g, shape (n, m + k).
-
-        Of joints whose derivatives do not depend on time c alone, shape (n, m).
-        """
+        """c and, if time-dependent, g of all joints at times (n,), shape (n, m + k) or (n, m)."""
         offsets = self.offsets(times)
         return np.hstack([offsets, self.slopes(times)]) if self.turns else offsets
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """c and g of all joints at one time, shapes (m,) and (k,)."""
-        if not self.motion_varies and not self.plain.joints.own:
+        """c (m,) and g (k,) of all joints at one time."""
+        if not self.motion_varies and not self.plain.joints.custom:
             c, g = self.still
             return c[0, 0], g[0, 0]
         times, m = np.array([t]), self.system.constraints.m
@@ -339,14 +296,13 @@ class Tables:
 
     @cached_property
     def still(self) -> tuple[Array, Array]:
-        """c and g of joints that do not move with both rates, (1, 3, m) and (1, 4, k).
+        """Constant c and g with two rates, (1, 3, m) and (1, 4, k); zero where time-dependent.
 
-        g twice: at the end of a step and where the joints act. What moves, and joints that are no
-        tables, have zeros.
+        g occurs twice: at the end of a step and where the joints act.
         """
         s, joints, first = self.system, self.plain.joints, np.zeros(1)
         c, g = np.zeros((1, 3, s.constraints.m)), np.zeros((1, 4, len(joints.gk)))
-        if s.constraints.m and not joints.own:
+        if s.constraints.m and not joints.custom:
             if not self.motion_varies:
                 c[:, 0] = self.offsets(first)
             if not self.turns:
@@ -355,21 +311,21 @@ class Tables:
 
 
 def packed(values: Any, dtype: Any = np.float64) -> Any:
-    """An array as compiled code takes it: contiguous and writable, of one type."""
+    """A contiguous, writable array for compiled code."""
     return np.require(values, dtype, ["C", "W"])
 
 
 def _beside(arrays):
-    """Arrays (n, ...) beside each other, as compiled code takes them."""
+    """Arrays (n, ...) side by side."""
     return packed(arrays[0] if len(arrays) == 1 else np.hstack(arrays))
 
 
 def _kind(load):
-    """Number of the kind of table that a load goes to."""
+    """Number of the table of a load."""
     if load.constant:
         return 0
     if load.turning:
         return 1
     if load.linear:
         return 2
-    return 3 if load.pushes else 4
+    return 3 if load.eigen_stresses else 4

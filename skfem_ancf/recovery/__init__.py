@@ -1,1 +1,1 @@
-"""Strain, stress and section forces recovered from a solution."""
+"""Recovery of strain, stress and section forces from a solution."""

@@ -1,8 +1,7 @@
-"""The table of fields: what can be drawn, written to files and asked for at points.
+"""Fields for plots, files and evaluation at points.
 
-One entry of :data:`FIELDS` says what a field is called, what it is computed from, its unit, whether
-it has a sign, and how many components it has. A user-defined field is a function of
-:class:`Values`, or a :class:`Field` made with one.
+:data:`FIELDS` has the name, definition, unit, sign and components of each field. A user-defined
+field is a function of :class:`Values`, or a :class:`Field` made from one.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from .recovered import Recovery
 
 COMPONENTS = ("xx", "yy", "xy")
 
-#: Factors that make the components of a strain of (eps_xx, eps_yy, 2 eps_xy).
+#: Factors from (eps_xx, eps_yy, 2 eps_xy) to tensor components.
 HALF_SHEAR = np.array([[1.0], [1.0], [0.5]])
 
 
@@ -39,21 +38,21 @@ class Field:
     Attributes
     ----------
     name : str
-        As in files.
+        Name in files.
     function : callable
-        From :class:`Values` to the field at their points, shape (n,), or (components, n).
+        From :class:`Values` to the field at its points, shape (n,) or (components, n).
     title : str
-        What it is, for pictures; mathtext between dollars.
+        Title in plots; mathtext between dollars.
     unit : str
-        As "force / area": the package knows no units, those of the input are meant.
+        Such as "force / area", in the units of the input.
     signed : bool
-        Colours are symmetric about ``neutral``; else they start there.
+        Colours are symmetric about ``neutral``; otherwise they start there.
     components : int
         1; 2 for a vector in global axes; 3 for a symmetric tensor (xx, yy, xy).
     frame : str
-        Of vectors and tensors, and of components: "global" or "beam".
+        Frame of vectors, tensors and components: "global" or "beam".
     neutral : float
-        Its value in the reference configuration.
+        Value in the reference configuration.
 
     Examples
     --------
@@ -112,37 +111,37 @@ class Field:
 
 
 class Values(Mapping):
-    """Everything that is known at n points of a beam, computed when it is asked for.
+    """Fields at n points of a beam, evaluated on demand.
 
-    A mapping from the names of :data:`FIELDS` to arrays (n,), or (components, n). Of a linear
-    solution strain and S are linear, F is one and the displacement gradient of the elements, and
-    Cauchy stress is S in global axes.
+    A mapping from the names of :data:`FIELDS` to arrays (n,) or (components, n). In a linear
+    solution strain and S are linear, F is the identity plus the displacement gradient of the
+    elements, and the Cauchy stress is S in global axes.
 
     Parameters
     ----------
     part
-        The :class:`~skfem_ancf.beam.points.BeamPoints` with the points.
+        The :class:`~skfem_ancf.beam.points.BeamPoints`.
     u
-        Displacement of the degrees of freedom of the part, shape (N,); of a linear
-        solution the :func:`~skfem_ancf.core.linear.step` from its base.
+        Displacement of the DOFs of the part, shape (N,); for a linear solution the
+        :func:`~skfem_ancf.core.linear.step` from its base.
     find
-        Returns the recovered field of the beam, or None; None for the field of the elements.
+        A function that returns the recovered field of the beam, or None; None for element fields.
     eigen
         Factors and loads of eigenstrains.
 
     Attributes
     ----------
     x, u
-        Reference positions, and their displacements, (2, n).
+        Reference positions and displacements, (2, n).
     strain, elastic
-        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) in the beam's frame, (3, n), and that less
-        the eigenstrain.
+        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) in the beam frame, (3, n), and the same
+        minus the eigenstrain.
     S
-        Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3, n).
+        Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam frame, (3, n).
     F
-        Deformation gradient: derivatives along the axis and across it, in global axes, (2, 2, n).
+        Deformation gradient: derivatives along and across the axis, in global axes, (2, 2, n).
     frame
-        The beam's frame in the reference configuration, ``frame[:, 0]`` along the axis, (2, 2, n).
+        Beam frame in the reference configuration, ``frame[:, 0]`` along the axis, (2, 2, n).
     """
 
     def __init__(self, part: BeamPoints, u: Array,
@@ -150,7 +149,7 @@ class Values(Mapping):
                  eigen: Sequence[tuple[Any, Any]] = ()) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)
-        #: It is linear about the reference configuration.
+        #: Linear about the reference configuration.
         self._small = np.iscomplexobj(u) and not u.real.any()
         self._known: dict[str, Array] = {}
 
@@ -192,7 +191,7 @@ class Values(Mapping):
 
     @property
     def _stress(self):
-        """That of the elements."""
+        """Stress of the elements."""
         part, u = self._part, self._u[self._part.slice]
         eigen = sum(load.stress_at(u, part.at, part.e, factor)[..., 0]
                     for factor, load in self._eigen)
@@ -200,7 +199,7 @@ class Values(Mapping):
 
     @property
     def _eigenstrain(self):
-        """(3, n), or 0."""
+        """Shape (3, n), or 0."""
         return sum(first_order(factor) * load.strain_at(self._part.at, self._part.e)[..., 0]
                    for factor, load in self._eigen)
 
@@ -209,14 +208,14 @@ class Values(Mapping):
         return self.strain - self._eigenstrain
 
     def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
-        """A field that the material at each point gives, (n,).
+        """A field (n,) that depends on the material at each point.
 
         Parameters
         ----------
         ask
-            Returns the field (n,) of a material.
+            A function of a material that returns the field (n,).
         graded
-            It is proportional to the modulus.
+            The field is proportional to the modulus.
         """
         across = self.beam.across
         if across.plain:
@@ -234,7 +233,7 @@ class Values(Mapping):
 
     @property
     def _gradient(self):
-        """That of the elements."""
+        """Deformation gradient of the elements."""
         part = self._part
         H, frame = kinematics.gradients(self.beam, self._u[part.slice], part.at, part.e)
         return (H + frame)[..., 0]
@@ -245,7 +244,7 @@ class Values(Mapping):
 
     @cached_property
     def _volume(self):
-        """Change of volume; NaN where the material has no thickness left."""
+        """det F times the stretch of the thickness; NaN if the thickness vanishes."""
         return 1.0 if self._small else first_order(self._volume_of(self.F, self.elastic))
 
     def _volume_of(self, F, elastic):
@@ -267,7 +266,7 @@ class Values(Mapping):
 
     @cached_property
     def sigma_zz(self) -> Array:
-        """Cauchy stress normal to the plane, (n,): zero in plane stress."""
+        """Out-of-plane Cauchy stress, (n,); zero in plane stress."""
         if self.beam.material.plane == "stress":
             return np.zeros(self.n)
         if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
@@ -281,7 +280,7 @@ class Values(Mapping):
     def energy(self) -> Array:
         """Strain energy per reference volume, (n,)."""
         if not self.beam.has_sections and not self._small:
-            # of a cable: half of its nominal stress times the stretch that is elastic
+            # cable: half of the nominal stress times the elastic stretch - 1
             stretch, longer = stretched(self.strain[0])
             longer = longer - (self._eigenstrain + 0.0 * self.strain)[0]
             return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
@@ -296,13 +295,13 @@ class Values(Mapping):
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
-        """Principal strains (2, n), the larger first, and the direction of that, (2, n)."""
+        """Principal strains (2, n), the larger first, and the direction of the larger, (2, n)."""
         values, direction = _principal(self.strain * HALF_SHEAR)
         return values, np.einsum("iJn,Jn->in", self.frame, direction)
 
     @cached_property
     def principal_stress(self) -> tuple[Array, Array]:
-        """Principal Cauchy stresses in the plane, (2, n), and the direction of the larger."""
+        """In-plane principal Cauchy stresses (2, n), and the direction of the larger, (2, n)."""
         return _principal(self.sigma)
 
 
@@ -397,16 +396,16 @@ def unit_of(field: Field, units: tuple[str, str] | None) -> str:
 #: All fields by their names.
 FIELDS = {field.name: field for field in _table()}
 
-#: Those that files hold where none are named.
+#: Default fields in files.
 DEFAULT = ("displacement", "strain", "stress", "cauchy_stress", "von_mises")
 
-#: Those that a picture can show.
+#: Fields that plots can show.
 DRAWN = tuple(name for name, f in FIELDS.items() if f.components == 1 or name == "displacement")
 
 
 def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, ...] | None = None,
                ) -> Field:
-    """The Field meant by a name, one of ``known``, a function of :class:`Values` or a Field."""
+    """The Field of a name, a function of :class:`Values` or a Field."""
     if isinstance(field, Field):
         return field
     if isinstance(field, str):
@@ -414,7 +413,7 @@ def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, .
         if field not in known:
             if field in FIELDS:
                 raise InputError(f"the field {field!r} has {FIELDS[field].components} components, "
-                                 f"one is drawn: as {', '.join(map(repr, known[:4]))}")
+                                 f"a plot shows one, as {', '.join(map(repr, known[:4]))}")
             raise NameUnknown("field", field, known)
         return FIELDS[field]
     if callable(field) and not isinstance(field, type):
@@ -424,7 +423,7 @@ def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, .
 
 
 def find_fields(fields: Any) -> list[Field]:
-    """The Fields meant by one or several names, functions or Fields; None for the usual ones."""
+    """The Fields of one or several names, functions or Fields; None for the default."""
     if fields is None:
         fields = DEFAULT
     if isinstance(fields, (str, Field)) or callable(fields):
@@ -439,19 +438,10 @@ def find_fields(fields: Any) -> list[Field]:
 
 
 class DomainValues:
-    """What is known at points of a domain: displacement and strain, in global axes.
+    """Displacement, strain (3, n) and deformation gradient (2, 2, n) at points of a domain.
 
-    Parameters
-    ----------
-    x, u, gradient
-        Reference positions and displacements, (2, n), and the displacement gradient, (2, 2, n).
-
-    Attributes
-    ----------
-    strain
-        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy), (3, n).
-    F
-        Deformation gradient, (2, 2, n).
+    Components are in global axes. Arguments are reference positions and displacements, (2, n), and
+    the displacement gradient, (2, 2, n).
     """
 
     _small = False
@@ -466,16 +456,16 @@ class DomainValues:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        raise InputError(f"{name.lstrip('_')} of a domain is a matter of its own forms")
+        raise InputError(f"{name.lstrip('_')} of a domain depends on its forms")
 
     def __getitem__(self, name: str) -> Array:
         return find_field(name).of(self)  # type: ignore[arg-type]
 
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
-    """Values of a beam in a state at reference points of all its elements, flattened.
+    """Values of a beam at points of all elements, flattened.
 
-    Points (xi, eta) in [0, 1] have the shape (2, npoints) or (2, nelements, npoints).
+    ``X`` are points (xi, eta) in [0, 1], shape (2, npoints) or (2, nelements, npoints).
     """
     ne = beam.mesh.nelements
     part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),

@@ -1,4 +1,4 @@
-"""The beams and rigid bodies of a deformed configuration on points, for pictures and files."""
+"""Members of a deformed configuration as points and cells, for plots and files."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from ..core.quadrature import tensor
 from ..core.types import Array
 from .fields import DomainValues, Values, values_on_grid
 
-#: VTK's numbers of cells, by what meshio calls them.
+#: VTK cell numbers by meshio's names.
 CELL_TYPES = {"triangle": 5, "polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
-#: VTK evaluates Lagrange cells up to this degree.
+#: Largest degree of Lagrange cells in VTK.
 MAX_LAGRANGE_DEGREE = 10
 
-#: Of the height of a layer, how far points beside a jump are from it.
+#: Distance of points from a jump, relative to the height of a layer.
 BESIDE = 1e-9
 
-#: Subdivisions of an element along or across, and points of a whole body, at most.
+#: Largest number of subdivisions of an element, and of points of a body.
 MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 
 class Grid(NamedTuple):
-    """One member on points: reference positions ``x`` and displacements ``u``, (2, n).
+    """One member as points and cells.
 
-    ``kind`` is what meshio calls the cells: "quad", "triangle", "VTK_LAGRANGE_QUADRILATERAL", or
-    "polygon"; ``cells`` (nc, k) are rows of point numbers, ``elements`` (nc,) their elements.
-    ``rows`` points across a section follow each other. ``values`` are the :class:`~.fields.Values`
-    of a beam, :class:`~.fields.DomainValues`, or None of a rigid body. ``between`` (2, k) are
-    numbers of points of neighbouring elements that are one point of the body.
+    ``x`` and ``u`` are reference positions and displacements, (2, n). ``kind`` is meshio's name of
+    the cells: "quad", "triangle", "VTK_LAGRANGE_QUADRILATERAL" or "polygon"; ``cells`` (nc, k) are
+    point numbers, ``elements`` (nc,) their elements. ``rows`` points across a section are
+    consecutive. ``values`` are those of a beam or domain, None for a rigid body. ``between`` (2, k)
+    are numbers of coincident points of neighbouring elements.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Grid(NamedTuple):
     between: Array = np.zeros((2, 0), dtype=int)
 
     def points(self, undeformed: bool = False) -> Array:
-        """Positions with a third component of zero, shape (n, 3)."""
+        """Positions with a zero third component, shape (n, 3)."""
         return in_space(self.x if undeformed else self.x + self.u)
 
 
@@ -54,7 +54,8 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
           recover: bool = True) -> list[Grid]:
     """The :class:`Grid` of each beam, rigid body and domain of a state.
 
-    ``subdivide`` says how many quads an element has along and across, or it is one Lagrange cell.
+    ``subdivide`` is the number of quads along and across an element; with ``lagrange`` an element
+    is one Lagrange cell.
     """
     require_like("state", state, "State", "beams", "u_of")
     m, n = subdivision(subdivide)
@@ -89,14 +90,14 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
 
 
 def _between(mesh, n, rows):
-    """Last points of elements and first ones of those behind, (2, k), with n points each."""
+    """Last points of elements and first points of the next ones, (2, k); n points each."""
     e = np.flatnonzero(mesh.t[1, :-1] == mesh.t[0, 1:])[:, None]
     first = n * (e + 1) + np.arange(rows)
     return np.array([first - rows, first]).reshape(2, -1)
 
 
 def subdivision(subdivide: Any) -> tuple[int, int]:
-    """Intervals along and across an element, checked."""
+    """Checked numbers of intervals along and across an element."""
     try:
         m, n = subdivide
     except (TypeError, ValueError):
@@ -110,14 +111,14 @@ def subdivision(subdivide: Any) -> tuple[int, int]:
 
 
 def in_space(x: Array) -> Array:
-    """Vectors (2, ...) of the plane as rows with a third component of zero, shape (n, 3)."""
+    """Plane vectors (2, ...) as rows with a zero third component, shape (n, 3)."""
     out = np.zeros((x[0].size, 3))
     out[:, :2] = x.reshape(2, -1).T
     return out
 
 
 def grid(m: int, n: int) -> Array:
-    """A grid of (m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints)."""
+    """(m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints)."""
     xi, eta = np.linspace(0, 1, m + 1), np.linspace(0, 1, n + 1)
     return tensor((xi, xi), (eta, eta))[0]
 
@@ -131,8 +132,8 @@ def quads(m: int, n: int) -> Array:
 def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
     """Points and quads of an element with m and n intervals along and across.
 
-    There is at least one interval for each piece of the section; where fields jump across it there
-    are points on both sides. Points are (2, npoints), or (2, nelements, npoints) where pieces move.
+    Each interval of the section has at least one cell, with points on both sides of jumps. Points
+    are (2, npoints), or (2, nelements, npoints) if the intervals vary along the axis.
     """
     sizes = np.diff(beam.across.ends())
     if len(sizes) == 1:
@@ -150,10 +151,10 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
 
 
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
-    """Points of the Lagrange cell that holds an element, and their order in VTK.
+    """Points of an element's Lagrange cell, and their VTK order.
 
-    VTK numbers the corners, then the inner points of the edges bottom, right, top, left (in the
-    directions of rising xi and eta), then the inside with xi fastest.
+    The order is corners, edges (bottom, right, top, left, in the direction of increasing xi and
+    eta), interior with xi fastest.
     """
     p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
     if p > MAX_LAGRANGE_DEGREE:

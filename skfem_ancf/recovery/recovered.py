@@ -1,24 +1,22 @@
-"""Recovered strain and stress: from the section forces and the equilibrium of the body.
+"""Recovery of strain and stress from section forces and equilibrium.
 
-The strain of an element at a point is the derivative of its displacement, which is less accurate
-than the displacement, and not continuous. Here the fields are found again, for each axial segment
-between two places where the section force jumps:
+The strain of an element is a derivative of its displacement: less accurate and discontinuous. The
+recovered fields are found for each axial segment between jumps of the section force:
 
-1. The internal forces of the elements give the force and the moment of every section
+1. The internal forces of the elements give force and moment of every section
    (:mod:`skfem_ancf.recovery.section_forces`).
-2. The stretch of the fibres follows from the compatibility ``d(r_X)/dY = d(r_Y)/dX``: they turn at
-   the rate of their section. This rate and the stretch of the axis are those for which the
-   section has its force and moment; S_xx is that of the law.
-3. S_xy and S_yy follow from the equilibrium of the body, ``div P + b = 0``, integrated across the
-   section from the lower face with its load. What is left at the upper face is spread over the
-   area, and Jourawski's shear stress (of a rectangle a parabola) added to S_xy that gives the
-   section its shear force. The law's inverse gives eps_yy and eps_xy, which enter step 2: both are
-   repeated. Where the width or the law jumps across the section, so do they; P_2 times the width
-   does not.
-4. This is the solution of Saint-Venant, to high order in h / L. Supports and point loads cause
-   boundary layers of the length h besides. Where the elements there are short enough to resolve
-   them, their own stress is taken, from where it is most accurate: the mean of two Gauss points,
-   put at the element's centre (sections cubic along the axis: at the Gauss points), splined.
+2. The stretch of the fibres follows from the compatibility ``d(r_X)/dY = d(r_Y)/dX``, with the rate
+   of rotation of the section. This rate and the axial stretch are those that give the section its
+   force and moment; S_xx follows from the law.
+3. S_xy and S_yy follow from ``div P + b = 0``, integrated across the section from the lower face.
+   The residual at the upper face is distributed over the area, and Jourawski's shear stress
+   (parabolic in a rectangle) is added to match the shear force. The inverse law gives eps_yy and
+   eps_xy for step 2; both steps are repeated. Where the width or the law jumps across the section,
+   the fields jump and P_2 times the width is continuous.
+4. This is Saint-Venant's solution, to high order in h / L. Supports and point loads add boundary
+   layers of length h. Where the elements resolve them, the element stress is used, as a spline
+   through its most accurate points: the mean of two Gauss points at the element's centre (for
+   sections cubic along the axis, the Gauss points).
 """
 
 from __future__ import annotations
@@ -44,20 +42,19 @@ from ..sections.across import EDGE
 from .section_forces import ALONG, NotRecovered, SectionForces
 from .segments import Segment
 
-#: Fields that the last round changes by more than this part of the largest strain have not settled;
-#: strains below the other are round-off.
+#: Largest relative change of the strain in the last round, and strain that is round-off.
 UNSETTLED, TINY = 0.01, 1e-12
 
-#: Sections nearer than this part of an element to a cut inside of it are at the cut.
+#: Sections closer to a cut than this fraction of an element are at the cut.
 AT_CUT = 1e-8
 
-#: Points of an interval that is the whole section, at least; of one of several, more than the
-#: order N and at least; and of one whose width is a function, as the chord of a circle.
+#: Least points of the only interval of a section; additional points (to the order N) and least
+#: points of one of several; points of an interval of variable width.
 ACROSS, MORE, FEW, ROUND = 7, 2, 5, 17
 
 
 class ArcLength:
-    """Arc length along the reference axis of a beam; ``nodes`` (ne + 1,) at ends of elements."""
+    """Arc length along the reference axis; ``nodes`` (ne + 1,) at ends of elements."""
 
     def __init__(self, beam: Beam) -> None:
         x, w = gauss(ALONG)
@@ -67,16 +64,16 @@ class ArcLength:
         self.nodes = np.append(0.0, np.cumsum(speed @ w))
 
     def at(self, e: Array, xi: Array) -> Array:
-        """That of places xi of elements e, both of shape (n,)."""
+        """Arc length at xi of elements e, both of shape (n,)."""
         return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
             2.0 * xi - 1.0, ALONG), self._inside[e])
 
 
 class Interval(NamedTuple):
-    """A part of the section from ``low`` to ``high`` (eta) with nodes of a coordinate s on [0, 1].
+    """Part of a section from ``low`` to ``high`` (eta), with nodes of a coordinate s in [0, 1].
 
-    Fields are polynomials of s. If it is curved, ``eta = middle - half cos(pi s)``, in which widths
-    with square roots at the ends are smooth; else s is linear in eta.
+    Fields are polynomials in s. If ``curved``, ``eta = middle - half cos(pi s)``, which smooths
+    widths with square roots at the ends; otherwise eta is linear in s.
     """
 
     low: float
@@ -86,23 +83,23 @@ class Interval(NamedTuple):
 
     @property
     def eta(self) -> Array:
-        """Places of the nodes."""
+        """Eta of the nodes."""
         s = 0.5 - 0.5 * np.cos(np.pi * self.nodes) if self.curved else self.nodes
         return self.low + (self.high - self.low) * s
 
     def local(self, eta: Array) -> Array:
-        """The points s of places eta."""
+        """s of points eta."""
         s = (eta - self.low) / (self.high - self.low)
         return np.arccos(np.clip(1.0 - 2.0 * s, -1.0, 1.0)) / np.pi if self.curved else s
 
     def weights(self, s: Array) -> Array:
-        """Weights of the values at the nodes for those at points s (...), shape (..., n)."""
+        """Interpolation weights from the nodes to points s (...), shape (..., n)."""
         degree = len(self.nodes) - 1
         return chebvander(2.0 * s - 1.0, degree) @ np.linalg.inv(
             chebvander(2.0 * self.nodes - 1.0, degree))
 
     def integrals(self, ends: Array) -> Array:
-        """From values at the nodes to the integrals over eta from s = 0 to ends (k,), (k, n)."""
+        """Weights (k, n) of the integrals over eta from s = 0 to ends (k,)."""
         x, w = gauss(len(self.nodes) * (2 if self.curved else 1))
         s = ends[:, None] * x
         slope = 0.5 * np.pi * np.sin(np.pi * s) if self.curved else 1.0 + 0.0 * s
@@ -111,12 +108,11 @@ class Interval(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points across sections: arrays (n, m), or (m,) where all sections are the same.
+    """Points across sections: arrays (n, m), or (m,) if all sections are equal.
 
-    ``eta`` is where they are, ``stretch`` the length of their interval over the longest; ``drift``
-    and ``swell`` are derivatives of eta and of the logarithm of the stretch by the height. ``axis``
-    and ``till_axis`` lead from values at the points to that on the axis, and to their integral over
-    the longest intervals from the lowest place to the axis.
+    ``eta`` are the points, ``stretch`` the relative length of their interval; ``drift`` and
+    ``swell`` the derivatives of eta and log(stretch) by the height. ``axis`` and ``till_axis`` are
+    weights for the value on the axis, and for the integral from the bottom to the axis.
     """
 
     eta: Array
@@ -128,14 +124,12 @@ class Points(NamedTuple):
 
 
 class Intervals:
-    """Points ``eta`` (m,) across a section of layers, with integrals and values of fields.
+    """Points ``eta`` (m,) across a section of layers, with weights of integrals and values.
 
-    The intervals of some tapered sections move: they are other parts of the height from place to
-    place. Their points are then given where the section is highest; :meth:`points` has them
-    elsewhere. ``layers`` are the columns of the points of each layer, ``width`` (m,) is its width
-    there over its mean. ``from_bottom`` (m, m) and ``whole`` (m,) lead from values to integrals
-    over eta from 0 to the points, and to 1; ``bottom`` and ``top`` to the values at the lowest and
-    highest place.
+    In some tapered sections the relative intervals vary along the axis; ``eta`` then belongs to the
+    highest section, and :meth:`points` gives others. ``layers`` are the columns of each layer,
+    ``width`` (m,) its relative width. ``from_bottom`` (m, m) and ``whole`` (m,) are weights of
+    integrals over eta; ``bottom`` and ``top`` of the values at the ends.
     """
 
     def __init__(self, layers: Sequence[Layer], order: int) -> None:
@@ -160,11 +154,11 @@ class Intervals:
         self.bottom, self.top = self.weights(np.array([self._low[0], self._high[-1]]))
 
     def _which(self, eta):
-        """The interval of each place; the upper one between two."""
+        """The interval of each point; the upper one at an interface."""
         return np.searchsorted(self._high[:-1] - EDGE, eta, side="right")
 
     def weights(self, eta: Array) -> Array:
-        """Weights of the values at the points for those at places eta (k,), shape (k, m)."""
+        """Weights (k, m) of the values at points eta (k,)."""
         which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
         for k in np.unique(which):
             i, on = self._intervals[k], np.flatnonzero(which == k)
@@ -172,7 +166,7 @@ class Intervals:
         return out
 
     def _integrals(self, eta):
-        """From values at the points to their integrals from the bottom to places, (k, m)."""
+        """Weights (k, m) of the integrals from the bottom to eta."""
         which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
         for k, (i, columns) in enumerate(zip(self._intervals, self._columns)):
             s = np.where(which > k, 1.0, i.local(np.clip(eta, i.low, i.high)))
@@ -185,7 +179,7 @@ class Intervals:
         return (np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]))
 
     def points(self, h: Array) -> Points:
-        """The points at sections of heights h, shape (n,)."""
+        """The points of sections of heights h (n,)."""
         middle = np.array([0.5])
         if not self.moves:
             return Points(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
@@ -195,7 +189,7 @@ class Intervals:
         z = (self.eta - self._low[of]) / size
         (low, high), (low2, high2) = ((end[of].T for end in self._ends_at(k * h))
                                       for k in (1.0, 2.0))
-        # ends are a + b / h: twice the difference of that of 2 h, over h, is the derivative
+        # ends are a + b / h: their derivative is 2 (end(2 h) - end(h)) / h
         low_rate, high_rate = (2.0 * (b - a) / h[:, None] for a, b in ((low, low2), (high, high2)))
         at = self.place(0.5 + 0.0 * h, h)
         return Points(low + (high - low) * z, (high - low) / size,
@@ -203,7 +197,7 @@ class Intervals:
                       self.weights(at), self._integrals(at))
 
     def place(self, eta: Array, h: Array) -> Array:
-        """Places where the section is highest, of places eta in sections of heights h, (n,)."""
+        """Map eta (n,) in sections of heights h (n,) to the highest section."""
         if not self.moves:
             return eta
         low, high = self._ends_at(h)
@@ -214,7 +208,7 @@ class Intervals:
 
 
 def _interval(low, high, curved, order, alone):
-    """An Interval; the points of one that is alone and smooth are at its ends too."""
+    """An Interval; the nodes of a single smooth one include its ends."""
     if alone and not curved:
         n = max(ACROSS, 2 * order + 1)
         nodes = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, n))
@@ -227,9 +221,9 @@ def _interval(low, high, curved, order, alone):
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
-    """The strain of a given stress under a law, by Newton's method; both (3, ...).
+    """The strain with a given stress under a law, by Newton's method; both (3, ...).
 
-    Neighbouring components ``unknown`` are found, the others stay as they are in ``strain``.
+    Only the consecutive components ``unknown`` of ``strain`` are solved for.
     """
     k = list(unknown)
     strain = np.array(strain, dtype=np.result_type(strain, stress, float))
@@ -254,7 +248,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
 
 
 def _axial(law, strain):
-    """Change of S_xx with eps_xx while S_yy and S_xy stay, shape (...), of strains (3, ...)."""
+    """dS_xx / deps_xx at constant S_yy and S_xy, shape (...), for strains (3, ...)."""
     D = law.D if isinstance(law, LinearLaw) else law.moduli(strain)
     det = D[1, 1] * D[2, 2] - D[1, 2] * D[2, 1]
     return 0.0 * strain[0] + D[0, 0] - (
@@ -263,25 +257,25 @@ def _axial(law, strain):
 
 
 class Recovery:
-    """The recovered field of one beam, a :class:`~.segments.Segment` between each two cuts.
+    """The recovered fields of one beam, a :class:`~.segments.Segment` between consecutive cuts.
 
-    ``why`` says why there are section forces, but no fields; "" if there are.
+    ``why`` says why there are section forces but no fields, or "".
     """
 
     def __init__(self, forces: SectionForces, u: Array) -> None:
         self.forces, self.beam, self._u = forces, forces.beam, u
         beam, layers = self.beam, self.beam.across.layers
         self.why = "" if beam.section.has_fields else (
-            f"{beam.section!r} does not say what it is made of: strain and stress are those of a "
-            "rectangle with these numbers; State.resultants() has what is known")
+            f"{beam.section!r} has no shape: strain and stress are those of a rectangle with its "
+            "stiffnesses; State.resultants() has the section forces")
         self.intervals = Intervals(layers, beam.element.order)
         laws = [layer.material.law(layer.shear) for layer in layers]
-        if forces.small:  # the law of small strains
+        if forces.small:  # linearised laws
             laws = [law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
                     for law in laws]
         self.laws = list(zip(self.intervals.layers, laws))
         self.arc = ArcLength(beam)
-        #: To the body whose sections turn as its axis at jumps of the curvature.
+        #: Mapping with sections that follow the axis at jumps of the curvature.
         self.geometry = None if beam.mesh.sections == "linear" or not len(
             beam.across.bends) else by_element(beam.mesh, beam.across.bends.astype(int)).mapping()
         self.has_stress = (len(layers) == 1 and layers[0].face is None
@@ -291,31 +285,31 @@ class Recovery:
         strain = max(np.max(np.abs(segment.stretch - 1.0)) for segment in self.segments)
         change = max(segment.change for segment in self.segments) / max(strain, TINY)
         if change > UNSETTLED:
-            raise NotRecovered("the fields do not settle: the last of their rounds changes the "
-                               f"strain by {change:.0%} of its largest value")
+            raise NotRecovered("the iteration does not converge: the last change of the strain is "
+                               f"{change:.0%} of its largest value")
 
     def _heights(self, e, xi):
         return (self.beam.mesh.mapping().height(xi[:, None], e)[0] + 0.0 * xi[:, None])[:, 0]
 
     def points(self, e: Array, xi: Array) -> Points:
-        """The :class:`.Points` across sections at places xi of elements e, shapes (n,)."""
+        """The :class:`.Points` across sections at xi of elements e, shapes (n,)."""
         return self.intervals.points(self._heights(e, xi))
 
     def modulus(self, strain: Array) -> Array:
-        """Change of S_xx with eps_xx while S_yy and S_xy stay, at strains (3, n, m)."""
+        """dS_xx / deps_xx at constant S_yy and S_xy, at strains (3, n, m)."""
         return self.by_law(_axial, strain)
 
     def strain_of(self, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2)) -> Array:
-        """:func:`strain_of_stress` of each point's law, shapes (3, n, m)."""
+        """:func:`strain_of_stress` with the law of each point, shapes (3, n, m)."""
         return self.by_law(partial(strain_of_stress, unknown=unknown), stress, strain)
 
     def by_law(self, function: Callable[..., Array], *fields: Array) -> Array:
-        """``function(law, *fields)`` with the law of each point, of fields (..., n, m)."""
+        """``function(law, *fields)`` with the law of each point, for fields (..., n, m)."""
         return np.concatenate([function(law, *(f[..., columns] for f in fields))
                                for columns, law in self.laws], axis=-1)
 
     def of_layers(self, of: Callable[..., Any], X: Array, e: Array) -> Any:
-        """``of(layer, X, e)`` with the layer of each of the points X, shapes (2, n, m) and (n,)."""
+        """``of(layer, X, e)`` with the layer of each point X, shapes (2, n, m) and (n,)."""
         return np.concatenate([np.broadcast_to(of(layer, X[..., at], e), X[0, :, at].shape)
                                for layer, at in zip(self.beam.across.layers,
                                                     self.intervals.layers)],
@@ -323,7 +317,7 @@ class Recovery:
 
     @cached_property
     def samples(self) -> tuple[Array, Array]:
-        """Places along an element, (p,), and its own stress there, (3, ne, p, m)."""
+        """Sampling points along an element, (p,), and the element stress there, (3, ne, p, m)."""
         beam, x = self.beam, self.beam.element.sampling.places("xx")
         eta, u, e = self.intervals.eta, self._u, np.arange(self.beam.mesh.nelements)
         X = np.array([np.repeat(x, len(eta)), np.tile(eta, len(x))])
@@ -336,9 +330,9 @@ class Recovery:
         return x, stress
 
     def segment_of(self, e: Array, xi: Array, after: Any = False) -> Array:
-        """The number of the segment of each section, (n,); a node at a cut is in its own element's.
+        """Segment numbers of sections, (n,); a node at a cut belongs to the segment of its element.
 
-        ``after`` is True for sections at a cut inside of an element that are on its right.
+        ``after`` is True for sections on the right of a cut inside an element.
         """
         cuts = self.forces.cuts
         at_node = np.minimum(xi, 1.0 - xi) < SNAP
@@ -353,7 +347,7 @@ class Recovery:
         return np.clip(found, 0, len(self.segments) - 1)
 
     def at(self, e: Array, X: Array, rows: slice = slice(7)) -> Array:
-        """Rows of strain, stress and angle (7 in all) at points X (2, n) of elements; (rows, n)."""
+        """Rows of strain, stress and angle (7 in all) at points X (2, n); shape (rows, n)."""
         xi, eta = X
         if self.intervals.moves:
             eta = self.intervals.place(eta, self._heights(e, xi))
@@ -368,7 +362,7 @@ class Recovery:
 
     @staticmethod
     def gradient(strain: Array, angle: Array) -> Array:
-        """The deformation gradient (2, 2, ...) of a strain (3, ...) and the angle of the fibres."""
+        """Deformation gradient (2, 2, ...) from strain (3, ...) and fibre angle."""
         lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
         across = angle + np.arccos(strain[2] / (lam_x * lam_y))
         return np.array([[lam_x * np.cos(angle), lam_y * np.cos(across)],

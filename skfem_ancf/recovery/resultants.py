@@ -1,4 +1,4 @@
-"""Force and moment in the sections of a beam, with the strains of the axis that go with them."""
+"""Section forces and axial strains of a beam."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from ..mesh.mapping import cross
 from .recovered import ArcLength, Recovery
 from .section_forces import Sections
 
-#: Sections in an element, both ends included, where none are named.
+#: Default number of sections in an element, both ends included.
 ALONG_ELEMENT = 9
-#: Part of an element over which the slope of the moment of a cable is taken.
+#: Fraction of an element for the difference quotient of a cable's moment.
 NEAR = 1e-3
 
 
@@ -29,40 +29,39 @@ NEAR = 1e-3
 class Resultants:
     """Section forces and strains along one beam.
 
-    They are what the part of the beam behind a section (of larger arc length) does to the part
-    before it. Where they jump, a section that is named gives the value before the jump; without
-    names both sides are there.
+    They are the action of the part behind a section (of larger arc length) on the part before it.
+    At a jump, a requested section gives the value before it; by default both values are included.
 
     Attributes
     ----------
     s
         Arc length along the reference axis, shape (n,).
     x
-        Place of the section on the reference axis, shape (2, n).
+        Section positions on the reference axis, shape (2, n).
     N
         Normal force along the deformed axis, positive in tension.
     Q
-        Shear force along the normal of the deformed axis, which is its tangent turned by +90
-        degrees. A straight beam has dM/ds = -Q where no moment acts.
+        Shear force along the normal of the deformed axis, the tangent turned by +90 degrees. In a
+        straight beam without distributed moment dM/ds = -Q.
     M
-        Bending moment about the deformed axis, counterclockwise: it presses the upper fibres.
+        Bending moment about the deformed axis, counterclockwise: it compresses the upper fibres.
     curvature
-        Change of the rate at which the sections turn along the reference axis, per length. A
-        cable has N = EA (stretch - 1) and M = EI curvature, if its axis is at the centroid.
+        Change of the rotation of sections per reference length. For a cable with its axis at the
+        centroid, N = EA (stretch - 1) and M = EI curvature.
     stretch
-        Length of the axis over that in the reference configuration.
+        Deformed over reference length of the axis.
     shear
-        Angle from the normal of the section to the axis, in radians.
+        Angle from the section normal to the axis, in radians.
     angle
         Direction of the deformed axis, in radians.
     force
-        N and Q along the global axes, shape (2, n).
+        N and Q in global axes, shape (2, n).
     recovered : bool
-        They follow from equilibrium. If not, from the stress of the elements, and Q of a cable,
-        which has no shear strain, is NaN.
+        True if they follow from equilibrium. Otherwise they follow from the stress of the elements,
+        and Q of a cable is NaN.
 
-    In a motion all but ``s`` and ``x`` have the instants as their first axis; of a single section
-    they have no axis n.
+    In a motion all but ``s`` and ``x`` have the instants as first axis; for a single section there
+    is no axis n.
     """
 
     s: Array
@@ -125,7 +124,7 @@ class Resultants:
                                  for name, values in columns.items()}, index)
 
     def first(self) -> Resultants:
-        """Those of the first section, without the axis n."""
+        """The first section, without the axis n."""
         values: dict[str, Any] = {
             f.name: value if isinstance(value := getattr(self, f.name), bool) else value[..., 0]
             for f in fields(self)}
@@ -133,7 +132,7 @@ class Resultants:
 
 
 def over_time(instants: list[Resultants]) -> Resultants:
-    """The Resultants of several instants at the same sections as one."""
+    """Join the Resultants of several instants."""
     first = instants[0]
     values: dict[str, Any] = {f.name: np.array([getattr(r, f.name) for r in instants])
                               for f in fields(first)}
@@ -144,11 +143,10 @@ def over_time(instants: list[Resultants]) -> Resultants:
 def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
                eigen: Sequence[tuple[Any, Any]] = (), at: tuple[Array, Array] | None = None,
                chain: int | None = None) -> Resultants:
-    """The Resultants of a beam for a displacement ``u`` (N,), which may be a step.
+    """The Resultants of a beam for a displacement ``u`` (N,) or a complex step.
 
     They follow from the recovery, or from the stress of the elements; ``eigen`` are factors and
-    loads of eigenstrains. Sections are in elements and at places ``at``, or all along the beam or a
-    chain.
+    loads of eigenstrains. Sections are elements and xi ``at``, or all of the beam or one chain.
     """
     if at is None:
         e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts)
@@ -172,12 +170,12 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
 
 
 def _on_axis(xi):
-    """Reference points on the axis, (2, n, 1)."""
+    """Points on the axis, (2, n, 1)."""
     return np.array([xi, 0.5 + 0.0 * xi])[:, :, None]
 
 
 def _everywhere(beam, cuts):
-    """Sections of all elements, both sides of cuts inside of them too."""
+    """Sections of all elements, with both sides of interior cuts."""
     ne = beam.mesh.nelements
     inside = np.array([cut for cut in cuts if cut % 1.0])
     e = np.append(np.repeat(np.arange(ne), ALONG_ELEMENT), np.repeat(inside.astype(int), 2))
@@ -207,7 +205,7 @@ def _recovered(recovery, e, xi, after):
 
 
 def _axis(segment):
-    """A spline of angle, stretch and shear of the axis, and the change of curvature."""
+    """Spline of angle, stretch and shear of the axis, and change of curvature."""
     eps = segment.strain
     phi, stretch = segment.at_axis(segment.angle), np.sqrt(1.0 + 2.0 * eps[0])
     lam_y = np.sqrt(1.0 + 2.0 * eps[1])
@@ -217,14 +215,14 @@ def _axis(segment):
     normal = unwrapped(angle_of(*d)) - 0.5 * np.pi
     shear = phi - normal
     shear = shear - 2.0 * np.pi * np.round(shear.real / (2.0 * np.pi))
-    # not the derivative of the angle, which is fitted to that of the elements
+    # not from the derivative of the angle, which is fitted to the elements
     start = (segment.g[:, 0] - segment.g[:, -1]) / (segment.Y[..., -1] - segment.Y[..., 0])
     curvature = segment.rate - start - segment.d_ds(shear[:, None])[:, 0]
     return segment.spline(np.array([phi, segment.at_axis(stretch), shear, curvature]), -1)
 
 
 def _own(beam, u, eigen, e, xi):
-    """From the stress of the elements, integrated across the section."""
+    """Integrate the stress of the elements across the section."""
     X, area = _across(beam, e, xi)
     S = on_grid(stress_at, beam, u, X, e) - sum(
         load.stress_at(u, X, e, factor) for factor, load in eigen)
@@ -240,7 +238,7 @@ def _own(beam, u, eigen, e, xi):
 
 
 def _across(beam, e, xi):
-    """Points across sections, shape (2, n, m), and the areas that they stand for."""
+    """Points across sections, shape (2, n, m), and their areas."""
     eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
         beam.across.points(layer, e, xi, max(beam.element.order, 1) + 2)
         for layer in beam.across.layers)))
@@ -249,7 +247,7 @@ def _across(beam, e, xi):
 
 
 def _own_of_cable(beam, u, eigen, e, xi):
-    """Of a cable from EA and EI; the shear force is the slope of the moment in the element."""
+    """Resultants of a cable from EA and EI; the shear force is the slope of the moment."""
     N, M, strains = _forces_of_cable(beam, u, eigen, e, xi)
     near = np.clip([xi - NEAR, xi + NEAR], 0.0, 1.0)
     a, b = (_forces_of_cable(beam, u, eigen, e, x)[1] for x in near)
@@ -270,7 +268,7 @@ def _forces_of_cable(beam, u, eigen, e, xi):
 
 
 def _strains_of_cable(beam, eigen, e, xi, N, M):
-    """Stretch and change of curvature of a cable under a normal force and a moment."""
+    """Stretch and change of curvature of a cable from normal force and moment."""
     EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
     N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
     N, M, det = N + N0, M + M0, EA * EI - ES * ES
@@ -278,14 +276,14 @@ def _strains_of_cable(beam, eigen, e, xi, N, M):
 
 
 def _eigen_forces_of_cable(beam, eigen, e, xi):
-    """Normal force and moment (2, n) that would give a cable its eigenstrains."""
+    """Normal force and moment of the eigenstrains of a cable."""
     X, area = _across(beam, e, xi)
     S0 = sum((load.nominal_at(X, e, factor)[0] for factor, load in eigen), 0.0) * area
     return np.sum(S0, axis=-1), -np.sum(S0 * beam.mesh.mapping().offset(X, e), axis=-1)
 
 
 def _axis_of_element(beam, u, e, xi):
-    """Angle, stretch, shear and change of curvature of the kinematics of the element."""
+    """Angle, stretch, shear and change of curvature of the element's kinematics."""
     eta, w = gauss(beam.element.order + 2)
     lever = 12.0 * (eta - 0.5) * w
     sections, axis = Sections(beam, e, xi, eta), Sections(beam, e, xi)

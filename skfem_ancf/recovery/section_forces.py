@@ -1,8 +1,8 @@
-"""Force and moment in the sections of a beam, from the internal forces of its elements.
+"""Section forces of a beam from the internal forces of its elements.
 
 The internal force of an element does no work in a rigid motion. With the loads on the element it is
-therefore in exact equilibrium, whatever the error of the displacement: the part of the element
-between a node and a section gives the force and the moment in that section.
+therefore in exact equilibrium, whatever the error of the displacement. Equilibrium of the part of
+the element between a node and a section gives the section force and moment.
 """
 
 from __future__ import annotations
@@ -22,30 +22,28 @@ from ..formulations.ecm import AXIS as WHOLE
 from ..mesh.mapping import MappingBeam, cross
 from ..sections.jumps import beside, jumps
 
-#: Points along an element for its loads.
+#: Quadrature points along an element for its loads.
 ALONG = 8
 
-#: Largest change of the section force at a node without a load, over its largest value. In a motion
-#: more is allowed: schemes that conserve energy satisfy the equation of motion in the mean over a
-#: step only, and the mean of both sides is right.
+#: Largest relative jump of the section force at an unloaded node, and in a motion: conserving
+#: schemes satisfy the equation of motion on average over a step.
 UNBALANCED, UNBALANCED_MOTION = 0.02, 0.5
 
-#: Strains below this times the places over the length of an element are round-off.
+#: Strain that is round-off, relative to position over element length.
 UNLOADED = 16 * np.finfo(float).eps
-#: Section forces below this part of those that eigenstrains have alone are round-off.
+#: Section force that is round-off, relative to that of the eigenstrains alone.
 BALANCED = 1e-4
 
 
 class NotRecovered(AncfError):
-    """The section forces or fields of a beam cannot be recovered; the message says why."""
+    """Section forces or fields cannot be recovered; the message says why."""
 
 
 class Sections:
-    """Points ``eta`` across sections at places ``xi`` (n,) of elements ``e`` (n,), and functions
-    there.
+    """Points ``eta`` across sections at ``xi`` (n,) of elements ``e`` (n,), with shape functions.
 
-    With ``lifted`` points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as its
-    :class:`~skfem_ancf.beam.inertia.Inertia` has them; else all are on the axis.
+    With ``lifted``, points of a cable off its axis are at ``r + Y r_X`` turned by 90 degrees, as in
+    :class:`~skfem_ancf.beam.masses.Masses`; otherwise all are on the axis.
     """
 
     def __init__(self, beam: Beam, e: Array, xi: Array, eta: Any = 0.5,
@@ -60,17 +58,17 @@ class Sections:
 
     @property
     def full_volume(self) -> Array:
-        """Of sections that weigh what their height says, see :meth:`.MappingBeam.full_volume`."""
+        """Volume for sections of full height, see :meth:`.MappingBeam.full_volume`."""
         mesh = self.beam.mesh
         return self.volume if mesh.is_straight else mesh.mapping().full_volume(self.X, self.e)
 
     @cached_property
     def _functions(self):
-        """Local functions and their slopes, (nb, n, k) each."""
+        """Shape functions and their slopes, (nb, n, k) each."""
         return self.beam.element.of_mesh(self.beam.mesh.mapping(), self.X, self.e)[:2]
 
     def field(self, q: Array, slope: bool = False) -> Array:
-        """A field of element degrees of freedom (ne, nb, 2), or its derivative by xi; (2, n, k)."""
+        """A field of nodal values (ne, nb, 2), or its derivative by xi; (2, n, k)."""
         def of(functions):
             return np.einsum("bnk,nbi->ink", functions, q[self.e], optimize=True)
 
@@ -79,8 +77,8 @@ class Sections:
         r_xi = of(self._functions[1])
         return of(self._functions[0]) + self._arm * np.array([-r_xi[1], r_xi[0]])
 
-    def spread(self, force: Array) -> Array:
-        """Element vectors (ne, nb, 2) of forces (2, n, k), summed."""
+    def nodal(self, force: Array) -> Array:
+        """Element vectors (ne, nb, 2) of forces (2, n, k)."""
         parts = np.einsum("bnk,ink->nbi", self._functions[0], force, optimize=True)
         if self._arm is not None:
             parts = parts + np.einsum("bnk,ink->nbi", self._functions[1], self._arm * np.array(
@@ -97,25 +95,14 @@ class Sections:
 
 
 class SectionForces:
-    """Force and moment in the sections of one beam, for a displacement ``u`` (N,).
+    """Section forces of a beam for a displacement ``u`` (N,).
 
-    Of linear solutions ``u`` is a :func:`~skfem_ancf.core.linear.step` from the reference
-    configuration, as are the factors of loads; then all results are one. Raises NotRecovered if the
-    state is no equilibrium. Between ``cuts``, axial coordinates element + xi, forces are
-    continuous.
-
-    Parameters
-    ----------
-    loads
-        Pairs of a factor and a :class:`~skfem_ancf.beam.distribution.Spread`, or None.
-    stations
-        Axial coordinates of supports and joints.
-    acceleration
-        Of the degrees of freedom, shape (N,), or None.
-    sampled
-        Further densities of force, :class:`~skfem_ancf.beam.distribution.Sampled`.
-    viscous
-        Forces of the elements that resist the rate of the strain, shape (ne, nb, 2), or None.
+    Between ``cuts``, axial coordinates element + xi, they are continuous. For a linear solution
+    ``u``, the load factors and the results are complex steps
+    (:func:`~skfem_ancf.core.linear.step`). ``loads`` are pairs of a factor and a Spread (or None),
+    ``stations`` the axial coordinates of supports and joints, ``sampled`` further force densities,
+    ``viscous`` the viscous element forces (ne, nb, 2). Raises NotRecovered if the state is not an
+    equilibrium.
     """
 
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
@@ -123,8 +110,8 @@ class SectionForces:
                  sampled: Sequence[Sampled] = (), viscous: Array | None = None) -> None:
         self.beam, self.small, self.viscous = beam, np.iscomplexobj(u), viscous
         if any(load is None for _, load in loads):
-            raise NotRecovered("a load is given by its force on the coordinates only: where it "
-                               "acts across the section is not known")
+            raise NotRecovered("a load has only a force on the degrees of freedom: its "
+                               "distribution across the section is unknown")
         self.lifted = not (beam.has_sections or beam.across.simple)
         self.q = beam.kernel.gather(beam.q0_local + u)
         self._acceleration = None if acceleration is None else beam.kernel.gather(acceleration)
@@ -135,7 +122,7 @@ class SectionForces:
                        if load.faces is not None and factor and np.any(load.faces)]
         self._sampled = [*sampled, *(s.times(factor) for factor, load in loads
                                      for s in load.sampled)]
-        #: The faces that carry a load: 0 the bottom, 1 the top.
+        #: Loaded faces: 0 bottom, 1 top.
         self.sides = [side for side in (0, 1) if any(np.any(f.faces[side]) for _, f in self._faces)
                       or any(s.where == side for s in self._sampled)]
         self.eigen = [(factor, load.eigen) for factor, load in loads if load.eigen is not None]
@@ -149,7 +136,7 @@ class SectionForces:
     # densities of force
 
     def body(self, at: Sections) -> Array:
-        """Force per reference volume at points, inertia included, (2, n, k)."""
+        """Force per reference volume with inertia, (2, n, k)."""
         gravity = self._gravity[:, None, None]
         out = self._body[:, None, None] + self.sampled(at, BODY) + np.zeros(at.X.shape)
         if self._acceleration is not None:
@@ -157,7 +144,7 @@ class SectionForces:
         return out + at.density() * gravity if np.any(gravity) else out
 
     def sampled(self, at: Sections, where: int) -> Any:
-        """The sum of the Sampled densities of a kind at points, (2, n, k); or 0."""
+        """Sum of the Sampled densities of a kind, (2, n, k); or 0."""
         return sum(s.at(at.e, at.X[0, :, 0], at.X[1], self.beam.mesh.nelements)
                    for s in self._sampled if s.where == where)
 
@@ -181,7 +168,7 @@ class SectionForces:
         return at, on + self.sampled(at, side)
 
     def _balance(self, u):
-        """Section forces at both ends of each element, and the loads at points along it."""
+        """Set section forces at both ends of each element, and the loads along it."""
         beam, ne, (x, w) = self.beam, self.beam.mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
         parts = [self.face(side, e, xi) for side in self.sides]
@@ -200,20 +187,20 @@ class SectionForces:
         moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
         self._r, self._force, self._moment = (
             x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
-        load = sum(at.spread(f * np.tile(w, ne)[:, None]) for at, f in parts)
+        load = sum(at.nodal(f * np.tile(w, ne)[:, None]) for at, f in parts)
         for e, _, f in self._points:
             load[e] = load[e] + f
         internal = (beam.kernel.small_forces if self.small else beam.kernel.forces)(u)
         if self.viscous is not None:
             internal = internal + self.viscous
-        #: Size of force times height and moment that eigenstrains have alone.
+        #: Size of the section forces of the eigenstrains alone.
         self._pushed = 0.0
         for factor, eigen in self.eigen:
             pushed = (factor * eigen.small_forces() if self.small else
                       eigen.element_forces(u, factor))
             internal = internal - pushed
             self._pushed += self._size(*self._at_ends(pushed))
-        # of the part of the beam on the right of a section on that on its left
+        # action of the part on the right of a section on the part on its left
         self.R, self.M = self._at_ends(internal - load)
 
     def _at_ends(self, force):
@@ -223,11 +210,11 @@ class SectionForces:
                 np.array([-_moments(ql, left), _moments(qr, right)]))
 
     def _size(self, R, M):
-        """The largest force times the height, and moment."""
+        """The largest force times the height, plus the largest moment."""
         return np.max(np.abs(R)) * self.beam.mesh.height + np.max(np.abs(M))
 
     def viscous_middles(self) -> tuple[Array, Array]:
-        """Force (2, ne) and moment (ne,) of the viscous stress in the middle of elements."""
+        """Viscous force (2, ne) and moment (ne,) in the middle of elements."""
         left, q = (np.split(np.asarray(x), 2, axis=1)[0] for x in (self.viscous, self.q))
         ne = self.beam.mesh.nelements
         r = Sections(self.beam, np.arange(ne), np.full(ne, 0.5)).field(self.q)[..., 0]
@@ -235,11 +222,10 @@ class SectionForces:
         return R, cross(q[:, 0].T - r, R) - _moments(q, left)
 
     def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
-        """Force (2, n) and moment (n,) about the axis: of the right part of the beam on the left.
+        """Force (2, n) and moment (n,) about the axis, of the right part on the left.
 
-        ``begin`` is the cut at which the segment of each section begins, (n,). The equilibrium is
-        followed from both ends of the element, and the mean taken; where a force inside of it is
-        not known, from the end on this side of it.
+        ``begin`` (n,) are the cuts at which the segments begin. The mean of equilibrium from both
+        ends of the element is taken; next to an unknown force inside it, only the end on this side.
         """
         side = np.full(len(e), 0.5)
         for cut in self._unknown:
@@ -270,6 +256,7 @@ class SectionForces:
     # where they jump
 
     def _cut(self, loads, stations):
+        """Find the cuts."""
         mesh, across = self.beam.mesh, self.beam.across
         ne = mesh.nelements
         stations = list(stations) + [s for _, load in loads for s in load.stations]
@@ -289,7 +276,7 @@ class SectionForces:
             stations += list(jumps(eigen.strain_at, ne, np.linspace(0.0, 1.0, 5)))
         self.cuts = np.unique(_snapped(stations))
         known = np.array([station for _, station, _ in self._points])
-        #: Stations inside of elements at which the force is not known.
+        #: Stations of unknown forces inside elements.
         self._unknown = np.unique(self._acted[(self._acted % 1.0 != 0)
                                               & ~np.isin(self._acted, known)])
         inside = self._unknown.astype(int)
@@ -297,18 +284,18 @@ class SectionForces:
             self._pass_on(e, inside)
 
     def _pass_on(self, e, inside):
-        """The section forces at the ends of an element with a point load, from its neighbours."""
+        """Take the end forces of an element with an unknown point load from its neighbours."""
         t = self.beam.mesh.t
         for end, other in ((0, e - 1), (1, e + 1)):
             if e + end in self._acted or other in inside or np.sum(inside == e) > 1:
-                raise NotRecovered("a load or joint at a point inside of an element acts next to "
+                raise NotRecovered("a load or joint at a point inside an element is next to "
                                    "another one, or to a support: put a node at the point")
             near = 0 <= other < t.shape[1] and t[end, e] == t[1 - end, other]
             self.R[end][e] = self.R[1 - end][other] if near else 0.0
             self.M[end][e] = self.M[1 - end][other] if near else 0.0
 
     def _check(self):
-        """The section force is continuous, and zero at ends, where nothing acts at a node."""
+        """Raise NotRecovered unless section forces are continuous at unloaded nodes."""
         beam, mesh = self.beam, self.beam.mesh
         n, ne = mesh.p.shape[1], mesh.nelements
         R, M = np.zeros((n, 2), self.R.dtype), np.zeros(n, self.M.dtype)
@@ -320,32 +307,32 @@ class SectionForces:
         round_off = UNLOADED * places / np.min(mesh.lengths) * (
             beam.kernel.scale / mesh.lengths.sum() * mesh.height)
         if size <= round_off:
-            raise NotRecovered("the beam carries no load")
+            raise NotRecovered("the beam has no load")
         place = np.zeros(n)
         place[mesh.t[0]], place[mesh.t[1]] = np.arange(ne), 1.0 + np.arange(ne)
         jump = (np.abs(R).max(axis=-1) * mesh.height + np.abs(M)) / size
         jump[np.isin(place, self._acted)] = 0.0
         if np.max(jump) > (UNBALANCED if self._acceleration is None else UNBALANCED_MOTION):
             raise NotRecovered(
-                "the state is no equilibrium under the loads of the scene: at node "
-                f"{np.argmax(jump)} the section force changes by {np.max(jump):.1%} of its "
-                "largest value")
+                "the state is not an equilibrium under the loads of the scene: at node "
+                f"{np.argmax(jump)} the section force jumps by {np.max(jump):.1%} of its largest "
+                "value")
 
 
 def _traction(beam, traction, X, e):
-    """What a function of places returns at points of the reference configuration, (2, n, k)."""
+    """A function of position at points, (2, n, k)."""
     return np.array([np.broadcast_to(c, X.shape[1:])
                      for c in traction(beam.mesh.mapping().F(X, e))])
 
 
 def _snapped(stations):
-    """Axial coordinates, those near a node put at it."""
+    """Axial coordinates, snapped to nodes."""
     stations = np.asarray(stations, dtype=float)
     near = np.round(stations)
     return np.where(np.abs(stations - near) < SNAP, near, stations)
 
 
 def _moments(q, force):
-    """Moments (ne,) of element vectors on all degrees of freedom but r, (ne, nb, 2) both."""
+    """Moments (ne,) of element vectors on all DOFs but r, (ne, nb, 2) both."""
     q, force = (np.moveaxis(x[:, 1:], -1, 0) for x in (q, force))
     return np.sum(cross(q, force), axis=-1)

@@ -1,4 +1,4 @@
-"""The field of one axial segment: steps 2 to 4 of :mod:`skfem_ancf.recovery.recovered`."""
+"""The fields of one axial segment: steps 2 to 4 of :mod:`skfem_ancf.recovery.recovered`."""
 
 from __future__ import annotations
 
@@ -16,26 +16,25 @@ from ..mesh.mapping import cross
 from ..sections.jumps import beside
 from .section_forces import NotRecovered, Sections
 
-#: Rounds of steps 2 and 3, and the change of the stretch, relative to its largest, at which they
-#: end; and of those that contract slowly.
+#: Rounds of steps 2 and 3, and their tolerance; largest number and tolerance if they converge
+#: slowly.
 ROUNDS, SETTLED = 6, 1e-7
 MOST, SLOWLY = 30, 1e-4
 
-#: Part of an element beside a load or a joint that has no sections of its own, up to this. Alone
-#: between two of them it has those of the whole element.
+#: Fraction of an element next to a load or joint that has no sections. If it is the whole segment,
+#: the sections are those of the whole element.
 CLOSE = 0.02
 
-#: Iterations of the balance of a section in a round, and at most after the last one.
+#: Iterations of the balance of a section in a round, and after the last one.
 BALANCE, BALANCE_AT_END = 2, 10
 
-#: Within INNER heights of an end of a segment the elements' own stress is used, from LAYER heights
-#: on no longer. Not at all if the elements there are longer than COARSE heights; if they are longer
-#: than FINE, in part.
+#: Distance from the ends in heights up to which the element stress is used, and beyond which it is
+#: not; element lengths in heights up to which it is used fully, and beyond which it is not.
 INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 
 def smoothed(s: Array, values: Array, length: float) -> Array:
-    """The solution f (..., n, m) of ``f - length^2 f'' = values`` with f' = 0 at both ends of s."""
+    """Solve ``f - length^2 f'' = values`` with f' = 0 at both ends of s, for f (..., n, m)."""
     d = np.diff(s)
     w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
     c = length**2 / d
@@ -48,17 +47,17 @@ def smoothed(s: Array, values: Array, length: float) -> Array:
 
 
 class Segment:
-    """The field between two cuts, at n sections (ends and middles of elements) of m points.
+    """The fields between two cuts, at n sections (ends and middles of elements) of m points.
 
-    The sections are at arc lengths ``s`` (n,) and turn at the ``rate`` (n,). ``strain`` and
-    ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the fibres along the axis, and
-    ``change`` that of the stretch in the last round.
+    The sections have arc lengths ``s`` (n,) and turn at the ``rate`` (n,). ``strain`` and
+    ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the axial fibres, ``change`` the
+    last change of the stretch.
     """
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
         self.recovery, self.forces = recovery, recovery.forces
         self.beam, self.height = recovery.beam, recovery.beam.mesh.height
-        #: Sections of cables keep their height where the axis is stretched.
+        #: Sections of cables keep their height when the axis is stretched.
         self.rigid = not self.beam.has_sections
         xi = self._sections(start, end)
         self._geometry(self.e, xi)
@@ -69,13 +68,13 @@ class Segment:
         self._solve()
 
     def _sections(self, start, end):
-        """Places of the sections in their elements."""
+        """xi of the sections; sets their elements."""
         e = np.arange(int(np.floor(start)), int(np.ceil(end)))
         a, b = np.maximum(start - e, 0.0), np.minimum(end - e, 1.0)
         far = b - a > CLOSE
-        if np.any(far):  # derivatives by sections that are near each other are round-off
+        if np.any(far):  # derivatives between close sections are round-off
             e, a, b = e[far], a[far], b[far]
-        if not np.any(far):  # the field on whole elements, under the section force of this part
+        if not np.any(far):  # whole elements, with the section force of this part
             a, b = 0.0 * a, 0.0 * b + 1.0
         whole = (a == 0) & (b == 1)
         self.elements = e[whole] if np.any(whole) else e
@@ -83,7 +82,7 @@ class Segment:
         return np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
 
     def _geometry(self, e, xi):
-        """Where the points are, what the section is made of there, and the loads."""
+        """Set points, stiffness and loads of the sections."""
         r, across, mapping = self.recovery, self.beam.across, self.beam.mesh.mapping()
         self.s = r.arc.at(e, xi)
         self.points = at = r.points(e, xi)
@@ -109,14 +108,13 @@ class Segment:
                       else np.zeros((2, len(e))) for k in (0, 1)]
         tangent = axis.field(self.forces.q, slope=True)[..., 0]
         self.axis_angle = unwrapped(angle_of(*tangent))
-        # shear stress in bending but for a factor [Jourawski]: the first moment of E dA beyond,
-        # over the width; of a rectangle of one material a parabola
+        # Jourawski's shear stress up to a factor: first moment of E dA over the width
         E = self.grade * r.modulus(np.zeros((3,) + self.g.shape))
         centre = (self.integral(E * self.Y) / self.integral(E))[:, None]
         self.jourawski = self.from_bottom(self.width * E * (centre - self.Y)) / self.width
 
     def _viscous_forces(self):
-        """The part of force and moment that resists the rate of the strain, splined."""
+        """Spline of the viscous part of force and moment."""
         s = self.recovery.arc.at(self.elements, np.full(len(self.elements), 0.5))
         R, M = (x[..., self.elements] for x in self.forces.viscous_middles())
         if len(s) == 1:
@@ -126,33 +124,33 @@ class Segment:
     # along the axis and across
 
     def spline(self, values: Array, axis: int) -> Any:
-        """The cubic spline through values at the sections."""
+        """Cubic spline through values at the sections."""
         degree = min(3, len(self.s) - 1)
         return scipy.interpolate.make_interp_spline(self.s, values, degree, axis=axis,
                                                     check_finite=False)
 
     def d_ds(self, values: Array) -> Array:
-        """The derivative along the axis of values (..., n, m)."""
+        """Axial derivative of values (..., n, m)."""
         return self.spline(values, -2)(self.s, 1)
 
     def smoothed(self, values: Array) -> Array:
-        """Values (..., n, m) without waves that would grow from round to round."""
+        """Values (..., n, m) without short waves, which would grow from round to round."""
         return smoothed(self.s, values, 0.5 * self.height)
 
     def across(self, values: Any) -> Array:
-        """The integral over the height of values (..., n, m)."""
+        """Integral over the height of values (..., n, m)."""
         return (self.span * values) @ self.recovery.intervals.whole
 
     def integral(self, values: Any) -> Array:
-        """The integral over the section, with the width, of values (..., n, m)."""
+        """Integral over the area of values (..., n, m)."""
         return self.across(self.width * values)
 
     def from_bottom(self, values: Array) -> Array:
-        """The integral from the bottom to each point of values (..., n, m)."""
+        """Integral from the bottom to each point of values (..., n, m)."""
         return (self.span * values) @ self.recovery.intervals.from_bottom.T
 
     def from_axis(self, values: Array) -> Array:
-        """The integral from the axis to each point of values (..., n, m)."""
+        """Integral from the axis to each point of values (..., n, m)."""
         return self.from_bottom(values) - np.sum(
             self.span * values * self.points.till_axis, axis=-1)[..., None]
 
@@ -161,9 +159,9 @@ class Segment:
         return np.sum(values * self.points.axis, axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
-        """The integral from the axis of the derivative along it, at the same distance from it.
+        """Integral from the axis of the axial derivative at constant distance from it.
 
-        Values (..., n, m) and ``d_ds`` are those of points at the same parts of their interval.
+        Values (..., n, m) and ``d_ds`` belong to points at constant relative positions.
         """
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
@@ -171,7 +169,7 @@ class Segment:
     # step 2
 
     def _strain(self):
-        """The strain (3, n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
+        """Strain (3, n, m) from S_yy, S_xy, and the stretch or S_xx."""
         r = self.recovery
         if self.stress_given:
             return self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
@@ -184,22 +182,22 @@ class Segment:
         return eps + self.E0
 
     def _fibres(self, S):
-        """The strain of a cable's fibres, and their S_xx: P / stretch of P = E (stretch - 1)."""
+        """Strain of a cable's fibres and S_xx = P / stretch, with P = E (stretch - 1)."""
         r, longer = self.recovery, self.stretch - 1.0
         eps = r.strain_of(S, np.array([longer, 0.0 * longer, 0.0 * longer]) - self.E0, (1, 2))
         P = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
         eps = eps + self.E0
-        size = 1.0 + 0.5 * longer  # of Green-Lagrange strain over stretch minus 1
+        size = 1.0 + 0.5 * longer  # Green-Lagrange strain over (stretch - 1)
         thin = r.by_law(lambda law, xx: law.D[1, 0] / law.D[1, 1] * xx,
                         size * (longer - self.E0[0]))
         self.thinner = np.sqrt(1.0 - 2.0 * self.at_axis(thin))
         return np.array([size * longer, size * eps[1], eps[2]]), P / self.stretch
 
     def _section(self):
-        """Derivatives r_X and r_Y, and the stress P on sections, along t and n; (2, n, m) each."""
+        """Set r_X, r_Y and the stress P on sections, along t and n; (2, n, m) each."""
         self.eps = eps = self._strain()
         lam_y = np.sqrt(1.0 + 2.0 * eps[1])
-        if self.rigid:  # a stretch of the axis makes the sections of a cable no thinner
+        if self.rigid:  # sections of a cable keep their height
             lam_y = lam_y / self.thinner[:, None]
         lean = self.alpha - np.arcsin(np.clip(eps[2] / (self.stretch * lam_y), -1.0, 1.0))
         self.rY = lam_y * _normal(lean)
@@ -207,8 +205,8 @@ class Segment:
         self.P = self.rX * self.S[0] + self.rY * self.S[2]
 
     def _balance(self, times=BALANCE_AT_END):
-        """Change S_xx linearly in Y until the section has its normal force and moment."""
-        # short waves would grow from round to round: S_yy holds second derivatives of S_xx
+        """Change S_xx linearly in Y until normal force and moment are balanced."""
+        # S_yy has second derivatives of S_xx: short waves would grow
         self._fed = np.concatenate([0.0 * self.S[:1], self.smoothed(self.S[1:])]) / self.grade
         N, self.Q = _turned(self.R, self.phi)
         for _ in range(times):
@@ -217,7 +215,7 @@ class Segment:
             x, y = self.from_axis(self.rY)
             z = y / self.height
             force = (E if self.rigid else self.S[0] + E * self.stretch**2) / self.g
-            # force and moment, and what a stretch and a bending of 1 / g and z / g add to them
+            # force and moment, and their derivatives by stretch 1 / g and bending z / g
             found, moment, one, two, three = self.integral(np.array([
                 self.P[0], x * self.P[1] - y * self.P[0], force, z * force, z * z * force]))
             n, m, det = N - found, (self.M - moment) / self.height, one * three - two * two
@@ -230,7 +228,7 @@ class Segment:
                 break
 
     def _turn(self):
-        """The rate at which sections turn, the angles of fibres and of the frame."""
+        """Set the rate of rotation, and the angles of fibres and frame."""
         intervals, along = self.recovery.intervals, self.g * self.rX[0]
         total = self.across(self.rY)
         with_faces = along + self.lean * self.rY[0]
@@ -250,20 +248,20 @@ class Segment:
 
     @cached_property
     def _line(self):
-        """From values (n,) at the sections to those of the straight line that fits them best."""
+        """Matrix of the least-squares line through values (n,)."""
         s = self.s - self.s.mean()
         return s[:, None] * s / (s @ s) + 1.0 / len(s)
 
     # step 3
 
     def _equilibrium(self):
-        """S_xy and S_yy from div P + b = 0 and the loads of the faces."""
+        """Set S_xy and S_yy from div P + b = 0 and the loads of the faces."""
         rate, viscous, phi = self.rate[:, None], self._viscous_stress(), self.phi[:, None]
         P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
         dP = (self.d_ds(P) + rate * np.array([-P[1], P[0]])
               + self.width * _turned(self.body, phi))
         bottom, top = (_turned(f[..., None], phi) for f in self.faces)
-        dP = dP + self.swell * P  # with what leaves oblique faces
+        dP = dP + self.swell * P  # with the flux through oblique faces
         left = top + bottom + self.across(dP)[..., None]
         P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
         P2 = P2 / (self.g * self.width)
@@ -273,7 +271,7 @@ class Segment:
         self._shear()
 
     def _viscous_stress(self):
-        """S_xx, linear in Y, and S_xy that resist the rate of the strain."""
+        """Viscous S_xx, linear in Y, and S_xy."""
         if self.forces.viscous is None:
             return 0.0, 0.0
         N, Q = _turned(self.Rv, self.phi)
@@ -293,7 +291,7 @@ class Segment:
         return (force / self.integral(self.rY[1] * self.jourawski))[:, None] * self.jourawski
 
     def _shear(self):
-        """Add a shear stress to S_xy, so that the section has its shear force."""
+        """Add shear stress to S_xy to match the shear force."""
         self.S[2] += self._sheared(self.Q - self.integral(
             self.rX[1] * self.S[0] + self.rY[1] * self.S[2]))
 
@@ -328,7 +326,7 @@ class Segment:
     # step 4
 
     def _layers(self):
-        """How much of the elements' own stress each section takes, (n,): near ends that is fine."""
+        """Weights (n,) of the element stress near the ends."""
         r, weight = self.recovery, np.zeros(len(self.s))
         if not r.has_stress:
             return weight
@@ -343,7 +341,7 @@ class Segment:
         return weight
 
     def _samples(self):
-        """The elements' stress (3, n, m): from where they are most accurate, splined."""
+        """Spline (3, n, m) of the element stress at its most accurate points."""
         r = self.recovery
         at, stress = r.samples
         s = r.arc.at(np.repeat(self.elements, len(at)), np.tile(at, len(self.elements)))
@@ -354,12 +352,12 @@ class Segment:
 
     @cached_property
     def result(self) -> Any:
-        """The spline of strain, stress and angle along the axis, of values (7, m)."""
+        """Spline of strain, stress and angle, with values (7, m)."""
         return self.spline(np.moveaxis(first_order(np.concatenate(
             [self.strain, self.stress, self.angle[None]])), 1, 0), 0)
 
 
-DIVERGED = "the strain is too large: the section has no state of equilibrium"
+DIVERGED = "the strain is too large: no equilibrium of the section was found"
 
 
 def _tangent(angle):
@@ -371,5 +369,5 @@ def _normal(angle):
 
 
 def _turned(f, angle):
-    """Components of vectors (2, ...) along the directions of angles and normal to them."""
+    """Components of vectors (2, ...) along angles and normal to them."""
     return np.array([np.sum(_tangent(angle) * f, axis=0), np.sum(_normal(angle) * f, axis=0)])

@@ -110,10 +110,10 @@ def _forces(s, dynamic, linear):
     yield _item("damping", kinds and dynamic, ", ".join(kinds),
                 "no velocities in statics" if kinds else "there is none")
     forces = s.forces
-    known = sum(ours(getattr(element, "item", element)) for element in forces.own)
+    known = sum(ours(getattr(element, "item", element)) for element in forces.custom)
     yield _item("force elements", forces.elements, (
         f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
-        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} user-defined, "
+        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.custom) - known} user-defined, "
         f"{known} by functions asked in Python, {len(forces.masses)} in the mass"
         + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
         + (", some couple points far apart" if forces.far else "")), "no springs, no masses")
@@ -203,7 +203,7 @@ def _obstacles(contacts, linear):
     groups = [group for one in contacts.obstacles for group in one.groups]
     how = [text for text, there in (
         ("friction", contacts.anchored), ("augmented Lagrangian", contacts.augmented),
-        ("moving", contacts.moving), ("a distance in Python", contacts.own)) if there]
+        ("moving", contacts.moving), ("a distance in Python", contacts.custom)) if there]
     return _item(
         "obstacles", groups and not linear, ", ".join([
             f"{len(contacts.obstacles)}, {sum(len(group.first) for group in groups)} points of the "

@@ -1,4 +1,4 @@
-"""Static solvers: one file each."""
+"""Static solvers."""
 
 from .continuation import continuation
 from .newton import solve_static

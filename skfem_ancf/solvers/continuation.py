@@ -1,4 +1,4 @@
-"""Arc-length continuation: equilibria beyond limit, snap-back and bifurcation points."""
+"""Arc-length continuation past limit, snap-back and bifurcation points."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .critical import Critical, find_critical
 from .tracing import Failed, Point, Tracer
 
 logger = logging.getLogger(__name__)
-#: Evaluations of the equations in a step, about.
+#: Approximate evaluations of the equations in a step.
 EVALUATIONS = 10
-#: Steps of the longest path.
+#: Largest number of steps.
 MAX_STEPS = 10**6
-#: How far a step may be off a straight line, relative to its length and to the load.
+#: Deviation of a step from a straight line, relative to its length and to the load.
 TURN = 0.03
-#: Shortest step that is tried, relative to ds.
+#: Shortest step, relative to ds.
 SHORTEST = 1e-6
 
 
@@ -33,14 +33,14 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                  progress: bool | None = None) -> tuple[list[Point], list[Critical]]:
     """Follow the equilibrium path from the reference configuration or from a bifurcation point.
 
-    Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
-    displacement over the size of the scene, with the load factor as an unknown. Where loads move no
-    node, as heat between walls, the strain that their forces could cause counts in it, too. Steps
-    become shorter where the path or its load turns and where iterations multiply. The geometric
-    part of the tangent uses the independent stress of the mixed iteration.
+    A step advances by ``ds`` along the tangent of the path, in the norm of the mean nodal
+    displacement over the size of the scene; the load factor is an unknown. For loads that move no
+    node, such as heat between walls, the norm includes the strain that their forces could cause.
+    Steps get shorter where the path or the load turns, or iterations increase. The geometric
+    stiffness uses the independent stress of the mixed iteration.
 
-    Where the load turns, or the number of negative eigenvalues of the tangent stiffness changes,
-    the limit or bifurcation point is solved for within its step.
+    Where the load turns, or the number of negative eigenvalues of the tangent changes, the limit or
+    bifurcation point within the step is computed.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     steps
         Largest number of steps, at most 10**6.
     ds
-        First arc length, relative to the size of the scene; later ones adapt.
+        Initial arc length, relative to the size of the scene; later ones adapt.
     ds_max
         Largest arc length; 5 ds by default.
     max_load
-        End where the load factor reaches this in size; the last point is there.
+        Stop at this absolute load factor; the last point is there.
     until
         A function of a :class:`Point` that returns True to stop.
     tol
@@ -61,15 +61,14 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     max_iterations
         Iterations before a step is halved.
     locate
-        Tolerance at critical points: of the load at a limit point, relative to it, and of the arc
-        length at a bifurcation point, relative to its step. None not to look for them.
+        Tolerance at critical points: relative load of a limit point, and arc length of a
+        bifurcation point relative to its step. None disables the search.
     branch
-        A critical point of an earlier path, of kind "bifurcation": follow the path that leaves
-        the other one there, along its mode.
+        A bifurcation point of an earlier path: follow the path that branches off along its mode.
     side
-        1 or -1: in the sense of the mode or against it.
+        1 or -1: along or against the mode.
     progress
-        Show a progress bar: True, False, or None for "if it takes long".
+        Show a progress bar: True, False, or None for long runs only.
 
     Returns
     -------
@@ -130,7 +129,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
 
 
 def _ends(until, point):
-    """What the caller's function says to a point."""
+    """The checked result of the user's function."""
     answer = ask("until(point)", until, point)
     if not isinstance(answer, (bool, np.bool_)):
         raise CallbackError(f"until(point) must return True or False, got {shown(answer)}")
@@ -152,7 +151,7 @@ def _start(tracer, branch, side):
 
 
 def _step(tracer, start, ds):
-    """The next point with its tangent, and how far the step is off a straight line."""
+    """The next point with its tangent, and the deviation from a straight line."""
     point = tracer.set_tangent(tracer.advance(start, ds), start)
     mean = 0.5 * ds * (start.tangent + point.tangent)
     bend = tracer.norm(point.u - start.u - mean) / ds
@@ -164,9 +163,9 @@ def _step(tracer, start, ds):
 
 
 def _land(tracer, start, point, load):
-    """The point between two where the load is reached."""
+    """The point between two at which the load is reached."""
     h, low, high, x = point.arc - start.arc, 0.0, 1.0, 1.0
-    for _ in range(60):  # bisection by the cubic polynomial of the load
+    for _ in range(60):  # bisection of the cubic interpolation of the load
         x = 0.5 * (low + high)
         low, high = (x, high) if abs(load_between(start, point, x)) < abs(load) else (low, x)
     near = point
@@ -179,7 +178,7 @@ def _land(tracer, start, point, load):
 
 
 def load_between(p: Point, q: Point, x: float) -> float:
-    """The load at a part x of the way between two points: a cubic polynomial of the arc length."""
+    """Cubic interpolation of the load at a fraction x of the arc length between two points."""
     h = q.arc - p.arc
     a, b = p.load, h * p.rate
     c = 3 * (q.load - a) - 2 * b - h * q.rate

@@ -10,18 +10,18 @@ import numpy as np
 from ..core.types import Array
 from .tracing import Point, Tracer
 
-#: How often a step is halved to tell critical points from each other.
+#: How often a step is halved to separate critical points.
 DEPTH = 12
 
 
 @dataclass
 class Critical:
-    """A point at which the tangent stiffness is singular.
+    """A point with a singular tangent stiffness.
 
-    ``kind`` is "limit", where the load turns, or "bifurcation", where another path crosses;
-    ``mode`` and ``multiplier_mode`` the null vector, (N,) and (m,), of unit mean displacement over
-    the size of the scene; ``negative`` the number of negative eigenvalues before it, ``change`` by
-    how many that changes. The others are as for :class:`~skfem_ancf.solvers.tracing.Point`.
+    ``kind`` is "limit" or "bifurcation"; ``mode`` (N,) and ``multiplier_mode`` (m,) are the null
+    vector, with unit mean displacement over the size of the scene; ``negative`` is the number of
+    negative eigenvalues before it, ``change`` the change of that number. Others as in
+    :class:`~skfem_ancf.solvers.tracing.Point`.
     """
 
     kind: str
@@ -38,7 +38,7 @@ class Critical:
 
 
 def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critical]:
-    """The critical points between two points of a path with their tangents, in order."""
+    """The critical points between two points with tangents, in order."""
     out, stack = [], [(p, q, 0)]
     while stack:
         a, b, depth = stack.pop()
@@ -59,19 +59,19 @@ def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critic
 
 
 def _between(tracer, p, arc, b):
-    """The point at an arc length after p; b if it is that one."""
+    """The point at an arc length after p, or b."""
     return b if arc >= b.arc else tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
 
 
 def _limit(tracer, p, a, b, tol):
-    """Where the load turns between a and b: Illinois' method for the rate of the load."""
+    """The limit point between a and b, by the Illinois method for the rate of the load."""
     end, before = tol * (b.arc - p.arc), a.negative
     change = None if before is None else b.negative - before
     low, high, f, g, best = a, b, a.rate, b.rate, b
     for _ in range(100):
         x = (low.arc * g - high.arc * f) / (g - f)
         best = _between(tracer, p, min(max(x, low.arc + 0.01 * end), high.arc - 0.01 * end), b)
-        # the load is a parabola here, of the second derivative that the rates at both ends say
+        # parabola of the load, with the second derivative from the rates at both ends
         gap = 0.5 * best.rate**2 * (b.arc - a.arc) / abs(b.rate - a.rate)
         if gap <= 0.1 * tol * abs(best.load):
             break
@@ -86,7 +86,7 @@ def _limit(tracer, p, a, b, tol):
 
 
 def _bifurcation(tracer, p, a, b, tol):
-    """Where the number of negative eigenvalues changes: bisection, and secants of the smallest."""
+    """Where the count of negative eigenvalues changes: bisection, and secants of the smallest."""
     end, before, change = tol * (b.arc - p.arc), a.negative, b.negative - a.negative
     mode, values = None, {}
     low, high, best = a, b, b
@@ -95,7 +95,7 @@ def _bifurcation(tracer, p, a, b, tol):
         f, g = values.get(low.arc), values.get(high.arc)
         if f is not None and g is not None and f * g < 0:
             guess = (low.arc * g - high.arc * f) / (g - f)
-            # overshoot a little, so that both ends close in
+            # overshoot slightly, so that both ends converge
             guess += np.sign(x - guess) * 0.1 * min(guess - low.arc, high.arc - guess)
             x = guess
         best = _between(tracer, p, x, b)
@@ -112,7 +112,7 @@ def _bifurcation(tracer, p, a, b, tol):
 
 def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = None
              ) -> tuple[tuple[Array, Array], float]:
-    """The eigenvalue next to zero of the tangent stiffness over its diagonal, and its vector.
+    """The eigenvalue closest to zero of the tangent stiffness over its diagonal, and its vector.
 
     By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
     """

@@ -1,4 +1,4 @@
-"""The way from an unstable point down to a stable equilibrium."""
+"""Descent from an unstable point to a stable equilibrium."""
 
 from __future__ import annotations
 
@@ -19,54 +19,50 @@ from .outcome import Equilibrium, StaticResult, StepFailed
 
 logger = logging.getLogger(__name__)
 
-#: Largest displacements of a node in one correction of a descent, relative to the scene's size,
-#: that are tried one after the other.
+#: Initial trust-region radii, relative to the scene's size, in the order of attempts.
 STRIDES = (0.1, 0.02, 0.004)
 #: First displacement along a negative direction, relative to the scene's size.
 KICK = 0.02
-#: How often a descent may come to rest at an unstable point and leave it again.
+#: Number of unstable points that a descent may leave.
 KICKS = 6
-#: Positions of nodes up to which dense eigenvalues are used.
+#: Largest number of position DOFs for dense eigenvalues.
 DENSE = 64
-#: How much more the nodes move close to a limit point than in the reference configuration.
+#: Ratio of compliances that indicates a limit point.
 SOFTER = 8.0
-#: How often a step that ends at an unstable point is cut before the path counts as unstable.
+#: Number of step cuts at unstable points before the path counts as unstable.
 CUTS = 3
 #: Iterations of a descent.
 DESCENT = 200
-#: Largest radius of a descent, and displacement over the size of the scene from which it is lost.
+#: Largest radius, and displacement that counts as diverged, relative to the scene's size.
 LARGEST, LOST = 0.5, 20.0
-#: How often a correction of a descent is halved that leads through an obstacle.
+#: How often a correction through an obstacle is halved.
 HALVED = 8
 
 
 def heads_on(system: System, start: StaticResult, u: Array, load: float) -> bool:
-    """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
+    """True if ``u`` lies on the side of the last equilibrium to which the load increment points.
 
-    Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
-    compared with those of the tangent, but where obstacles move.
+    Close to a bifurcation an iteration may jump to the other side. The displacement is compared
+    with that of the tangent; moving obstacles are not tested.
     """
     if system.forces.contacts.moving:
-        return True  # the tangent does not know where obstacles go
-    du, held, solver = np.zeros(system.N), system.constraints, system.solver
-    du[held.fixed] = held.values(load) - start.u[held.fixed]
+        return True  # the tangent has no motion of obstacles
+    du, constraints, solver = np.zeros(system.N), system.constraints, system.solver
+    du[constraints.fixed] = constraints.values(load) - start.u[constraints.fixed]
     force, _ = system.assemble(start.u, start.load)
-    J = held.full_jacobian(start.u, load)
+    J = constraints.full_jacobian(start.u, load)
     residual = (load * system.external_force(start.u) - force - solver.multiply(du)
                 - start.multipliers @ J)
     try:
         solver.factorize(start.u, load, start.multipliers)
-        du += solver.solve(residual, -held.constraint(start.u, load) - J @ du)[0]
+        du += solver.solve(residual, -constraints.constraint(start.u, load) - J @ du)[0]
     except NO_FACTORS:
         return True
     return bool(du @ (position_weights(system) * (u - start.u)) >= 0.0)
 
 
 def near_limit(system: System, start: StaticResult) -> bool:
-    """True if the last equilibrium is close to a limit point.
-
-    There the nodes move much more under forces that the reference configuration withstands.
-    """
+    """True if the last equilibrium is much more compliant than the reference configuration."""
     if start.load == 0.0:
         return False
     descent, none, ratio = Descent(system), np.zeros(system.constraints.m), []
@@ -82,16 +78,16 @@ def near_limit(system: System, start: StaticResult) -> bool:
 
 
 class Descent:
-    """Corrections of bounded size that lead to a minimum of the potential.
+    """A trust-region method that minimises the potential.
 
-    The tangent is made stiffer by a multiple of the identity, of coordinates over their sizes,
-    until it is positive definite and the correction no larger than a radius: a trust region by
-    Levenberg and Marquardt, see Conn, Gould, Toint: Trust-Region Methods (2000), 7.3. Close to a
-    minimum nothing is added, and the correction is Newton's.
+    A multiple of the identity (in scaled DOFs) is added to the tangent until it is positive
+    definite and the correction is within a radius (Levenberg-Marquardt; Conn, Gould, Toint:
+    Trust-Region Methods (2000), 7.3). Close to a minimum nothing is added, which is Newton's
+    method.
 
-    ``stride`` is the first radius: the largest change of a degree of freedom over its size. It is
-    halved where corrections turn back, and grows to five times that where they go on. ``turned``
-    is True once a direction of negative curvature was met.
+    ``stride`` is the initial radius, the largest change of a scaled DOF. It is halved if
+    corrections reverse, and grows to five times that if they continue. ``turned`` is True once a
+    direction of negative curvature was met.
     """
 
     def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
@@ -101,9 +97,9 @@ class Descent:
         self._radius, self._largest = stride, min(5.0 * stride, LARGEST)
         self._shift, self._before = 0.0, np.zeros(system.N)
 
-    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
-                  dm: Array) -> bool:
-        """Solve for a correction; False if there is none."""
+    def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                   dm: Array) -> bool:
+        """Solve for a correction within a kernel; False on failure."""
         if np.max(np.abs(u / self._sizes)) > LOST:
             return False
         found = self._bounded(lambda: self.system.solver.factorize(u, t, multipliers), R, phi)
@@ -120,7 +116,7 @@ class Descent:
         return True
 
     def _held_back(self, t, u, du, dm):
-        """A correction, shortened until nothing passes through an obstacle."""
+        """Shorten a correction until nothing passes through an obstacle."""
         for _ in range(HALVED):
             if self.system.forces.contacts.passed((u, t), (u + du, t)) is None:
                 break
@@ -128,7 +124,7 @@ class Descent:
         return du, dm
 
     def _bounded(self, factorize, R, phi):
-        """The correction with the least stiffness added that will do, to a factor of ten or so."""
+        """The correction with the smallest shift that suffices, to a factor of ten."""
         band, system = self.system.K.band, self.system
         fix(band, system.constraints.fixed)
         tangent = band.flat.copy()
@@ -142,7 +138,7 @@ class Descent:
             try:
                 factorize()
                 du, dm = system.solver.solve(R, phi)
-                # where friction slips there is no potential: what does work will do
+                # slipping friction has no potential: the correction must do positive work
                 down = system.solver.inertia().negative == 0 if system.symmetric else R @ du >= 0.0
             except NO_FACTORS:
                 return None
@@ -155,13 +151,13 @@ class Descent:
             self._shift = 0.0
             return found
         found = correction(shift)
-        if found is None:  # more
+        if found is None:  # increase
             while found is None and shift < 1e6 * scale:
                 shift *= 10.0
                 found = correction(shift)
             self._shift = shift
             return found
-        while shift > 10.0 * least:  # less
+        while shift > 10.0 * least:  # decrease
             less = correction(0.1 * shift)
             if less is None:
                 break
@@ -170,20 +166,19 @@ class Descent:
         return found
 
     def product(self, a: Array, b: Array) -> float:
-        """The sum over the nodes of ``a . b``, of displacements (N,)."""
+        """Scalar product of nodal displacements (N,)."""
         return float(a @ (self._weights * b))
 
     def directions(self, count: int) -> list[tuple[Array, float]]:
-        """Directions v with negative ``v . K v``, from the factors, and that number: pairs.
+        """Directions v with v . K v < 0, and the eigenvalues: pairs, the most negative first.
 
-        Eigenvectors of the inverse of K on the positions of the nodes, the most negative ones
-        first.
+        They are eigenvectors of K^-1 on the nodal positions.
         """
         inverse, values, Y = self._inverse_eigenvectors(count, "SA")
         return [(inverse(y), value) for y, value in zip(Y.T, values) if value < 0]
 
     def compliance(self) -> float:
-        """The largest displacement of the nodes for unit forces on them, from the factors."""
+        """The largest nodal displacement for unit forces, from the factors."""
         values = self._inverse_eigenvectors(1, "LA")[1]
         return float(np.max(values, initial=0.0))
 
@@ -211,9 +206,9 @@ class Descent:
 
 
 def way_down(increment: Any) -> tuple[Equilibrium | None, bool]:
-    """What :func:`descend` finds, or None, and whether it met an unstable tangent.
+    """The result of :func:`descend`, or None, and whether an unstable tangent was met.
 
-    Of the strides the first that leads where the load drives the scene.
+    Of all strides, the first result to which the load drives the scene is preferred.
     """
     system, start, level = increment.system, increment.start, increment.level
     options = increment.options._replace(most=DESCENT, watched=False)
@@ -238,11 +233,10 @@ def way_down(increment: Any) -> tuple[Equilibrium | None, bool]:
 
 def descend(increment: Any, iterate: Callable[..., Equilibrium],
             descent: Descent) -> Equilibrium:
-    """A stable equilibrium at a load where the path from the last one has lost its stability.
+    """A stable equilibrium at a load beyond which the path is unstable.
 
-    Corrections of :class:`Descent` from the last stable equilibrium, by ``iterate``; where they
-    come to rest at an unstable point, the lowest direction leads on, towards the last stable
-    equilibrium, or where it points to neither side, to that of the lower potential.
+    Corrections of :class:`Descent` start from the last stable equilibrium. An unstable point is
+    left along its lowest direction, towards the last stable equilibrium, or to the lower potential.
     """
     system, start, load = increment.system, increment.start, increment.load
     u, multipliers = start.u, start.multipliers
@@ -253,16 +247,16 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
             return found
         descent.turned = True
         directions = descent.directions(1)
-        if not directions:  # what gives way does not move the nodes
+        if not directions:  # the unstable direction does not move the nodes
             break
         v = directions[0][0]
         v = KICK * system.size / np.max(np.abs(v)) * v
         u = u + _side(system, descent, v, u, start.u, load) * v
-    raise StepFailed("no stable equilibrium found along the directions that give way")
+    raise StepFailed("no stable equilibrium found along the unstable directions")
 
 
 def _side(system, descent, v, u, last, load):
-    """On which side of an unstable point to leave it along v: 1 or -1."""
+    """On which side to leave an unstable point along v: 1 or -1."""
     back = descent.product(v, last - u)
     if abs(back) > 1e-6 * descent.product(v, v):
         return 1.0 if back > 0 else -1.0

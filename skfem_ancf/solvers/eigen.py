@@ -17,28 +17,28 @@ from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
 
-DENSE = 600  # free coordinates up to which the dense solver is used
-WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
-ORTHOGONAL = 1e-5  # scalar product of two shapes of unit mass
-UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
+DENSE = 600  # largest number of free DOFs for the dense solver
+WINDOW = 1e-8  # smallest relative eigenvalue that is taken from an inverse
+ORTHOGONAL = 1e-5  # scalar product of orthogonal shapes of unit mass
+UNREFINED = 1e-7  # error up to which Lanczos uses an inverse without refinement
 LANCZOS = 1e-10  # its tolerance
-SAME = 1e-6  # relative distance of eigenvalues that are the same
-UNSTRESSED = 1e-9  # force of springs at rest, over their stiffness times the size, of round-off
-SMALL = 1e-4  # displacement over the size by which tangents of domains are differences
-ASIDE = 1e-5  # motion that shows on which sides springs push, over the size
-STIFFER = 0.1  # relative change of their stiffness that is not left out
-TURNING = 1e-2  # square of the angular velocity over that of a frequency
-REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
+SAME = 1e-6  # relative distance of equal eigenvalues
+UNSTRESSED = 1e-9  # relative force of springs at rest that is round-off
+SMALL = 1e-4  # relative displacement for difference quotients of domain tangents
+ASIDE = 1e-5  # relative displacement for a test of one-sided springs
+STIFFER = 0.1  # relative change of spring stiffness that is not neglected
+TURNING = 1e-2  # squared ratio of angular velocity to frequency that gives a warning
+REAL = 1e-7  # relative imaginary part of a real eigenvalue
 
 
 def modes(system: System, state: State, k: int) -> Modes:
-    """The k lowest natural frequencies about a state, with the smallest real part of ``lambda``.
+    """The k lowest natural frequencies about a state (smallest real part of ``lambda``).
 
-    The eigenvalues of ``K x = lambda M x`` are found as ``1 / (lambda + s)``, the largest first, s
-    a small shift: of ``(K + s M)^-1 M``, with solutions refined by strains instead of assembled
-    stiffnesses, and at last as quotients of sums of squares of strains. So the low ones, of
-    bending, are accurate although the largest are ``(L / h)^4`` times as large. With loads that
-    have no potential K is not symmetric, and its eigenvalues may be complex.
+    The eigenvalues of ``K x = lambda M x`` are computed as the largest of ``(K + s M)^-1 M`` with a
+    small shift s. Solutions are refined by strains instead of assembled stiffnesses, and
+    eigenvalues are quotients of sums of squared strains. Low (bending) frequencies are therefore
+    accurate although the highest eigenvalues are ``(L / h)^4`` times larger. With loads without a
+    potential, K is unsymmetric and eigenvalues may be complex.
     """
     with system.forces.contacts.lent(state.memory):
         return _modes(system, state, k)
@@ -68,29 +68,25 @@ def _modes(system, state, k):
 
 
 def rest_modes(system: System, k: int) -> tuple[Array, Array]:
-    """The k lowest angular frequencies (k,) and shapes (k, N) about the reference configuration.
-
-    Rigid motions are left out.
-    """
+    """The k lowest angular frequencies (k,) and shapes (k, N) at rest, without rigid motions."""
     rigid = len(system.constraints.free_rigid_motions())
     found = modes(system, State(system, np.zeros(system.N), load=0.0), rigid + k)
     return found.frequencies[rigid:], found.shapes[rigid:]
 
 
 def _warn_of_turning(state, values, rigid):
-    """Give a ModelWarning if the state turns not much slower than it vibrates."""
+    """Give a ModelWarning if the state rotates at a speed comparable with a frequency."""
     speed = _angular_velocity(state) if np.any(state.v) else 0.0
     values = values[values > max(rigid, TURNING * speed**2)]  # of vibrations
     if values.size and speed**2 > TURNING * values.min():
-        warn(f"the state turns by {speed:.3g} rad/s, and modes know its stiffness alone: "
-                      "centrifugal and Coriolis forces are missing, which change the square of a "
-                      "frequency by about the square of that; take the state at rest in a frame "
-                      "that turns, with the centrifugal force (docs/modes.md, Rotating beams)",
-                      ModelWarning)
+        warn(f"the state rotates at {speed:.3g} rad/s, and modes neglect centrifugal and Coriolis "
+             "forces, which change the square of a frequency by about the square of that speed. "
+             "Use the state at rest in a rotating frame with the centrifugal force "
+             "(docs/modes.md, Rotating beams)", ModelWarning)
 
 
 def _angular_velocity(state):
-    """The largest one of a beam or body, in the mean of its mass."""
+    """The largest mass-weighted angular velocity of a beam or body."""
     system, speeds = state.system, []
     for member, s in zip(system.members, system.slices):
         B, v = np.zeros((system.N, 3)), np.zeros(system.N)
@@ -103,13 +99,13 @@ def _angular_velocity(state):
 
 
 def _free_mass(system, tangent):
-    """The mass matrix between the free coordinates, sparse."""
-    M = system.mass.tocsc().T  # it is symmetric: in rows, as it is
+    """The mass matrix of the free DOFs, sparse."""
+    M = system.mass.tocsc().T  # symmetric: CSC to CSR without conversion
     return M[tangent.free][:, tangent.free] if len(tangent.free) < system.N else M
 
 
 def _shift(tangent, state):
-    """A number s for which K + s M is positive definite between the free coordinates."""
+    """A shift s for which K + s M is positive definite between free DOFs."""
     shift = tangent.system.scales.bending_eigenvalue
     for _ in range(80):
         try:
@@ -118,17 +114,17 @@ def _shift(tangent, state):
         except NO_FACTORS:
             pass
         shift *= 4.0
-    raise SupportError("the joints are not independent in this state")
+    raise SupportError("the joints are dependent in this state")
 
 
 def _negative(tangent, state, shift):
-    """How many eigenvalues of K + shift M between the free coordinates are negative."""
+    """Number of negative eigenvalues of K + shift M between free DOFs."""
     system = tangent.system
     if system.solver.condensed is not None:
         return tangent.condense(system.solver.condensed, shift).inertia().negative
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
-    if shift < 0.0 and not system.solver.coupled:  # as a rule indefinite: without factors
+    if shift < 0.0 and not system.solver.coupled:  # mostly indefinite: no factors needed
         fix(system.K.band, system.constraints.fixed)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
     system.solver.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
@@ -136,12 +132,12 @@ def _negative(tangent, state, shift):
 
 
 def _dense(tangent, M, k, shift):
-    """The k lowest by all eigenvalues of the inverse, so many at once as it has digits for."""
+    """The k lowest modes by dense eigenvalues of the inverse, in windows of its precision."""
     inverse, L = Inverse(tangent, M, shift), scipy.linalg.cholesky(M.toarray(), lower=True)
     X, values = np.zeros((len(L), 0)), np.zeros(0)
     while len(values) < k:
         MX = M @ X
-        Y = inverse.solve(L - MX @ (X.T @ L))  # of what is left, M-orthogonal to those known
+        Y = inverse.solve(L - MX @ (X.T @ L))  # M-orthogonal to the known modes
         Y -= X @ (MX.T @ Y)
         T = L.T @ Y
         theta, V = scipy.linalg.eigh(0.5 * (T + T.T))
@@ -149,11 +145,11 @@ def _dense(tangent, M, k, shift):
         theta, V = theta[seen], V[:, seen]
         lowest = np.argsort(1.0 / theta)[:k - len(values)]
         found, quotients = _quotients(tangent, M, (Y @ V / theta)[:, lowest])
-        # a rounded window shows those known once more
+        # round-off may reproduce known modes
         new = np.max(np.abs(MX.T @ found), axis=0, initial=0.0) < ORTHOGONAL
         if not np.any(new):
-            raise InputError(f"{len(values)} modes of so slender a beam can be told from "
-                             f"round-off, k = {k} were asked for")
+            raise InputError(f"only {len(values)} modes of so slender a beam exceed round-off, "
+                             f"k = {k} were requested")
         X = np.column_stack([X, found[:, new]])
         values = np.append(values, quotients[new])
     order = np.argsort(values)
@@ -161,10 +157,9 @@ def _dense(tangent, M, k, shift):
 
 
 def _sparse(tangent, state, M, k, shift):
-    """The k lowest by Lanczos on the inverse, which need not be refined where it is good.
+    """The k lowest modes by Lanczos on the inverse, and one step of subspace iteration.
 
-    An error of a shape is squared in its quotient, after a step of subspace iteration. Of equal
-    frequencies Lanczos may miss some: they are counted, and looked for beside those that are known.
+    Lanczos may miss some of equal frequencies: they are counted, and the missing ones computed.
     """
     inverse, rng = Inverse(tangent, M, shift), np.random.default_rng(0)
     start = inverse.solve(rng.standard_normal(M.shape[0]))
@@ -180,7 +175,7 @@ def _sparse(tangent, state, M, k, shift):
         before, (values, X) = values, _polished(tangent, M, inverse, more)
         values, X = values[:k], X[:, :k]
         if not np.any(values < before - SAME * np.maximum(np.abs(before), shift)):
-            break  # what was counted was round-off
+            break  # the count was round-off
     return values, X
 
 
@@ -190,14 +185,14 @@ def _lanczos(M, k, shift, apply, start):
         return eigsh(M, k=k, M=M, sigma=-shift, v0=start, tol=LANCZOS,
                      OPinv=LinearOperator(M.shape, apply, dtype=float))[1]
     except ArpackNoConvergence as failure:
-        raise ConvergenceError(f"of {k} modes Lanczos found {len(failure.eigenvalues)}; ask for "
+        raise ConvergenceError(f"Lanczos found {len(failure.eigenvalues)} of {k} modes; try "
                                "another number") from None
 
 
 def _missing(tangent, state, shift, values):
-    """How many eigenvalues below the largest of those found are not among them.
+    """Number of missing eigenvalues below the largest one found, by Sylvester's law of inertia.
 
-    By Sylvester's law of inertia; 1 where there are no factors to tell.
+    It is 1 if there are no factors.
     """
     below = values[-1] - SAME * max(abs(values[-1]), shift)
     try:
@@ -214,7 +209,7 @@ def _quotients(tangent, M, X):
 
 
 def _polished(tangent, M, inverse, X):
-    """Eigenvalues and columns X after a step of subspace iteration, the lowest first."""
+    """Sorted eigenvalues and columns X after a step of subspace iteration."""
     MX = M @ X
     Y = inverse.solve(MX)
     theta, V = scipy.linalg.eigh(MX.T @ Y, X.T @ MX)
@@ -224,7 +219,7 @@ def _polished(tangent, M, inverse, X):
 
 
 def _unsymmetric(tangent, M, k, shift, small):
-    """The k lowest where K is not symmetric: complex values, shapes (n, k)."""
+    """The k lowest modes of an unsymmetric K: complex values, shapes (n, k)."""
     inverse, n = Inverse(tangent, M, shift), M.shape[0]
     if small:
         theta, X = scipy.linalg.eig(inverse.solve(M.toarray()))
@@ -234,8 +229,8 @@ def _unsymmetric(tangent, M, k, shift, small):
                         k=min(k + 2, n - 2), v0=inverse.solve(start))
     seen = np.abs(theta) > WINDOW * np.abs(theta).max()
     if np.sum(seen) < k:
-        raise InputError(f"under loads that follow the body {int(np.sum(seen))} modes can be "
-                         f"told from round-off, k = {k} were asked for")
+        raise InputError(f"only {int(np.sum(seen))} modes under follower loads exceed round-off, "
+                         f"k = {k} were requested")
     values, X = 1.0 / theta[seen] - shift, X[:, seen]
     real = np.abs(values.imag) <= REAL * np.abs(values)
     values[real] = values[real].real
@@ -249,13 +244,13 @@ def _unsymmetric(tangent, M, k, shift, small):
 def buckling(system: System, k: int) -> Buckling:
     """The k lowest positive load factors of linear buckling.
 
-    ``(K_0 + factor K_s) phi = 0``, K_s the geometric part for the stress that the full load, moved
-    supports included, causes in the stress-free geometry, less the stiffness of the loads. Factors
-    at which the mean strain before buckling is not below one are left out. With loads that have no
-    potential K_s is not symmetric, and only real factors, of divergence, are found.
+    ``(K_0 + factor K_s) phi = 0``, with the geometric stiffness K_s of the linear stress under full
+    load, including support displacements and load stiffness. Factors with a prebuckling strain of
+    order one are omitted. If loads have no potential, K_s is unsymmetric, and only real factors
+    (divergence) are found.
 
-    Raises InputError if the loads do not buckle the beam, it touches an obstacle before, springs
-    are tight before any load, or push or pull on one side only of where it buckles.
+    Raises InputError if the loads cause no buckling, if the beam touches an obstacle first, or if
+    springs are prestressed or one-sided.
     """
     system.constraints.require_supports()
     zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
@@ -269,11 +264,11 @@ def buckling(system: System, k: int) -> Buckling:
         raise InputError("no positive load factor: the loads do not stress the beam")
     symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
     theta, X = _buckled(tangent, Ks, k, symmetric)
-    # mean strain before buckling over that of the strain energy of a strain of one
+    # mean prebuckling strain at the load factor 1
     strain = np.sqrt(max(float(du @ tangent.internal(stress)), 0.0)) * np.finfo(float).eps
     good = theta < -strain / system.scales.strain_noise
     if not np.any(good):
-        raise InputError("no positive load factor: these loads pull the beam straight"
+        raise InputError("no positive load factor: these loads stiffen the beam"
                          if symmetric else _FLUTTER)
     factors = -1.0 / theta[good]
     order = np.argsort(factors)[:k]
@@ -288,7 +283,7 @@ def buckling(system: System, k: int) -> Buckling:
 
 
 def _geometric_of_domains(system, tangent, du):
-    """How tangents of domains change along a displacement (N,), between free coordinates."""
+    """Derivative of domain tangents along a displacement (N,), between free DOFs."""
     K = sparse.csr_matrix((system.N, system.N))
     for domain in system.domains:
         s = system.of(domain)
@@ -300,24 +295,20 @@ def _geometric_of_domains(system, tangent, du):
 
 
 def _require_unstressed(system, zero):
-    """Raise InputError where force elements push before there is any load."""
+    """Raise InputError if force elements are prestressed."""
     if not len(system.forces.elements):
         return
     push = np.abs(system.internal_force(zero, 0.0, 0.0) * system.constraints.mask).max()
-    held = abs(system.stiffness_at_rest())
-    if push > UNSTRESSED * (held.max() if held.nnz else 0.0) * system.size:
+    springs = abs(system.stiffness_at_rest())
+    if push > UNSTRESSED * (springs.max() if springs.nnz else 0.0) * system.size:
         raise InputError(
-            "springs push before there is any load: buckling() starts from the reference "
-            "configuration and scales all that stresses it. state.stability of "
-            "scene.solve_static(stable=False), and scene.modes(k, state), tell under "
-            "which loads the tightened scene holds")
+            "springs push before there is any load: buckling() starts from the unstressed "
+            "reference configuration and scales all loads. Use state.stability of "
+            "scene.solve_static(stable=False), or scene.modes(k, state), for prestressed scenes")
 
 
 def _require_same_springs(system, u):
-    """Raise InputError where springs give way to one side only of the buckling state u.
-
-    A small motion there and back tells. Warns where they are not as stiff as without load.
-    """
+    """Raise InputError for one-sided springs at the buckling state u; warn of changed stiffness."""
     if not len(system.forces.elements):
         return
     kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.constraints.mask
@@ -326,19 +317,18 @@ def _require_same_springs(system, u):
                             for x in (np.zeros(system.N), u, u + kick, u - kick))
     if np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)):
         raise InputError(
-            "where it buckles, springs or foundations are stiffer to one side than to the other, "
-            "as ropes and one-sided foundations: buckling() knows one stiffness for both. Take "
-            "scene.continuation() with a small force to either side, or leave out what comes loose")
+            "at the buckling load springs or foundations are stiffer to one side than to the "
+            "other, such as ropes and one-sided foundations: buckling() needs one stiffness. Use "
+            "scene.continuation() with a small force to either side, or remove loose elements")
     if np.any(np.abs(here - rest) > STIFFER * np.maximum(here, rest)):
-        warn("springs become stiffer or softer before it buckles, and buckling() knows "
-                      "their stiffness without load alone: state.stability of scene.solve_static() "
-                      "tells under which loads it holds", ModelWarning)
+        warn("springs become stiffer or softer before buckling, but buckling() uses their "
+             "stiffness without load: check state.stability of scene.solve_static()", ModelWarning)
 
 
 _FLUTTER = (
-    "no real positive load factor at which a neighbouring equilibrium appears: these loads follow "
-    "the body and have no potential. It may flutter: look at scene.modes(k, state) about "
-    "states under load, beyond the critical load modes.flutter is True")
+    "no real positive load factor: these follower loads have no potential, and no neighbouring "
+    "equilibrium exists. Check for flutter with scene.modes(k, state) about states under load: "
+    "modes.flutter is True beyond the critical load")
 
 
 def _buckled(tangent, Ks, k, symmetric):
@@ -355,7 +345,7 @@ def _buckled(tangent, Ks, k, symmetric):
         try:
             _, X = eigsh(Ks, k=k, M=operator(tangent.multiply), Minv=operator(inverse.solve),
                          which="SA", v0=start, maxiter=200)
-        except ArpackNoConvergence as failure:  # there are not as many negative ones
+        except ArpackNoConvergence as failure:  # fewer negative ones exist
             X = failure.eigenvectors
             if not X.shape[1]:
                 return np.zeros(0), X
@@ -369,7 +359,7 @@ def _buckled(tangent, Ks, k, symmetric):
 
 
 def _require_no_flutter(system, tangent, Ks, factor):
-    """Raise InputError if oscillations grow below a load factor, as far as linear theory says."""
+    """Raise InputError if linear theory predicts flutter below a load factor."""
     if any(layer.density is None for beam in system.beams for layer in beam.across.layers):
         return
     if any(domain.mass is None for domain in system.domains):
@@ -382,26 +372,24 @@ def _require_no_flutter(system, tangent, Ks, factor):
             tangent.S = S + part * Ks
             try:
                 values, _ = _unsymmetric(tangent, M, k, shift, small)
-            except ConvergenceError:  # critical to round-off just there
+            except ConvergenceError:  # a critical point to round-off
                 continue
             if np.any(values.imag):
                 raise InputError(
-                    f"it flutters before it buckles at the factor {factor:.6g}, for example at "
-                    f"{part:.3g} times these loads, which follow the body: look at "
-                    "scene.modes(k, state) about states under load, beyond the critical load "
-                    "modes.flutter is True")
+                    f"flutter occurs before buckling at the factor {factor:.6g}, for example at "
+                    f"{part:.3g} times these follower loads: use scene.modes(k, state) about "
+                    "states under load; modes.flutter is True beyond the critical load")
     finally:
         tangent.S = S
 
 
 def _real(X):
-    """Columns X turned in the complex plane so that their largest entry is real."""
+    """Rotate complex columns so that the largest entry is real."""
     X = X * np.exp(-1j * np.angle(X[np.argmax(np.abs(X), axis=0), np.arange(X.shape[1])]))
     return X.real
 
 
 def _count(k, n):
     if n == 0:
-        raise InputError("there are no modes, as supports and joints hold all coordinates: leave "
-                         "some of them free")
+        raise InputError("there are no modes: supports and joints fix all degrees of freedom")
     return require_integer("the number of modes", k, 1, n)

@@ -1,4 +1,4 @@
-"""One load increment: from an equilibrium to that of the next load level."""
+"""One load increment."""
 
 from __future__ import annotations
 
@@ -21,19 +21,18 @@ from .touching import SOON, found_touching
 
 logger = logging.getLogger(__name__)
 
-#: Corrections of the pressure of obstacles in a load step, at most.
+#: Largest number of pressure corrections (augmented Lagrangian) in a load step.
 AUGMENTED = 50
-#: Relative error of an equilibrium that is only a start.
+#: Tolerance of an equilibrium that is only a start.
 NEAR = 1e-2
 
 
 class Route(NamedTuple):
-    """How loads and supports come to their full values as the level goes from 0 to 1.
+    """How loads and supports change with the level from 0 to 1.
 
-    ``u`` is the displacement at level 0, (N,); ``gap`` what is missing there to equilibrium under
-    the full load, (N,), which is reduced to nothing, None where the loads themselves are applied;
-    ``loads`` and ``times`` the load factor, and the time of supports and obstacles, at levels 0 and
-    1.
+    ``u`` (N,) is the displacement at level 0. With ``gap`` (N,), the residual there under full load
+    is reduced to zero; otherwise ``loads`` and ``times`` are the load factor, and the time of
+    supports and obstacles, at both levels.
     """
 
     u: Array
@@ -50,15 +49,15 @@ class Route(NamedTuple):
 
     @property
     def proportional(self) -> bool:
-        """True if loads and supports grow together from the reference configuration."""
+        """True if loads and supports are proportional from the reference configuration."""
         return self.gap is None and self.loads == self.times == (0.0, 1.0)
 
 
 class Options(NamedTuple):
-    """Of the iteration of a load step: the method "mixed" or "newton", iterations at most.
+    """Options of an iteration: method "mixed" or "newton", tolerance, largest number of iterations.
 
-    ``watched``: it is given up where the mixed iteration does not seem to converge. ``close``: the
-    start is close to the equilibrium.
+    If ``watched``, the iteration stops where the mixed method does not seem to converge. ``close``:
+    the start is close to the equilibrium.
     """
 
     route: Route
@@ -70,10 +69,7 @@ class Options(NamedTuple):
 
 
 class Increment:
-    """The way from the last equilibrium, a :class:`StaticResult`, to a load level from 0 to 1.
-
-    ``record``, a LoadStep, takes the iterations of all that is tried.
-    """
+    """The step from the last equilibrium to a load level; ``record`` counts all iterations."""
 
     def __init__(self, system: System, start: StaticResult, level: float,
                  options: Options) -> None:
@@ -82,7 +78,7 @@ class Increment:
         self.record = LoadStep(level)
 
     def solve(self, stable: bool) -> Equilibrium:
-        """The equilibrium, a stable one if that is wanted; raises StepFailed."""
+        """The equilibrium, a stable one if requested; raises StepFailed."""
         system, start, route = self.system, self.start, self.options.route
         found = self._augmented()
         passed = system.forces.contacts.passed((start.u, route.acting(start.load)[1]),
@@ -91,7 +87,7 @@ class Increment:
             raise StepFailed(passed)
         if not stable or start.unstable:
             return found
-        if not stability.holds(system, found.u, self.load, found.multipliers, self.time):
+        if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
             raise Unstable("the equilibrium found is unstable", found)
         if (start.rejected and route.proportional and start.load > 0.0
                 and not descent.heads_on(system, start, found.u, self.level)):
@@ -99,14 +95,14 @@ class Increment:
         return found
 
     def reached(self, found: Equilibrium) -> StaticResult:
-        """The result after the increment, with what it leaves behind at obstacles."""
+        """The result after the increment, with updated contact history."""
         contacts, start = self.system.forces.contacts, self.start
         rubbed = start.rubbed + contacts.settle(found.u, self.time)
         return replace(start, steps=[*start.steps, self.record], load=self.level, rubbed=rubbed,
                        memory=contacts.remember(), **found._asdict())
 
     def _augmented(self):
-        """Again until obstacles that ask for it are entered no deeper than that."""
+        """Repeat with corrected pressures until the penetration is within tolerance."""
         contacts = self.system.forces.contacts
         contacts.put_back(self.start.memory)
         found = self._touching()
@@ -120,7 +116,7 @@ class Increment:
                          "corrections of the pressure")
 
     def _touching(self):
-        """Where there are obstacles by :mod:`skfem_ancf.solvers.touching`."""
+        """Iterate, with obstacles by :mod:`skfem_ancf.solvers.touching`."""
         contacts, options = self.system.forces.contacts, self.options
         if not contacts.obstacles:
             return self._from_start(options)
@@ -137,10 +133,11 @@ class Increment:
                               options.close)
 
     def _from_start(self, options):
-        """From the last equilibrium; where a law is left behind, by way of its first moduli.
+        """Iterate from the last equilibrium; if that fails, from the equilibrium of the linearised
+        law.
 
-        A correction that turns the beam far strains it for once, more than a law may bear that
-        others than Hooke's are; the equilibrium that Hooke's finds is close to theirs.
+        A correction that turns a beam far strains it temporarily, possibly beyond the range of a
+        nonlinear law. The equilibrium of Hooke's law is close to the final one.
         """
         backend = None if self.start.diverging else self.system.backend.linearised
         if backend is None:
@@ -163,20 +160,20 @@ class Increment:
                 backend: Any = None, wary: bool = False) -> Equilibrium:
         """Iterate to equilibrium from ``begin``, by default the last one; raises StepFailed.
 
-        ``solver`` solves the linear systems, as a :class:`~skfem_ancf.solvers.descent.Descent`;
-        ``backend`` is that of other laws; ``wary`` ends where the third correction is not smaller
-        than the first.
+        ``solver`` solves the linear systems, such as a
+        :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws; ``wary``
+        stops if the third correction is not smaller than the first.
         """
         system, options = self.system, options or self.options
         u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
         backend = backend or system.backend
-        tables, given, own = backend.tables, solver is not None, system.solver
+        tables, given, default = backend.tables, solver is not None, system.solver
         target = self._target(tables, u)
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not given else 0)
         scratch = backend.workspace(workspace_for_iterations, system.constraints.m)
-        if solver is None and own.coupled:
-            solver = own
+        if solver is None and default.coupled:
+            solver = default
         while True:
             if solver is not None:
                 rules = rules._replace(solver=handle_of(solver))
@@ -186,19 +183,19 @@ class Increment:
             status, n = backend.of(equilibrium)(target, rules, x, scratch, residuals)
             if status != SINGULAR or solver is not None:
                 break
-            solver = own  # factors with exchanges of rows
+            solver = default  # with pivoting
         self.record.iterations += n
         self.record.force_residuals += residuals[:n + 1, 0].tolist()
         self.record.energy_residuals += residuals[:n, 1].tolist()
         self._require_converged(status, n, rules)
         if system.inverted(x.u):
-            raise StepFailed("the body is turned inside out")
+            raise StepFailed("an element is turned inside out")
         if lost := system.constraints.lost(x.u):
             raise StepFailed(lost)
         if n == 0:
-            own.forget()
+            default.forget()
         elif solver is None:
-            own.take_factors()
+            default.take_factors()
         return Equilibrium(x.u, x.multipliers, x.force)
 
     def _target(self, tables, u):
@@ -226,15 +223,15 @@ class Increment:
             return
         if status == NOT_CONVERGED and n < rules.iterations:
             if rules.wary == WATCHED and n == 2:
-                raise Soft("the first correction stretches it far beyond its place")
-            raise Diverging("the first corrections do not get smaller" if rules.wary == FIRST else
-                            f"the corrections do not get smaller in {n} iterations")
+                raise Soft("the first correction is far too large")
+            raise Diverging("the first corrections do not decrease" if rules.wary == FIRST else
+                            f"the corrections do not decrease in {n} iterations")
         raise StepFailed({
             SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
             NOT_CONVERGED: f"no convergence in {rules.iterations} iterations"}[status])
 
     def rescue(self, failure: StepFailed) -> Equilibrium | None:
-        """A stable equilibrium where the path has lost its stability; None where it has not."""
+        """A stable equilibrium if the path has lost its stability, else None."""
         system, start, route = self.system, self.start, self.options.route
         unstable = isinstance(failure, Unstable)
         if unstable and route.gap is None and not start.steps and (
@@ -246,25 +243,23 @@ class Increment:
             if not isinstance(failure, Unstable):
                 return None
             start.unstable = True
-            start.doubt = (f"the path is unstable from the load level {self.level:.6g} on, and its "
-                           "loads have no potential that would lead to a stable equilibrium")
+            start.doubt = (f"the path is unstable from the load level {self.level:.6g} on, and the "
+                           "loads have no potential by which to find a stable equilibrium")
             return failure.found
         with np.errstate(all="ignore"):
             found, turned = descent.way_down(self)
         if turned and not start.doubt:
             start.doubt = (
                 f"the path loses its stability between the load levels {start.load:.6g} and "
-                f"{self.level:.6g}, the solution went on along the direction that gives way to a "
-                "stable equilibrium, which need not be the only one")
+                f"{self.level:.6g}; the solution followed the unstable direction to a stable "
+                "equilibrium, which need not be the only one")
         return found
 
 
 def rules_of(system: System, method: str, tol: float, max_iterations: int,
              wary: int = 0) -> Rules:
-    """When an iteration of a system has converged; ``wary`` as in
-    :class:`~skfem_ancf.solvers.iteration.Rules`.
-    """
+    """Convergence criteria; ``wary`` as in :class:`~skfem_ancf.solvers.iteration.Rules`."""
     scales = system.scales
-    # the residual sums the noise of all degrees of freedom, the work that of the strains
+    # the residual has the round-off of all DOFs, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, 8.0 * scales.work_noise,
                  8.0 * scales.force_noise, 0, wary)

@@ -1,4 +1,4 @@
-"""The iteration to equilibrium: Newton's method, mixed or not."""
+"""The equilibrium iteration: Newton's method and the mixed iteration."""
 
 from __future__ import annotations
 
@@ -10,82 +10,68 @@ from ..actions.forces.kernels import (add_elastic_force, add_element_tangent, co
                                       contact_work)
 from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                               external_force)
-from ..beam.strain_energy import body_carry, body_force, body_tangent
+from ..beam.strain_energy import body_force, body_linearised, body_tangent
 from ..core.band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
                          weighted)
-from ..core.callbacks import own_solve
+from ..core.callbacks import call_solver
 from ..core.source import F1, indices, source
 from ..equations.tables import Equations
 
-#: Stiffness that a coordinate is taken to have in norms at least, over the mean of all, each times
-#: the square of its size: that of a rigid body has none of its own.
+#: Smallest stiffness of a DOF in norms, relative to the mean; DOFs of a rigid body have none.
 SMALLEST = 1e-14
 #: How an iteration ends.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
-#: Corrections at least, where the residual at the start is not round-off.
+#: Least number of corrections, unless the initial residual is round-off.
 LEAST = 2
-#: The largest residual of joints, over the sizes of their equations.
+#: The largest relative residual of joints.
 CLOSED = 1e-12
-#: Work of the third correction, as a root over that of all forces, of an iteration that diverges.
+#: Root of the relative work of the third correction that indicates divergence.
 DIVERGING = 0.9
-#: The same of the second, of a scene so soft that the first was far too large; and of one after
-#: the eighth, of an iteration that is not seen to converge.
+#: The same of the second correction, for a very soft scene; first late correction, and its limit.
 SOFT, LATE, LARGE = 10.0, 8, 3.0
-#: What ends an iteration early: the third correction, or the second and those after the eighth.
+#: Early end of an iteration: by the third correction, or by the second and late ones.
 FIRST, WATCHED = 1, 2
 
 
 class Target(NamedTuple):
-    """The equilibrium asked for.
+    """The equilibrium to find."""
 
-    ``factors``, ``before`` and ``scale`` are those of the tables of loads, the same for the first
-    tangent, and of user-defined loads; ``when`` the time of loads, NaN for full size; ``at, c, g``
-    the time of the joints and their tables; ``gap`` the force that may be missing, (N,);
-    ``prescribed`` by how much fixed DOFs have to change.
-    """
-
-    factors: F1
-    before: F1
-    scale: float
-    when: float
-    at: float
-    c: F1
+    factors: F1  # of the loads
+    before: F1  # the same for the first tangent
+    scale: float  # load factor of user-defined loads
+    when: float  # time of loads; NaN for full size
+    at: float  # time of joints
+    c: F1  # tables of the joints at that time
     g: F1
-    gap: F1
-    prescribed: F1
+    gap: F1  # residual that may remain, (N,)
+    prescribed: F1  # required changes of the fixed DOFs
 
 
 class Rules(NamedTuple):
-    """When it has converged, in so many ``iterations`` at most.
+    """Convergence criteria and options."""
 
-    ``mixed`` is 1 if the geometric part takes independent stresses; ``tol`` the tolerance of a
-    correction, ``floor`` and ``force_floor`` the round-off of its work and of the residual;
-    ``solver`` the handle of what solves the linear systems, 0 for the band alone; ``wary`` when it
-    ends because corrections do not get smaller: 0 never, :data:`FIRST` or :data:`WATCHED`.
-    """
-
-    mixed: int
-    iterations: int
-    tol: float
-    floor: float
-    force_floor: float
-    solver: int
-    wary: int
+    mixed: int  # 1 if the geometric part uses independent stresses
+    iterations: int  # largest number
+    tol: float  # of a correction
+    floor: float  # round-off of its work
+    force_floor: float  # round-off of the residual
+    solver: int  # handle of a linear solver; 0 for the band
+    wary: int  # early end: 0, FIRST or WATCHED
 
 
 class Unknowns(NamedTuple):
-    """What is found: displacement, multipliers, internal force, stresses and independent ones."""
+    """Displacement, multipliers, internal force, stresses and independent stresses."""
 
     u: F1
     multipliers: F1
     force: F1
     stresses: F1
-    carried: F1
+    independent: F1
 
 
 class Work(NamedTuple):
-    """Work arrays: residual, correction, displacement before it, 1 / diagonal, loads, joints'
-    opening and correction.
+    """Work arrays: residual, correction, displacement before it, 1 / diagonal, loads, joint force,
+    constraint residual and multiplier correction.
     """
 
     R: F1
@@ -107,16 +93,16 @@ def workspace_for_iterations(e: Equations, m: int) -> Work:
 
 @source
 def equilibrium(e, target, rules, x, w, record):
-    """Iterate to equilibrium from x, in place; returns how it ends, and the linear systems solved.
+    """Iterate to equilibrium from x, in place; returns how it ended, and the linear systems solved.
 
-    ``record`` takes the residuals of each iteration, shape (iterations + 1, 2).
+    ``record`` (iterations + 1, 2) takes the residuals of each iteration.
     """
     N, m = x.u.size, x.multipliers.size
     clear(w.dm)
     work = before = reference = np.inf
     quiet, moving = False, dot(target.prescribed, target.prescribed) > 0.0
     for k in range(rules.iterations + 1):
-        # after the last correction only the residual is wanted, not the tangent
+        # the last residual needs no tangent
         part = min(1.0, work / before) if k > 1 else 1.0
         last = (k >= LEAST or (k > 0 and quiet)) and settled(work * part, reference, rules)
         if last:
@@ -132,7 +118,7 @@ def equilibrium(e, target, rules, x, w, record):
         record[k, 0] = rho / size if size > 0.0 else 0.0
         if k == 0:
             small = rho <= 1e-3 * rules.tol * size
-            # no more than round-off: of a slender beam that may be a load, the correction tells
+            # round-off, unless the correction shows that it is the load of a slender beam
             quiet = rho <= rules.force_floor
         else:
             small = last and rho <= rules.tol * size + rules.force_floor
@@ -162,7 +148,7 @@ def equilibrium(e, target, rules, x, w, record):
 
 @source
 def _diverging(wary, k, work):
-    """True if correction k says that an iteration will not converge."""
+    """True if correction k indicates that the iteration will not converge."""
     if wary == FIRST:
         return k == 2 and work > DIVERGING
     return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
@@ -170,30 +156,30 @@ def _diverging(wary, k, work):
 
 @source
 def reference_work(force, load, u):
-    """The root of the work that corrections are compared with: that of the forces on the way."""
+    """Root of the work of the forces, to which corrections are compared."""
     return np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
 
 
 @source
 def settled(work, reference, rules):
-    """True if a correction's work, as a root, is as small as is asked, or round-off."""
+    """True if the root of a correction's work is within tolerance or round-off."""
     return work <= rules.tol * reference + rules.floor
 
 
 @source
 def mean_stiffness(diagonal, sizes):
-    """The mean of stiffnesses, each times the square of its coordinate's size; 1 of none."""
+    """Mean of the scaled stiffnesses; 1 if it is zero."""
     mean = weighted(sizes, sizes, diagonal) / sizes.size
     return mean if mean > 0.0 else 1.0
 
 
 @source
 def _tangent(e, target, rules, x, w, k):
-    """The internal force, the tangent, and 1 / its diagonal."""
+    """Internal force, tangent, and 1 / diagonal."""
     mixed = rules.mixed > 0 and k > 0
     if mixed:
-        body_carry(e.body, w.before, w.du, x.stresses, x.carried)
-    body_tangent(e.body, x.u, x.force, x.carried, mixed, x.stresses, e.K)
+        body_linearised(e.body, w.before, w.du, x.stresses, x.independent)
+    body_tangent(e.body, x.u, x.force, x.independent, mixed, x.stresses, e.K)
     add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
     factors, t = (target.factors, target.when) if k > 0 else (
         target.before, np.inf if np.isnan(target.when) else target.when)
@@ -209,7 +195,7 @@ def _tangent(e, target, rules, x, w, k):
 
 @source
 def _residual(e, target, x, w):
-    """The residual at free coordinates; returns how far joints are open, over their sizes."""
+    """The residual at free DOFs; returns the largest relative residual of joints."""
     external_force(e.loads, target.factors, target.when, target.scale, x.u, w.load)
     clear(w.push)
     opening = 0.0
@@ -226,7 +212,7 @@ def _residual(e, target, x, w):
 
 @source
 def _correction(e, target, rules, x, w, moving):
-    """The correction into w; returns the root of its work, negative if there is none."""
+    """The correction; returns the root of its work, negative on failure."""
     N, m = x.u.size, w.phi.size
     clear(w.push)
     if moving:  # R = R - K du of the fixed coordinates
@@ -248,17 +234,18 @@ def _correction(e, target, rules, x, w, moving):
     return work
 
 
-#: Part of the work that a correction leaves along its direction, up to which it is taken; of the
-#: work tried, and how often; parts of a correction that are looked at for obstacles on the way.
+#: Line search with contact: accepted relative residual along the correction; largest number of
+#: trials; largest number of intervals.
 LEFT, TRIES, PARTS = 0.5, 12, 16
 
 
 @source
 def _hold_back(e, t, x, w):
-    """Shorten a correction that runs into obstacles.
+    """Line search for a correction that runs into obstacles.
 
-    Of the equations linearised without contact, and contact as it is, what is left along the
-    correction has to be small, see Crisfield (1991), 9.2: without that points come and go.
+    The residual along the correction, of the equations linearised without contact plus the actual
+    contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close in
+    turn.
     """
     N, work, two = x.u.size, dot(w.R, w.du), np.empty(2)
     there, scratch = np.empty(N), np.zeros(N)
@@ -295,7 +282,7 @@ def _hold_back(e, t, x, w):
 
 @source
 def _left(e, t, x, w, s, work, along, before, there, scratch):
-    """What is left along the correction at a part s of it."""
+    """Residual along the correction at a fraction s of it."""
     for i in indices(there.size):
         there[i] = x.u[i] + s * w.du[i]
     now = contact_work(e.forces, t, there, w.du, scratch)
@@ -306,7 +293,7 @@ def _left(e, t, x, w, s, work, along, before, there, scratch):
 def _solved(e, target, rules, x, w):
     """Solve for the correction; False if the matrix is singular."""
     if rules.solver > 0:
-        return own_solve(rules.solver, target.at, x.u, x.multipliers, w.R, w.phi, w.du, w.dm)
+        return call_solver(rules.solver, target.at, x.u, x.multipliers, w.R, w.phi, w.du, w.dm)
     copy(w.R, w.du)
     if not factorize(e.K):
         return False

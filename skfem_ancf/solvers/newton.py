@@ -1,4 +1,4 @@
-"""Statics: the strategies in order, and the load steps that they are made of."""
+"""Static equilibrium: a list of strategies, and load steps."""
 
 from __future__ import annotations
 
@@ -19,27 +19,26 @@ from ..equations.system import System
 from . import descent
 from .increment import Increment, Options, Route
 from .outcome import Attempt, Equilibrium, Soft, StaticResult, StepFailed, Unstable
-from .strategies import HELD_BY_LOADS, STRATEGIES, Strategy
+from .strategies import STABILISED_BY_LOADS, STRATEGIES, Strategy
 
 logger = logging.getLogger(__name__)
 
-#: Iterations in a load step that are expected, about, and at most.
+#: Expected and largest number of iterations in a load step.
 ITERATIONS = 10
 MAX_ITERATIONS = 10000
-#: Iterations of load steps before the next strategy has its turn, and steps that are cut at the
-#: begin before.
+#: Number of iterations of load steps, and of cuts of the first step, before the next strategy.
 FEW, CUT = 60, 3
-#: Equilibria found that nothing holds, after which without friction no further one is looked for.
-UNHELD = 2
-#: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, the others one iteration.
+#: Number of unstabilised equilibria after which the search without friction ends.
+UNSTABILISED = 2
+#: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, others a single iteration.
 METHODS = ("mixed", "newton", "auto")
 _NAMES = {"mixed": "the mixed iteration", "newton": "Newton's method"}
 
 
 class Steps(NamedTuple):
-    """Rules of load steps, as for :func:`solve_static`.
+    """Options of load steps, see :func:`solve_static`.
 
-    ``few``: they are given up after :data:`FEW` iterations, or where the first :data:`CUT` fail.
+    With ``few``, they stop after :data:`FEW` iterations, or if the first :data:`CUT` steps fail.
     """
 
     method: str
@@ -56,47 +55,46 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
                  memory: Array | None = None) -> StaticResult:
     """Find the equilibrium at full load.
 
-    The default tries a list of strategies (:data:`~skfem_ancf.solvers.strategies.STRATEGIES`) in
-    order, the mixed iteration in one step first, until one ends in a stable equilibrium; the
-    result's message says which. ``method="mixed"`` and ``method="newton"`` stay with one iteration
-    and load steps: the first is ``first_step`` of the load, a step that fails is cut to a
-    quarter, a step that goes well doubles the next. The iteration has converged when the
-    correction's work ``R . du`` is below ``tol^2`` times the work done, and the residual, in the
-    norm ``sqrt(sum R_i^2 / K_ii)`` in which no unit matters, is below ``tol`` times that of the
-    forces; both with the round-off of the strain as a floor.
+    By default the strategies of :data:`~skfem_ancf.solvers.strategies.STRATEGIES` are tried in
+    order, first the mixed iteration in one step, until one finds a stable equilibrium; the message
+    of the result says which. ``method="mixed"`` and ``method="newton"`` use one iteration and load
+    steps: the first is ``first_step`` of the load, a failed step is cut to a quarter, an easy step
+    doubles the next. An iteration has converged when the work ``R . du`` of the correction is below
+    ``tol^2`` times the work done, and the residual in the norm ``sqrt(sum R_i^2 / K_ii)`` is below
+    ``tol`` times that of the forces; the round-off of the strain is a lower bound of both.
 
     Parameters
     ----------
     system
         A :class:`~skfem_ancf.equations.system.System`.
     u
-        Displacement to start from, shape (N,); the reference configuration by default. Load steps
-        lead from it to the equilibrium under the full load, whatever holds it in its place.
+        Initial displacement, shape (N,); the reference configuration by default. Load steps reduce
+        its residual under full load to zero.
     method
-        "auto": the strategies in order. "mixed": the geometric part of the tangent uses an
-        independent stress, which follows its linearisation. "newton": it uses the stress of the
-        strain. The solution is the same.
+        "auto": the strategies in order. "mixed": the geometric stiffness uses an independent
+        stress, which is updated by linearisation. "newton": it uses the stress of the strain. All
+        have the same solution.
     tol
         Relative error of a correction in the energy norm.
     max_iterations
-        Iterations before a step is given up and cut.
+        Iterations before a step is cut.
     first_step, min_step
-        Parts of the load. A ``first_step`` below 1 leaves out the strategies that take the whole
+        Fractions of the load. A ``first_step`` below 1 skips the strategies that apply the whole
         load at once.
     progress
-        Show a progress bar: True, False, or None for "if it takes long".
+        Show a progress bar: True, False, or None for long runs only.
     stable
-        Take no unstable equilibrium: a step that lands on one is cut, and where the path itself
-        loses its stability the solution goes on along the direction that gives way, see
-        :func:`~skfem_ancf.solvers.descent.descend`. False takes any.
+        Reject unstable equilibria: a step that ends at one is cut, and where the path itself
+        becomes unstable, the solution follows the unstable direction, see
+        :func:`~skfem_ancf.solvers.descent.descend`. False accepts any equilibrium.
     memory
-        What load steps had left behind at obstacles, at the displacement ``u``; shape (n,).
+        Contact history at ``u``, shape (n,).
 
     Raises
     ------
     ConvergenceError
-        If no strategy finds an equilibrium; the error says which were tried, and has the converged
-        ``StaticResult`` of the highest load as ``state``.
+        If no strategy finds an equilibrium. The error lists those tried; its ``state`` is the
+        converged ``StaticResult`` of the highest load.
 
     References
     ----------
@@ -113,41 +111,32 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     if u is not None:
         u = require_finite("u", u, (system.N,))
     rules = Steps(method, tol, max_iterations, float(first_step), min_step)
-    steps = 1.0 + max(0.0, np.log2(1.0 / first_step))  # each is twice as long as the one before
+    steps = 1.0 + max(0.0, np.log2(1.0 / first_step))  # each doubles the last
     with system.forces.contacts.lent(), expecting(ITERATIONS * steps):
         return Search(system, u, memory, rules, stable, progress).find()
 
 
 class Search:
-    """What strategies ask: the scene, where to start, and ways to look for an equilibrium.
+    """The search for an equilibrium: initial state, options, and methods for strategies.
 
-    ``u`` and ``memory`` are the displacement to start from, (N,), and what is left behind there at
-    obstacles, (n,), or None; ``steps`` are rules of load steps.
-
-    Attributes
-    ----------
-    held_by_loads : bool
-        A rigid motion is free: only loads hold the scene, or obstacles.
-    soft : bool
-        The first correction of the mixed iteration was so large that the second had to do much
-        more work than the loads: that of a slack rope.
-    attempts : list of Attempt
-        What has been tried.
-    loose : str
-        What nothing holds at an equilibrium that was found, in words.
+    ``u`` (N,) and ``memory`` (n,) are initial displacement and contact history, or None; ``steps``
+    the options of load steps. ``stabilised_by_loads`` is True if the supports leave a rigid motion
+    free, so that only loads or obstacles stabilise the scene; ``loose`` is an unstabilised motion
+    in words. ``soft`` is True if the second correction of the mixed iteration did far more work
+    than the loads, as for a slack rope. ``attempts`` lists the strategies tried.
     """
 
     def __init__(self, system: System, u: Array | None, memory: Array | None, steps: Steps,
                  stable: bool, progress: bool | None) -> None:
         self.system, self.rules, self.stable, self.progress = system, steps, stable, progress
-        self.held_by_loads = bool(system.constraints.missing_supports)
+        self.stabilised_by_loads = bool(system.constraints.missing_supports)
         self.attempts: list[Attempt] = []
         self.soft, self.loose = False, ""
         self.furthest: StaticResult | None = None
         self.other: StaticResult | None = None
         self._folded: StaticResult | None = None
         self._failure: Exception | None = None
-        self._spent, self._unheld, self._unstable = 0, 0, False
+        self._spent, self._unstabilised, self._unstable = 0, 0, False
         contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
         memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
@@ -174,7 +163,7 @@ class Search:
                 self._note(strategy.name, str(failure))
                 self._unstable = self._unstable or isinstance(failure, Unstable)
                 self._failure = failure
-                if self._unheld == UNHELD and not self.rubs:
+                if self._unstabilised == UNSTABILISED and not self.rubs:
                     break
                 continue
             if result:
@@ -184,8 +173,7 @@ class Search:
             return self._done(self._folded)
         if self.other is not None:
             self.other.doubt = self.other.doubt or (
-                "of several stable equilibria this one may not be that to which the loads drive "
-                "the scene")
+                "there may be several stable equilibria, and the loads may lead to another one")
             return self._done(self.other)
         raise self._lost()
 
@@ -193,7 +181,7 @@ class Search:
         method = self.rules.method
         if method != "auto":
             return [Strategy(_NAMES[method], lambda search: search.load_steps(method))]
-        return HELD_BY_LOADS if self.held_by_loads else STRATEGIES
+        return STABILISED_BY_LOADS if self.stabilised_by_loads else STRATEGIES
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
@@ -211,26 +199,26 @@ class Search:
         return result
 
     def _lost(self):
-        """Why there is no solution beyond the last load step, as an error."""
+        """The ConvergenceError of a search that failed."""
         result = self.furthest or self._beginning(self.route)
         failure, load = self._failure, getattr(self._failure, "load", 1.0)
         text = (f"no equilibrium found beyond the load level {result.load:.6g}: {failure} at "
-                f"{load:.6g}, and steps below {self.rules.min_step:g} are not tried. ")
+                f"{load:.6g}; the smallest step is {self.rules.min_step:g}. ")
         if self.rules.method == "auto":
             text += f"Tried: {_listed(self.attempts)}. "
-        if self.held_by_loads:
+        if self.stabilised_by_loads:
             text = f"{self._missing()}. Tried: {_listed(self.attempts)}"
         elif isinstance(failure, Unstable):
-            text += ("No stable one was found either from there: stable=False takes the unstable "
-                     "one, scene.continuation() follows the path")
+            text += ("No stable equilibrium was found from there: stable=False accepts the "
+                     "unstable one, scene.continuation() follows the path")
         else:
-            text += ("Beyond a limit point there is none: use scene.continuation(); else more "
+            text += ("Beyond a limit point there is none: use scene.continuation(). Otherwise more "
                      "elements or a larger max_iterations may help")
         result.message, result.attempts = text, tuple(self.attempts)
         return ConvergenceError(text, result)
 
     def _missing(self):
-        """What would hold a scene that neither supports nor loads do, in words."""
+        """What could stabilise a scene that neither supports nor loads stabilise, in words."""
         text = self.system.constraints.missing_supports
         text += ". No stable equilibrium was found in which the loads hold what is free"
         if self.loose:
@@ -239,16 +227,16 @@ class Search:
             text += ". Obstacles without friction hold nothing along their surface: friction= does"
         return text
 
-    # what strategies ask
+    # for strategies
 
     @property
     def at_once(self) -> bool:
-        """True if the whole load may be tried in one step."""
+        """True if the whole load may be applied in one step."""
         return self.rules.first_step == 1.0
 
     @property
-    def pushed_at_rest(self) -> bool:
-        """True if springs push the scene out of its place before any load."""
+    def prestressed(self) -> bool:
+        """True if springs are prestressed."""
         force = self.system.internal_force(self.route.u, 0.0, 0.0)
         return self.route.proportional and bool(np.any(force * self.system.constraints.mask))
 
@@ -264,17 +252,17 @@ class Search:
 
     @property
     def smaller_step(self) -> float:
-        """The first load step where the whole load has been tried."""
+        """The first load step after the whole load has failed."""
         return 0.25 if self.at_once else self.rules.first_step
 
     @property
     def supports_move(self) -> bool:
-        """True if supports have displacements, so that loads can be applied before these."""
+        """True if supports have displacements, so that loads can be applied first."""
         moves = self.system.constraints.moves or self.system.constraints.drives
         return self.route.proportional and moves
 
     def at_rest(self) -> StaticResult:
-        """The displacement to start from, if it is an equilibrium; raises StepFailed."""
+        """The initial displacement, if it is an equilibrium; raises StepFailed."""
         result = self._beginning(self.route)
         step = Increment(self.system, result, 1.0, self._options(self.route, "mixed")._replace(
             most=0))
@@ -282,17 +270,17 @@ class Search:
 
     def load_steps(self, method: str, route: Route | None = None,
                    start: StaticResult | None = None, **changes: Any) -> StaticResult:
-        """The equilibrium at the end of a route, with ``changes`` of the rules of load steps."""
+        """The equilibrium at the end of a route by load steps, with changed options."""
         rules = self.rules._replace(method=method, **changes)
         return self._load_steps(route or self.route, start, rules)
 
     def one_step(self, method: str, route: Route | None = None) -> StaticResult:
-        """As :meth:`load_steps`, at once or not at all."""
+        """The equilibrium at the end of a route in one step."""
         route = route or self.route
         result = self._beginning(route)
         step = Increment(self.system, result, 1.0, self._options(route, method, watched=True))
         try:
-            with np.errstate(all="ignore"):  # what overflows is seen in the residual
+            with np.errstate(all="ignore"):  # overflow shows in the residual
                 found = step.solve(self._wanted(route))
             if self._elsewhere(route, found):
                 self.other = self.other or step.reached(found)
@@ -306,13 +294,12 @@ class Search:
 
     def descent(self, method: str, eased: bool = False, route: Route | None = None,
                 most: int = descent.DESCENT) -> StaticResult:
-        """The equilibrium that corrections of bounded size lead down to under the full load.
+        """The equilibrium at full load by a descent of ``most`` iterations.
 
-        ``eased``: first without friction; bodies stick from where they have come to rest.
-        ``most``: iterations at most.
+        ``eased``: first without friction; bodies then stick where they came to rest.
         """
         route, system = route or self.route, self.system
-        if (not (system.symmetric or self.held_by_loads or self.rubs)
+        if (not (system.symmetric or self.stabilised_by_loads or self.rubs)
                 and not stability.has_potential(system, route.u, 1.0)):
             raise StepFailed("the loads have no potential")
         result = self._beginning(route)
@@ -340,7 +327,7 @@ class Search:
             self._spent += step.record.iterations
         return step.reached(found)
 
-    # how
+    # implementation
 
     def _options(self, route, method, watched=False):
         watched = (watched and method == "mixed" and self.rules.method == "auto"
@@ -348,24 +335,25 @@ class Search:
         return Options(route, method, self.rules.tol, self.rules.max_iterations, watched)
 
     def _wanted(self, route):
-        """Whether the end of a route has to be stable."""
+        """True if the end of a route has to be stable."""
         return self.stable and route.acting(1.0) == (1.0, self.route.times[1])
 
     def _require_good(self, result):
-        """Raise StepFailed unless what is free is held, and no axis turns back in an element."""
-        if self.held_by_loads and not stability.is_held(self.system, result.u, result.multipliers):
-            self.loose, self._unheld = self._loose(result.u), self._unheld + 1
+        """Raise StepFailed if a rigid motion is not stabilised, or an axis is folded."""
+        if self.stabilised_by_loads and not stability.is_stabilised(
+                self.system, result.u, result.multipliers):
+            self.loose, self._unstabilised = self._loose(result.u), self._unstabilised + 1
             raise StepFailed("the loads do not hold what the supports leave free" + (
                 f": nothing holds {self.loose}" if self.loose else ""))
         if self.rules.method == "auto" and self.system.folded(result.u):
             again = self._folded is not None and np.allclose(
                 result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
             self._folded = self._folded or result
-            if not again:  # where two come to it the mesh is too coarse, which a warning says
-                raise StepFailed("the axis turns back within an element")
+            if not again:  # if two strategies find it, the mesh is too coarse: a warning says so
+                raise StepFailed("the axis folds back within an element")
 
     def _loose(self, u):
-        """What is not held at an equilibrium, in words, by the factors that have told so."""
+        """An unstabilised motion of an equilibrium, in words, from the last factors."""
         try:
             directions = descent.Descent(self.system).directions(1)
         except NO_FACTORS:
@@ -373,14 +361,14 @@ class Search:
         return stability.motion_in_words(self.system, u, directions[0][0]) if directions else ""
 
     def _elsewhere(self, route, found):
-        """True if a strategy but the first comes to where the load does not drive the scene."""
-        if (not (self.attempts and self.stable and route.proportional) or self.held_by_loads
+        """True if a later strategy found an equilibrium on the side away from the load."""
+        if (not (self.attempts and self.stable and route.proportional) or self.stabilised_by_loads
                 or self.touches):
             return False
         return not descent.heads_on(self.system, self._beginning(route), found.u, 1.0)
 
     def _firm(self, found, step, eased):
-        """What is found in contact: on obstacles that are hard enough."""
+        """Solve again with contact that is stiff enough."""
         memory = self._memory
         if eased:
             memory = self.system.forces.contacts.begin(found.u, self.route.times[1])
@@ -402,10 +390,10 @@ class Search:
         stable = self._wanted(route)
         result = result or self._beginning(route)
         size, cuts, spent = rules.first_step, 0, 0
-        if size < self.rules.first_step:  # a strategy has tried what the step was cut from
+        if size < self.rules.first_step:  # a strategy has tried the larger step
             result.rejected, cuts = 1, int(self._unstable)
         options = self._options(route, rules.method, watched=rules.few)
-        patience = 3 if self.touches else 1  # contact takes its time
+        patience = 3 if self.touches else 1
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
             while result.load < 1.0:
                 load = min(1.0, result.load + size)
@@ -413,7 +401,7 @@ class Search:
                     load = 1.0
                 step = Increment(self.system, result, load, options)
                 try:
-                    with np.errstate(all="ignore"):  # what overflows is seen in the residual
+                    with np.errstate(all="ignore"):  # overflow shows in the residual
                         found = step.solve(stable)
                 except StepFailed as failure:
                     result.rejected += 1
@@ -434,11 +422,11 @@ class Search:
                     continue
                 size = load - result.load
                 bar.update(size)
-                # one assignment: who interrupts finds the old result or the new one
+                # one assignment, so that an interrupt finds the old or the new result
                 result = step.reached(found)
                 if route is self.route and (self.furthest is None
                                             or result.load > self.furthest.load):
-                    self.furthest = result  # what an error has
+                    self.furthest = result  # for errors
                 cuts = 0
                 logger.info("load %.6g converged in %d iterations", load, step.record.iterations)
                 if step.record.iterations <= patience * max(8, rules.max_iterations // 3):

@@ -1,4 +1,4 @@
-"""What statics finds: load steps, attempts, results, and why a step fails."""
+"""Results of statics: load steps, attempts, and failures."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class LoadStep:
     Attributes
     ----------
     load
-        Load factor at its end, 1 is full load.
+        Load factor at its end; 1 is full load.
     iterations
-        Linear systems solved, with those of other starts that were tried.
+        Number of linear systems solved, including failed attempts.
     force_residuals, energy_residuals
-        For each iteration the residual in the norm ``sum R_i^2 / K_ii`` and the work of the
-        correction ``R . du``, as square roots relative to those of the forces and of the work.
+        For each iteration the residual in the norm ``sum R_i^2 / K_ii`` and the work ``R . du`` of
+        the correction, as square roots relative to those of the forces and of the work.
     """
 
     load: float
@@ -30,10 +30,7 @@ class LoadStep:
 
 
 class Attempt(NamedTuple):
-    """A strategy that was tried, its iterations, and why it was given up.
-
-    Linear systems of load steps that were given up count; ``failure`` is empty if it succeeded.
-    """
+    """A strategy that was tried, its iterations, and why it failed ("" if it did not)."""
 
     strategy: str
     iterations: int
@@ -46,7 +43,7 @@ class Attempt(NamedTuple):
 
 @dataclass
 class StaticResult:
-    """What the iteration found.
+    """Result of a static solution.
 
     Attributes
     ----------
@@ -57,20 +54,19 @@ class StaticResult:
     steps
         A :class:`LoadStep` for each load step.
     converged, message
-        Whether full load was reached, and in words how.
+        Whether full load was reached, and how.
     rejected
-        Load steps that were given up.
+        Number of rejected load steps.
     unstable, doubt
-        Whether the equilibrium gives way in some direction, and what could not be told.
+        Whether the equilibrium is unstable, and doubts about the result.
     memory
-        What load steps have left behind at obstacles, shape (n,), or None.
+        Contact history, shape (n,), or None.
     rubbed
-        The work of friction in all load steps.
+        Work of friction in all load steps.
     diverging
-        Whether the equilibrium of the laws' first moduli was no better a start; then it is not
-        looked for again.
+        Whether the equilibrium of the linearised law was no better start; it is not tried again.
     attempts
-        The strategies that were tried, an :class:`Attempt` each; the last is the one that led here.
+        An :class:`Attempt` for each strategy tried; the last one succeeded.
     """
 
     u: Array
@@ -90,12 +86,12 @@ class StaticResult:
 
     @property
     def iterations(self) -> int:
-        """Linear systems solved for the converged steps, with what was tried for them."""
+        """Number of linear systems solved for the converged steps, including failed attempts."""
         return sum(step.iterations for step in self.steps)
 
 
 class Equilibrium(NamedTuple):
-    """What an iteration ends with: displacement (N,), multipliers (m,), internal force (N,)."""
+    """Displacement (N,), multipliers (m,) and internal force (N,) of an equilibrium."""
 
     u: Array
     multipliers: Array
@@ -109,11 +105,11 @@ class StepFailed(Exception):
 
 
 class Diverging(StepFailed):
-    """The first corrections of a load step did not get smaller."""
+    """The first corrections of a load step did not decrease."""
 
 
 class Soft(StepFailed):
-    """The second correction of the mixed iteration does far more work than the loads."""
+    """The second correction of the mixed iteration did far more work than the loads."""
 
 
 class Unstable(StepFailed):

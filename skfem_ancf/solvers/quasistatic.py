@@ -1,4 +1,4 @@
-"""Quasi-static runs: equilibria from one time to the next, each from the one before."""
+"""Quasi-static runs: a sequence of equilibria in time."""
 
 from __future__ import annotations
 
@@ -19,49 +19,38 @@ from .outcome import StaticResult, StepFailed
 
 logger = logging.getLogger(__name__)
 
-#: Iterations of an increment, over those at most, up to which the next one may be larger; by how
-#: much, and what is left of one that has failed.
+#: Fraction of the allowed iterations up to which the next increment grows; its growth; reduction
+#: after a failure.
 FEW, LARGER, CUT = 0.7, 1.5, 0.25
 FOLLOWED, JUMPED = "followed", "jumped"
-#: Iterations of corrections of bounded size in an increment, at most.
+#: Iterations of a descent in an increment.
 BOUNDED = 20
-#: Jumps one after the other, each of the smallest increment.
+#: Largest number of consecutive jumps.
 JUMPS = 3
-#: Largest displacement of a node in an increment that is not the smallest: in the first relative to
-#: the scene's size, then over that at the rate of the increment before, or relative to the size.
+#: Largest displacement of a node in an increment: in the first one relative to the scene's size,
+#: then relative to that at the last rate, or to the size.
 FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
 
 
 class Instant(NamedTuple):
-    """An equilibrium at a time.
-
-    Attributes
-    ----------
-    t, result
-        The time, and a :class:`~skfem_ancf.solvers.outcome.StaticResult`.
-    way
-        How it was found: the name of a strategy.
-    rate
-        The largest displacement of a node since the one before, over the time between; or None.
-    """
+    """An equilibrium at a time."""
 
     t: float
     result: StaticResult
-    way: str
-    rate: float | None = None
+    way: str  # how it was found: the name of a strategy
+    rate: float | None = None  # largest displacement of a node over the last increment of time
 
 
 def first(system: System, t: float, u: Array | None, memory: Array | None, rules: Rules,
           stable: bool) -> Instant:
-    """The equilibrium at a time, from a displacement (N,) that need be none, or from rest.
+    """The equilibrium at a time, from rest or from a displacement (N,) that need not be one.
 
-    From a displacement what is missing to equilibrium, as the force of a support that is no longer
-    there, is reduced to nothing. ``memory`` is what is left behind there at obstacles. What only
-    loads and obstacles hold need not be held before these act.
+    The residual at the displacement is reduced to zero in load steps; ``memory`` is the contact
+    history there. A scene that only loads and obstacles stabilise may be at rest before they act.
     """
     with system.stopped_at(t):
         search = Search(system, u, memory, rules, stable, False)
-        if search.held_by_loads:
+        if search.stabilised_by_loads:
             try:
                 return Instant(t, search.at_rest(), "at rest")
             except StepFailed:
@@ -72,32 +61,16 @@ def first(system: System, t: float, u: Array | None, memory: Array | None, rules
 
 def follow(system: System, ends: Array, increments: int, begin: Instant, rules: Rules,
            stable: bool) -> Iterator[Instant]:
-    """Equilibria from the one given on, one after the other.
+    """Yield equilibria from ``begin`` on.
 
-    Each is looked for from the one before, by the mixed iteration, then by Newton's method or,
-    where obstacles or only loads hold the scene, by corrections of bounded size. An increment that
-    fails is cut, and one that moves the scene far: several equilibria may be near.
-    Where the smallest fails, because the equilibrium gives way there, the strategies of
-    :func:`~skfem_ancf.solvers.newton.solve_static` lead from the last one to another, as under
-    loads that stay.
+    Each follows from the one before, by the mixed iteration, then by Newton's method, or by a
+    descent if obstacles or only loads stabilise the scene. An increment that fails or moves the
+    scene far is cut, since several equilibria may be close. If the smallest one fails, because the
+    equilibrium becomes unstable, the strategies of :func:`~skfem_ancf.solvers.newton.solve_static`
+    look for another one under constant loads.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    ends
-        Times at which an increment has to end, ascending.
-    increments
-        Increments from one end to the next at least.
-    begin
-        The equilibrium to begin with.
-    rules, stable
-        Of each increment, as for :func:`~skfem_ancf.solvers.newton.solve_static`.
-
-    Raises
-    ------
-    StepFailed, ConvergenceError
-        If an equilibrium is not found; what was found before has been given.
+    ``ends`` are increasing times at which increments must end, ``increments`` the least number
+    between two of them. Raises StepFailed or ConvergenceError.
     """
     yield begin
     jumps = 0
@@ -125,7 +98,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
 
 def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
           smallest: bool) -> Instant:
-    """The equilibrium at t; by all strategies where the increment is the smallest."""
+    """The equilibrium at t; by all strategies if the increment is the smallest."""
     route = Route(last.result.u, None, (1.0, 1.0), (last.t, t))
     start = replace(last.result, load=0.0, steps=[], rejected=0, unstable=False, doubt="",
                     diverging=False)
@@ -138,12 +111,12 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
         options = Options(route, method, rules.tol, rules.max_iterations, method == "mixed",
                           close=True)
         step = Increment(system, start, 1.0, options)
-        with np.errstate(all="ignore"):  # what overflows is seen in the residual
+        with np.errstate(all="ignore"):  # overflow shows in the residual
             return step.reached(step.solve(stable))
 
     with system.stopped_at(t), system.forces.contacts.lent():
         search = Search(system, last.result.u, last.result.memory, rules, stable, False)
-        bounded = search.touches or search.held_by_loads
+        bounded = search.touches or search.stabilised_by_loads
         for method in ("mixed", "descent" if bounded else "newton"):
             try:
                 result = (search.descent("mixed", most=BOUNDED) if method == "descent" else
@@ -161,7 +134,7 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             return Instant(t, result, way, moved / (t - last.t))
         if not smallest:
             raise failed
-        logger.info("t = %.6g: %s, going on to another equilibrium", t, failed)
+        logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
         result = search.find()
         result.rubbed += last.result.rubbed
     return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")

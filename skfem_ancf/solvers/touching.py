@@ -1,15 +1,14 @@
-"""Equilibria in contact: from a start that holds what lies on an obstacle, and hard enough.
+"""Equilibria in contact: a suitable start, then stiffening obstacles.
 
-A belt that just does not touch its pulley has no stiffness across: the first correction throws it
-far off, and what shortens it brings back single points. So bodies that lie beside an obstacle at
-the begin of a load step are first held there, pulled as well as pushed, as a belt is by a groove;
-then let go, on an obstacle so soft that the pressure found presses all points in; then there is
-friction, and last the obstacle is hardened step by step. Each is close to the next. It begins as a
-primal-dual active set method does (Hintermueller, Ito, Kunisch 2003) to which all that lies near
-is active.
+A belt that just does not touch its pulley has no transverse stiffness: the first correction is far
+too large, and shorter ones close the contact at single points. At the start of a load step, points
+near an obstacle are therefore bound to it in both directions (bilateral contact), as in a
+primal-dual active set method with a large initial set (Hintermueller, Ito, Kunisch 2003). Then they
+are released on an obstacle so soft that its pressure keeps all points in contact, then friction is
+added, and the obstacle is stiffened step by step.
 
-An obstacle of the default stiffness is hardened until the body lies on it, and not in it: what the
-penetration stores is by how much the whole is too compliant.
+An obstacle of default stiffness is stiffened until the penetration is small and stores little
+energy.
 """
 
 from __future__ import annotations
@@ -24,29 +23,29 @@ from ..actions.contact.contacts import Contacts
 from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
 from ..core.types import Array
 
-#: How near a point lies that is held at first, and how far it is held, relative to the height.
+#: Distance of points that are bound at first, and range of the bond, relative to the height.
 NEAR, FAR = 0.5, 1e3
-#: Part of the surface that lies near where points are held.
+#: Least fraction of the surface that is near an obstacle if points are bound.
 PART = 0.03
-#: The mean penetration of what is let go, relative to the height.
-LET_GO = 0.1
-#: Penetration, relative to the height, and energy of it, relative to all other, up to which an
-#: obstacle is hard enough: what is deeper than the first, or than the second and stores more.
+#: Mean penetration after the release, relative to the height.
+RELEASED = 0.1
+#: Penetrations relative to the height, and relative stored energy, above which an obstacle is too
+#: soft: deeper than the first, or deeper than the second with more energy.
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
-#: What is not asked for, relative to the height: what lies flat stores nothing else.
+#: Smallest target of the penetration, relative to the height.
 LEAST = 1e-3
-#: What the harder one is to leave of each.
+#: Target of penetration and energy, relative to their limits.
 LEFT = 0.5
-#: By how much obstacles are made harder at once.
+#: Largest stiffening factor in one step.
 RUNG = 30.0
-#: Iterations of an equilibrium that is close to the last one, at most: at once, and from a start.
+#: Largest number of iterations close to the last equilibrium: directly, and from a soft start.
 AT_ONCE, SOON = 8, 15
-#: Times that they are found too soft in a load step at most, and that what is done at once is less.
+#: Largest number of stiffenings in a load step, and of reductions of the factor.
 TIMES, HALVED = 4, 2
 
 
 def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
-    """Points of each group that lie on an obstacle, or near it; None if they are few, or press."""
+    """Flags of points near an obstacle by group; None if they are few, or already in contact."""
     flags, most, pressed = [], 0.0, 0.0
     for (_, group), _, gap in contacts.look(u, t):
         flags.append(gap < NEAR * group.height)
@@ -58,7 +57,7 @@ def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
 
 @contextmanager
 def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
-    """While it is open, flagged points of groups stay on obstacles, without friction."""
+    """Bind flagged points to obstacles without friction inside the block."""
     memory = contacts.tables.memory
     before = memory.copy()
     try:
@@ -73,25 +72,25 @@ def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
 
 
 def soft(contacts: Contacts, u: Array, t: float) -> Array:
-    """The firmness with which the mean pressure presses all points in, shape (groups,)."""
+    """The firmness with which the mean pressure keeps all points in contact, shape (groups,)."""
     out = contacts.firmness.copy()
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
         deep = np.maximum(-gap, 0.0)
         if np.any(deep):
             mean = group.areas @ deep / group.areas[deep > 0.0].sum()
-            out[k] = min(group.firmest, (1.0 + out[k]) * mean / (LET_GO * group.height)) - 1.0
+            out[k] = min(group.firmest, (1.0 + out[k]) * mean / (RELEASED * group.height)) - 1.0
     return out
 
 
 def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
-    """The firmness that leaves the body on the obstacles, shape (groups,); not less than it is.
+    """The required firmness, shape (groups,); at least the present one.
 
-    ``energy`` is the strain energy, with that of the penetration.
+    ``energy`` is the strain energy including that of the penetration.
     """
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
-        part = (1.0 + now[k]) / (1.0 + out[k])  # what this pressure leaves if it is not harder
+        part = (1.0 + now[k]) / (1.0 + out[k])  # penetration at this pressure and the new firmness
         deep, stores = -part * float(gap.min()) / group.height, part * share
         if deep > DEEP or (deep > SEEN and stores > STORED):
             more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
@@ -104,17 +103,16 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
                    failed: type[Exception], close: bool = False) -> Any:
     """An equilibrium in contact at the time t, from a displacement and its time.
 
-    The obstacles have the memory of the begin of the load step; at its end that of its end, if
-    they had to be harder. ``solve`` is a function of what has been found, or None for the begin,
-    of whether a start is wanted only, and of iterations at most; it raises ``failed``. ``close``:
-    the start is close to what is looked for: few iterations tell.
+    Obstacles have the contact history at the start of the load step. ``solve`` takes the last
+    equilibrium (None for the start), whether a rough one suffices, and the number of iterations; it
+    raises ``failed``. If the start is ``close`` to the equilibrium, few iterations are tried.
     """
     before = contacts.tables.memory.copy()
     climb = _Climb(contacts, start, t, solve, energy, failed)
-    ways = [_at_once, _soon] if close else [_let_go, _from_soft, _directly]
+    ways = [_at_once, _soon] if close else [_released, _from_soft, _directly]
     flags = lies_near(contacts, *start)
     for way in ways:
-        if way is _let_go and flags is None:
+        if way is _released and flags is None:
             continue
         try:
             return climb.up(way(climb, flags))
@@ -125,7 +123,7 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
 
 
 def _at_once(climb, _):
-    """What is found in few iterations."""
+    """The equilibrium in few iterations."""
     return climb.solve(None, False, AT_ONCE)
 
 
@@ -135,18 +133,18 @@ def _soon(climb, flags):
 
 
 def _from_soft(climb, _, most=None):
-    """What is found from the equilibrium on soft obstacles without friction.
+    """The equilibrium, starting from that on soft obstacles without friction.
 
-    There points come and go one after the other no longer: the correction that presses one out of
-    the obstacle does not throw off those beside it.
+    Contacts then no longer open and close one after the other: the correction that moves one point
+    out of the obstacle does not throw off its neighbours.
     """
     with climb.contacts.eased(soft=True):
         found = climb.solve(None, True)
     return climb.solve(found, False, most)
 
 
-def _let_go(climb, flags):
-    """What is found from bodies that are held, on obstacles that are soft."""
+def _released(climb, flags):
+    """The equilibrium on soft obstacles, starting from bound points."""
     contacts = climb.contacts
     with held(contacts, flags):
         found = climb.solve(None, True)
@@ -158,7 +156,7 @@ def _let_go(climb, flags):
 
 
 def _directly(climb, _):
-    """What is found without more ado; where that fails, from obstacles without friction."""
+    """The equilibrium without further measures, or from one without friction if that fails."""
     try:
         return climb.solve(None, False)
     except climb.failed:
@@ -170,14 +168,14 @@ def _directly(climb, _):
 
 
 class _Climb:
-    """From obstacles that are soft to those that are hard enough; see :func:`found_touching`."""
+    """Stiffens soft obstacles step by step; see :func:`found_touching`."""
 
     def __init__(self, contacts, start, t, solve, energy, failed):
         self.contacts, self.start, self.t = contacts, start, t
         self.solve, self.energy, self.failed = solve, energy, failed
 
     def up(self, found):
-        """What is found there, or on the way to it, where that ends."""
+        """The equilibrium on stiff obstacles, or the last one before a failure."""
         contacts = self.contacts
         for _ in range(TIMES):
             wanted = firm(contacts, found[0], self.t, self.energy(found[0]))
@@ -189,7 +187,7 @@ class _Climb:
         return found
 
     def _to(self, wanted, found):
-        """What is found there, or last on the way, and whether it is there."""
+        """The equilibrium at a firmness or the last one before it, and whether it was reached."""
         contacts, rung, fails = self.contacts, RUNG, 0
         memory = contacts.tables.memory
         while True:

@@ -1,4 +1,4 @@
-"""Points of an equilibrium path, and the corrector that finds the next one."""
+"""Points of an equilibrium path, and the corrector of continuation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..equations.system import System
 from .increment import rules_of
 from .iteration import CLOSED, reference_work, settled
 
-#: Motion of the nodes below which the load counts in the arc length, over what it could stretch.
+#: Relative motion of the nodes below which the load counts in the arc length.
 STILL = 1e-3
 
 
@@ -22,22 +22,13 @@ class Failed(Exception):
 
 
 class Point:
-    """One equilibrium of a path.
+    """An equilibrium of a path.
 
-    ``u``, ``multipliers``, ``load`` and ``force`` are displacement (N,), multipliers (m,), load
-    factor and internal force (N,); ``arc`` the arc length from the start of the path; ``error`` the
-    size of the last correction in the energy norm, relative to the work done; ``iterations`` the
-    linear systems solved.
-
-    Attributes
-    ----------
-    rate, tangent
-        Of the load and of the displacement (N,) with the arc length.
-    negative
-        Number of negative eigenvalues of the tangent stiffness on the tangent space of the
-        constraints; None where the loads have no potential.
-    stable
-        Whether ``negative`` is zero; None where it is not known.
+    ``u`` (N,), ``multipliers`` (m,), ``load`` and ``force`` (N,) are the state; ``arc`` is the arc
+    length from the start, ``error`` the last correction in the energy norm relative to the work
+    done, ``iterations`` the linear systems solved. ``rate`` and ``tangent`` (N,) are derivatives of
+    load and displacement by the arc length. ``negative`` is the number of negative eigenvalues of
+    the tangent stiffness on the null space of J, None if loads have no potential.
     """
 
     def __init__(self, u: Array, multipliers: Array, load: float, force: Array, arc: float,
@@ -62,11 +53,11 @@ class Tracer:
         weights = position_weights(system)
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
         self.unit = system.constraints.values(1.0) - system.constraints.values(0.0)
-        #: what a unit of load counts in the arc length, where it hardly moves the nodes
+        #: weight of the load in the arc length, if it hardly moves the nodes
         self.of_load: float = 0.0
 
     def norm(self, v: Array) -> float:
-        """The norm of the nodes' mean displacement over the size of the scene."""
+        """Mean nodal displacement over the size of the scene."""
         return np.sqrt(v @ (self.weights * v))
 
     def stress_free(self) -> Point:
@@ -75,10 +66,10 @@ class Tracer:
         return Point(zero, np.zeros(self.system.constraints.m), 0.0, zero, 0.0, 0.0, 0)
 
     def begin(self, point: Point) -> Point:
-        """Find the tangent at the reference configuration, and the load's weight in the arc length.
+        """Set the tangent at the reference configuration, and the weight of the load in the arc
+        length.
 
-        Heat between walls moves no node: there the arc length has the load in it, times the strain
-        that its forces could cause.
+        Loads that move no node count with the strain that their forces could cause.
         """
         system = self.system
         forces = float(np.abs(system.external_force(point.u)) @ system.constraints.coordinate_sizes)
@@ -92,7 +83,7 @@ class Tracer:
         return point
 
     def _drive(self, external, u, load):
-        """What a unit of load adds to the residual and to the constraints."""
+        """Derivatives of residual and constraints by the load."""
         system, phi = self.system, np.zeros(self.system.constraints.m)
         if system.constraints.drives:
             h = 1e-6 * max(1.0, abs(load))
@@ -107,7 +98,7 @@ class Tracer:
         return external, -phi
 
     def factorize(self, point: Point) -> tuple[Array, Array]:
-        """Factorise the tangent stiffness of a point and count its negative eigenvalues."""
+        """Factorise the tangent stiffness at a point and count its negative eigenvalues."""
         system = self.system
         system.assemble(point.u, point.load)
         drive = self._drive(system.external_force(point.u), point.u, point.load)
@@ -120,7 +111,7 @@ class Tracer:
         return drive
 
     def set_tangent(self, point: Point, after: Point | None = None) -> Point:
-        """Find the tangent of the path at a point."""
+        """Set the tangent of the path at a point."""
         drive, phi = self.factorize(point)
         dF, mF = self.system.solver.solve(drive, phi)
         dF[self.system.constraints.fixed] += self.unit
@@ -134,7 +125,7 @@ class Tracer:
         return point
 
     def advance(self, start: Point, ds: float) -> Point:
-        """The next point of the path."""
+        """The next point at the distance ds."""
         first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
         plane, normal = self.weights * start.tangent, self.of_load**2 * start.rate
 
@@ -144,22 +135,22 @@ class Tracer:
         return self._correct(start, first, increment, ds)
 
     def at_load(self, start: Point, load: float, guess: tuple[Array, Array]) -> Point:
-        """The point at a load near another one; ``guess`` are changes (N,) and (m,) from there."""
+        """The point at a load near another one; ``guess`` are increments (N,) and (m,)."""
         first = guess[0], guess[1], load - start.load
         return self._correct(start, first, lambda step, dl, dR, dF: 0.0, np.inf)
 
     def _correct(self, start, first, increment, ds):
-        """Iterate from ``start`` and a first increment of u, multipliers and load."""
+        """Iterate from ``start`` and first increments of u, multipliers and load."""
         system, weights = self.system, self.weights
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
         du, dm, dl = first
         step, work, rules = np.zeros(system.N), np.inf, self.rules
         for k in range(1, rules.iterations + 1):
-            carried = system.carried_stress(u, stresses, du)
+            independent = system.linearised_stress(u, stresses, du)
             u, m, load, step = u + du, m + dm, load + dl, step + du
             with np.errstate(over="ignore", invalid="ignore"):
-                force, stresses = system.assemble(u, load, carried)
+                force, stresses = system.assemble(u, load, independent)
                 external = system.external_force(u)
             if not np.all(np.isfinite(force)):
                 raise Failed("the strain is not finite")

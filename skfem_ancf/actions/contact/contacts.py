@@ -75,7 +75,7 @@ class Contacts:
     ----------
     obstacles, groups
         The obstacles, and pairs of the number of one and a :class:`Group`.
-    moving, own, anchored, augmented
+    moving, custom, anchored, augmented
         True if an obstacle moves, has a shape of the caller's, friction, or takes the augmented
         Lagrangian.
     """
@@ -90,7 +90,7 @@ class Contacts:
         start = np.append(self.origin, np.zeros(2))[:, None]
         self.groups = [(k, group._replace(starts=group.starts - start)) for k, group in groups]
         self.moving = any(one.moves for one in self.obstacles)
-        self.own = any(one.shape.kind == CUSTOM for one in self.obstacles)
+        self.custom = any(one.shape.kind == CUSTOM for one in self.obstacles)
         self.anchored = any(one.friction > 0.0 for one in self.obstacles)
         self.augmented = any(one.method == "augmented" for one in self.obstacles)
         self.tables = self._tables() if groups else NO_CONTACTS
@@ -111,8 +111,9 @@ class Contacts:
             memory, after, at = memory + 4 * points, after + points, at + floats[-1].size
         return ContactTables(
             n, np.concatenate([headers.ravel(), *ints]).astype(np.int64), np.concatenate(floats),
-            np.zeros(POSES * len(self.obstacles)), np.zeros(memory), int(self.moving or self.own),
-            handle_of(self), ANCHORS * self.anchored + PRESSURES * self.augmented)
+            np.zeros(POSES * len(self.obstacles)), np.zeros(memory),
+            int(self.moving or self.custom), handle_of(self),
+            ANCHORS * self.anchored + PRESSURES * self.augmented)
 
     def pair(self, k: int) -> Pair:
         """Views of the tables for group k."""
@@ -281,7 +282,7 @@ class Contacts:
     # values
 
     def _place(self, t):
-        if self.moving or self.own:
+        if self.moving or self.custom:
             self.put(t, 0.0, self.tables.poses)
 
     def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:

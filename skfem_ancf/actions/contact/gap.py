@@ -7,7 +7,7 @@ the obstacle; its gradient is the normal at the closest point of the outline.
 
 import numpy as np
 
-from ...core.callbacks import own_distance
+from ...core.callbacks import custom_distance
 from ...core.source import indices, source
 from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE, START
 
@@ -102,7 +102,7 @@ def distances(pair, which, whole, x, out):
         a, b = x[0, i] - pose[0] - pose[4], x[1, i] - pose[1] - pose[5]
         y[0, i], y[1, i] = cos * a + sin * b + pose[4], cos * b - sin * a + pose[5]
     if pair.header[KIND] == CUSTOM:
-        own_distance(pair.own, pair.header[OBSTACLE], pose[9], y, out)
+        custom_distance(pair.custom, pair.header[OBSTACLE], pose[9], y, out)
     else:
         outline(pair.numbers[NUMBERS:], whole, y, out)
     for i in indices(x.shape[1]):

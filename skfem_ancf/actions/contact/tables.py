@@ -69,7 +69,7 @@ class ContactTables(NamedTuple):
 
     ``ints`` and ``floats`` are headers of the pairs and DOFs, and numbers of points and shapes;
     ``poses`` those of obstacles at the time asked last; ``memory`` what steps leave behind.
-    ``moving`` says whether poses depend on time, ``own`` is the handle of what knows them, and
+    ``moving`` says whether poses depend on time, ``custom`` is the handle of what knows them, and
     shapes of the caller's. ``lasting`` is the sum of what is kept from step to step: ANCHORS,
     PRESSURES. ``address`` is that of the compiled function, 0 in NumPy.
     """
@@ -80,7 +80,7 @@ class ContactTables(NamedTuple):
     poses: F1
     memory: F1
     moving: int
-    own: int
+    custom: int
     lasting: int = 0
     address: int = 0
 
@@ -97,7 +97,7 @@ class Pair(NamedTuple):
     k: Any
     number: Any
     moving: Any
-    own: Any
+    custom: Any
     header: Any
     first: Any
     weights: Any
@@ -121,7 +121,7 @@ def pair_of(tables, k):
     numbers = middles + (2 + 2 * pairs) * elements
     pose = h[OBSTACLE] * POSES
     return Pair(
-        k, tables.number, tables.moving, tables.own, h, tables.ints[h[INTS]:h[INTS] + n],
+        k, tables.number, tables.moving, tables.custom, h, tables.ints[h[INTS]:h[INTS] + n],
         shaped(floats[at:at + pairs * n], (pairs, n)),
         shaped(floats[at + pairs * n:points], (slopes, n)),
         shaped(floats[points:middles], (6, n)),

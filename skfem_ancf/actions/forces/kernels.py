@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.band import clear, dot
 from ...beam.kernels.moments import mean_turning
-from ...core.callbacks import own_elements, own_poses
+from ...core.callbacks import custom_elements, custom_poses
 from ...core.source import F1, I1, indices, primitive, shaped, source
 from ..tables import add_products
 from ..contact.kernels import run_contacts
@@ -57,7 +57,7 @@ class ForceTables(NamedTuple):
         Positions in the band, derivatives and weights.
     row_at, row_of
         Positions between the rows of elements that couple distant DOFs.
-    own, contacts
+    custom, contacts
         Handle of user-defined elements, 0 for none; the obstacles.
     address
         Address of the compiled :func:`of_kinds`; 0 in NumPy.
@@ -76,7 +76,7 @@ class ForceTables(NamedTuple):
     band_weight: F1
     row_at: I1
     row_of: I1
-    own: int
+    custom: int
     contacts: ContactTables
     address: int = 0
 
@@ -117,8 +117,8 @@ def run_kinds(tables, what, y, w, factor, out):
 def _evaluate(tables, what, t, factor, y, w, out):
     """Evaluate ``what`` for all kinds and for user-defined elements."""
     run_kinds(tables, what, y, w, factor, out)
-    if tables.own > 0:
-        own_elements(tables.own, what, t, factor, y, w, out)
+    if tables.custom > 0:
+        custom_elements(tables.custom, what, t, factor, y, w, out)
 
 
 @source
@@ -156,7 +156,7 @@ def add_contact(contacts, asked, u, v, out):
     """Add the answer of obstacles to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     if contacts.number > 0:
         if contacts.moving > 0:
-            own_poses(contacts.own, asked.t, asked.span, contacts.poses)
+            custom_poses(contacts.custom, asked.t, asked.span, contacts.poses)
         run_contacts(contacts, asked, u, v, out)
 
 
@@ -196,7 +196,7 @@ def contact_along(tables, t, u, du, out):
 
 
 @source
-def pace_contact(tables, dt):
+def set_contact_rate(tables, dt):
     """Pass the time step to obstacles."""
     tables.contacts.memory[RATE] = 1.0 / (dt * dt)
 

@@ -22,7 +22,7 @@ KINDS = 4
 
 
 class Forces:
-    """The bound force elements of a scene; ``own`` are the user-defined ones.
+    """The bound force elements of a scene; ``custom`` are the user-defined ones.
 
     ``far``: an element couples DOFs outside the band. ``symmetric``: all derivatives are symmetric.
     ``resists``: there are velocity-dependent forces. ``masses`` contribute to the mass matrix;
@@ -32,11 +32,11 @@ class Forces:
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
         self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
         parts: list[Part] = []
-        self.own = []
+        self.custom = []
         for element in self.elements:
             found = element.parts()
             if found is None:
-                self.own.append(element)
+                self.custom.append(element)
             else:
                 parts += found
         order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
@@ -51,7 +51,7 @@ class Forces:
             blocks.append((pair, rows, k + n * np.arange(16).reshape(4, 4)))
         row, at = 4 * n, 16 * n
         self._slices = []
-        for element in self.own:
+        for element in self.custom:
             m = 2 * len(element.links)
             shape = (m, m) if element.entries is None else element.entries[0].shape
             end = at + int(np.prod(shape))
@@ -64,14 +64,15 @@ class Forces:
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         self.contacts = Contacts(self.elements)
-        self.resists = (any(e.resists for e in self.own) or any(map(_resists, self.parts))
+        self.resists = (any(e.resists for e in self.custom) or any(map(_resists, self.parts))
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _coupling(self, k):
         """Rows, columns, weights and source positions of the derivatives of element k."""
         links, _, places = self._blocks[k]
         dofs = [link.dofs[c] for link in links for c in range(2)]
-        if k >= len(self.parts) and (entries := self.own[k - len(self.parts)].entries) is not None:
+        if k >= len(self.parts) and (
+                entries := self.custom[k - len(self.parts)].entries) is not None:
             i, j = (np.concatenate(dofs)[x] for x in entries)
             return i, j, np.ones(len(i)), places
         weights = [row for link in links for row in link.weights]
@@ -119,7 +120,7 @@ class Forces:
             np.ascontiguousarray(numbers.T).ravel(), self.size,
             position(i[keep], j[keep]).astype(np.int64), place[keep].astype(np.int64), w[keep],
             (rows * between + columns).astype(np.int64), places.astype(np.int64),
-            handle if self.own else 0, self.contacts.tables)
+            handle if self.custom else 0, self.contacts.tables)
 
     def acting_rows(self) -> Array:
         """Derivatives of positions of concentrated elements, shape (k, N)."""
@@ -171,15 +172,15 @@ class Forces:
         y = self.vectors(tables, u)
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
-            for element, (rows, _) in zip(self.own, self._slices))
+            for element, (rows, _) in zip(self.custom, self._slices))
 
     @cached_property
     def sampled(self) -> list[Control]:
         """Controls with a sampling time."""
-        return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
+        return [e for e in self.custom if isinstance(e, Control) and e.dt is not None]
 
     @contextmanager
-    def unheld(self) -> Iterator[None]:
+    def without_samples(self) -> Iterator[None]:
         """The elements as at the start of a motion, without held values of controls."""
         held = [control.held for control in self.sampled]
         for control in self.sampled:
@@ -194,7 +195,7 @@ class Forces:
         """Evaluate sampled controls that are due; ``first`` clears held values."""
         y, w = self.vectors(tables, u), np.empty(self.rows)
         vectors_of(tables, v, 0.0, w)
-        for element, (rows, _) in zip(self.own, self._slices):
+        for element, (rows, _) in zip(self.custom, self._slices):
             if isinstance(element, Control):
                 if first:
                     element.hold(())
@@ -261,15 +262,15 @@ class Forces:
         return (np.append(i, touched[0]), np.append(j, touched[1]),
                 np.append(w * D[place], touched[2]))
 
-    def add_own(self, what: int, t: float, factor: float, a: Array, b: Array,
+    def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
-        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.own_elements`.
+        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.custom_elements`.
 
         ``what`` is 0: the mean force at zero velocity between positions a and b; 1: the force at a
         due to velocities b; 2: the derivatives by positions, plus a factor times those by
         velocities.
         """
-        for element, (rows, places) in zip(self.own, self._slices):
+        for element, (rows, places) in zip(self.custom, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
             if what == 0:
                 out[rows] -= np.ravel(element.mean_force(x, y, t))

@@ -1,7 +1,7 @@
-"""Steps of the kernels, of all elements of a block at once; :mod:`.loops` has the same for Numba.
+"""Steps of the kernels in NumPy, for all elements of a block; :mod:`.loops` has them for Numba.
 
-Elements are the last axis of what is of rows, samples and points, and the first of matrices.
-Displacements may be complex.
+Elements are the last axis of rows, samples and points, and the first of matrices. Displacements may
+be complex.
 """
 
 from typing import Any
@@ -11,36 +11,36 @@ import numpy as np
 from ...core.source import primitive
 from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION
 
-#: Steps that Numba compiles from loops.
+#: Marks steps that Numba compiles from loops.
 step = primitive("skfem_ancf.beam.kernels.loops")
 
 
 @step
 def block():
-    """How many elements are evaluated together: as many as stay in cache."""
+    """Number of elements that are evaluated together, to stay in cache."""
     return 128
 
 
 def _at(t, first, last, of):
-    """Which of a table are those of elements."""
+    """Numbers of the elements' entries in a table."""
     return t.at[first:last, of]
 
 
 def _product(A, at, X):
-    """``A[at] @ X`` of matrices and X (k, m, ne)."""
+    """``A[at] @ X`` for X (k, m, ne)."""
     if len(A) == 1:
         return (A[0] @ X.reshape(len(X), -1)).reshape(A.shape[1], *X.shape[1:])
     return (A[at] @ X.transpose(2, 0, 1)).transpose(1, 2, 0)
 
 
 def _of_elements(A, at):
-    """Values (k, ...) of each element as the last axis, which is 1 if all have the same."""
+    """Values (k, ...) with the elements as last axis, of length 1 if all are equal."""
     return np.moveaxis(A if len(A) == 1 else A[at], 0, -1)
 
 
 @step
 def gathered(t, first, last, u):
-    """Degrees of freedom (nb - 1, 2, ne) of the elements, as their left nodes see them."""
+    """DOFs (nb - 1, 2, ne) of the elements, relative to the left node."""
     m, start = t.G.shape[2], t.start[first:last]
     U = u[start + np.arange(2, 2 * m + 2)[:, None]].reshape(m, 2, -1)
     U[m // 2] -= u[start + np.arange(2)[:, None]]
@@ -49,16 +49,16 @@ def gathered(t, first, last, u):
 
 @step
 def displaced(t, first, last, u):
-    """Displacements (rows, 2, ne) of the rows of the elements from ``first`` to ``last``."""
+    """Displacements (rows, 2, ne) of the rows of elements ``first`` to ``last``."""
     return _product(t.G, _at(t, first, last, OF_G), gathered(t, first, last, u))
 
 
 @step
 def sampled(t, first, d, dd):
-    """Strains (ns, ne) at d, and directions X (2, ns, 2, ne) in which rows g and h do work.
+    """Strains (ns, ne) at d, and directions X (2, ns, 2, ne) of the work of rows g and h.
 
-    What the strain changes by from d to d + dd is ``X[0] . dd_g + X[1] . dd_h``; where dd is 0, X
-    are its derivatives. Where g and h are the same row, X[1] is zero.
+    The strain changes by ``X[0] . dd_g + X[1] . dd_h`` from d to d + dd; for dd = 0, X are the
+    derivatives. If g and h are the same row, X[1] is zero.
     """
     x, (g, h) = _of_elements(t.frame, _at(t, first, first + d.shape[2], OF_FRAME)), t.rows
     r = x + d
@@ -86,19 +86,19 @@ def _cross(a, b):
 
 
 def _turned(a):
-    """Vectors (n, 2, ne) turned clockwise."""
+    """Vectors (n, 2, ne) rotated by -90 degrees."""
     return np.stack([a[:, 1], -a[:, 0]], axis=1)
 
 
 @step
 def changed(t, dd, X):
-    """What changes dd of the rows change the strains by, (ns, ne)."""
+    """Change (ns, ne) of the strains for increments dd of the rows."""
     return (X[0] * dd[t.rows[0]] + X[1] * dd[t.rows[1]]).sum(axis=1)
 
 
 @step
 def middle(strain, change):
-    """The mean of strains (ns, ne) before and after a change, of size 0 for none."""
+    """Mean of the strains (ns, ne) before and after a change, which may be empty."""
     return strain + 0.5 * change if change.size else strain
 
 
@@ -110,25 +110,25 @@ def difference(X, Y):
 
 @step
 def shifted(E, first, shift):
-    """E (k, points, ne) and what is added to that of the elements from ``first`` on."""
+    """E (k, points, ne) plus the shift of the elements from ``first``."""
     return E + shift[:, :, first:first + E.shape[2]]
 
 
 @step
 def stresses_at(given, first, last):
-    """Of stresses (all elements, ns) those of some elements, (ns, ne)."""
+    """Stresses (ns, ne) of some elements, from those of all (ne, ns)."""
     return given[first:last].T
 
 
 @step
 def put_stresses(T, first, more, out):
-    """Write stresses (ns, ne) to (all elements, ns), and what they are added to, if any."""
+    """Write stresses (ns, ne), plus ``more`` if not empty, to (ne, ns)."""
     last = first + T.shape[1]
     out[first:last] = T.T + more[first:last] if more.size else T.T
 
 
 @step
-def own_moduli(t, first, last):
+def linear_moduli(t, first, last):
     """Moduli of a linear law between samples, (nq, ne)."""
     return np.broadcast_to(_of_elements(t.H, _at(t, first, last, OF_H)),
                            (t.H.shape[1], last - first))
@@ -136,7 +136,7 @@ def own_moduli(t, first, last):
 
 @step
 def at_points(t, strain):
-    """Strains at the points of integration, (3, points, ne)."""
+    """Strains at the integration points, (3, points, ne)."""
     return (t.along @ strain).reshape(3, -1, strain.shape[1])
 
 
@@ -174,10 +174,10 @@ def add_forces(t, first, X, T, f):
 
 
 def _add_to_nodes(t, first, F, f):
-    """Add forces (nb - 1, 2, ne) on what :func:`gathered` finds."""
+    """Add forces (nb - 1, 2, ne) on the DOFs of :func:`gathered`."""
     m, n, start = len(F), len(F) // 2, t.start[first:first + F.shape[2]]
     F = F.reshape(2 * m, -1)
-    # no two elements have the same left node, nor the same right one
+    # left nodes are unique, and right nodes too
     f[start + np.arange(2)[:, None]] -= F[2 * n:2 * n + 2]
     f[start + np.arange(2, m + 1)[:, None]] += F[:m - 1]
     f[start + np.arange(m + 1, 2 * m + 2)[:, None]] += F[m - 1:]
@@ -193,7 +193,7 @@ def add_constant(t, first, last, u, f):
 
 @step
 def derivatives(t, first, X, B):
-    """Write the derivatives of the strains, (ne, ns, 2 nb - 2)."""
+    """Write the strain derivatives, (ne, ns, 2 nb - 2)."""
     G = t.G if len(t.G) == 1 else t.G[_at(t, first, first + len(B), OF_G)]
     both, X = B.reshape(*B.shape[:2], -1, 2), X.transpose(0, 3, 1, 2)
     for i in range(2):
@@ -202,7 +202,7 @@ def derivatives(t, first, X, B):
 
 @step
 def moved(t, H, B, HB):
-    """Write moduli times derivatives of the strains, (ne, ns, 2 nb - 2)."""
+    """Write moduli times strain derivatives, (ne, ns, 2 nb - 2)."""
     dense, (s, m) = np.zeros((len(B), B.shape[1], B.shape[1])), t.pairs
     dense[:, s, m] = dense[:, m, s] = H.T
     HB[:] = dense @ B
@@ -210,7 +210,7 @@ def moved(t, H, B, HB):
 
 @step
 def add_material(t, H, X, Y, w):
-    """Add the coefficients (np, 4, ne) of the part due to moduli H (nq, ne)."""
+    """Add the coefficients (np, 4, ne) of the material part with moduli H (nq, ne)."""
     product, a, b, q = t.terms
     X, Y = X.reshape(-1, 2, X.shape[3]), Y.reshape(-1, 2, X.shape[3])
     half = np.where(a == b, 0.5, 1.0)[:, None] * H[q]
@@ -220,7 +220,7 @@ def add_material(t, H, X, Y, w):
 
 @step
 def add_geometric(t, first, d, T, w):
-    """Add the coefficients of the part due to weighted stresses (ns, ne)."""
+    """Add the coefficients of the geometric part with weighted stresses (ns, ne)."""
     if t.kind == SECTION:
         x = np.where(t.rows[0] == t.rows[1], 0.5, 1.0)[:, None] * T
         np.add.at(w, t.of, x[:, None] * np.array([1.0, 0.0, 0.0, 1.0])[:, None])
@@ -241,7 +241,7 @@ def add_geometric(t, first, d, T, w):
 
 @step
 def add_products(t, first, w, one, other, K):
-    """Add the matrices Q (ne, 2 nb - 2, 2 nb - 2) of coefficients: ``one Q + other Q^T``."""
+    """Add ``one Q + other Q^T`` to K, with matrices Q (ne, 2 nb - 2, 2 nb - 2) of coefficients."""
     G, n, m = t.G, len(K), t.G.shape[2]
     G = G if len(G) == 1 else G[_at(t, first, first + n, OF_G)]
     g, h = t.products
@@ -258,12 +258,12 @@ def add_stiffness(t, first, K):
 
 @step
 def add_to_band(t, first, K, to, halves):
-    """Add matrices of elements to a band, of two halves to both."""
-    # what is symmetric is so to the bit: a translation then meets no round-off
+    """Add element matrices to a band; to both halves if it is stored in two."""
+    # exactly symmetric, so that translations have no round-off
     K = _with_left(K if halves else 0.5 * (K + K.transpose(0, 2, 1)))
     j, i = np.triu_indices(K.shape[1])
     at = t.start[first:first + len(K), None] * to.ld + (j * (to.ld - 1) + i)
-    left = np.searchsorted(j, K.shape[1] // 2)  # as for forces
+    left = np.searchsorted(j, K.shape[1] // 2)  # both parts have unique entries
     for k in (slice(left), slice(left, None)):
         to.flat[at[:, k]] += K[:, i[k], j[k]]
         if halves:
@@ -271,7 +271,7 @@ def add_to_band(t, first, K, to, halves):
 
 
 def _with_left(K):
-    """Matrices with the left node's position: less what the right one's has, (ne, 2 nb, 2 nb)."""
+    """Matrices (ne, 2 nb, 2 nb) that include the left node's position."""
     n = K.shape[1]
     q, out = n // 2 + 1, np.empty((len(K), n + 2, n + 2))
     out[:, 2:, 2:] = K
@@ -282,17 +282,17 @@ def _with_left(K):
 
 @step
 def put_columns(B, out):
-    """Write derivatives by the degrees of freedom of both nodes, (ne, ns, 2 nb)."""
+    """Write the derivatives by the DOFs of both nodes, (ne, ns, 2 nb)."""
     n = B.shape[2] // 2 + 1
     out[:, :, 2:], out[:, :, :2] = B, -B[:, :, n - 2:n]
 
 
 def weights_of(t: Any) -> Any:
-    """Weights of the points, (points, ne) or (points, 1)."""
+    """Weights of the integration points, (points, ne) or (points, 1)."""
     return _of_elements(t.weights, t.at[:, OF_WEIGHTS])
 
 
-def add_held_energies(t: Any, u: Any, out: Any) -> None:
+def add_constant_energies(t: Any, u: Any, out: Any) -> None:
     """Add the energies (ne,) of the constant stiffness."""
     if len(t.C):
         U = gathered(t, 0, len(t.start), u).reshape(t.C.shape[1], 1, -1)
@@ -301,13 +301,13 @@ def add_held_energies(t: Any, u: Any, out: Any) -> None:
 
 @step
 def add_changes(B, start, x, T):
-    """Add ``B[e] x`` at start[e] to T (ne ns,), B repeated for copies of the elements."""
+    """Add ``B[e] x`` at start[e] to T (ne ns,), with B repeated for copies of the elements."""
     x = x[start[:, None] + np.arange(B.shape[2])].reshape(-1, len(B), B.shape[2], 1)
     T += (B @ x).ravel()
 
 
 @step
-def add_pushes(B, start, T, f):
-    """Add ``B[e]^T T[e]`` to f at start[e], of T (ne ns,), B repeated for copies."""
+def add_transposed(B, start, T, f):
+    """Add ``B[e]^T T[e]`` at start[e] to f, with B repeated for copies."""
     F = T.reshape(-1, len(B), 1, B.shape[1]) @ B
     np.add.at(f, start[:, None] + np.arange(B.shape[2]), F.reshape(len(start), -1))

@@ -1,12 +1,12 @@
 """Tables of the shear-rigid cable.
 
 ``U = 1/2 int E A eps^2 - 2 E S eps k + E I k^2 ds`` with ``eps = |r'| - 1``, the change ``k`` of
-the material curvature ``kappa = r' x r'' / |r'|^2``, the rate at which the tangent turns along the
-stress-free axis, and the first moment S of the section about it. Both are sampled at 2 m - 2 Gauss
-points of an axis of degree 2 m - 1. Those of the cubic axis miss a mode, equal slopes along the
-axis at both nodes: it has a third point in the middle, whose weight falls with the slenderness.
+the material curvature ``kappa = r' x r'' / |r'|^2`` (rotation of the tangent per reference length),
+and the first moment S of the section about the axis. Both are sampled at 2 m - 2 Gauss points for
+an axis of degree 2 m - 1. Those of the cubic axis miss a mode (equal axial slopes at both nodes),
+which gets a third point in the middle with a weight that decreases with the slenderness.
 
-Rows are those of d/dX, then of d^2/dX^2, at the points.
+Rows are d/dX, then d^2/dX^2, at the points.
 """
 
 from __future__ import annotations
@@ -22,18 +22,15 @@ from .kernel import ElementKernel, strains
 from .law import NO_LAW
 from .tables import CABLE, StrainTables, apart, products_of
 
-#: Stiffness against the mode that two points of a cubic axis miss, in EI over the square of the
-#: length of the beam: the third point has a quarter of it.
+#: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
+#: beam; the third point has a quarter of it.
 MIDDLE = 1200.0
 
 
 def softened(weight: float) -> tuple[Array, Array]:
-    """Three points on [0, 1], exact for cubics: two Gauss points and one of a weight between them.
+    """Three points on [0, 1], exact for cubics: two Gauss points and a weighted middle one.
 
-    Parameters
-    ----------
-    weight
-        That of the middle; of 4/9 and more it is the rule of three Gauss points.
+    A weight of 4/9 gives the three-point Gauss rule, which is the maximum.
     """
     weight = min(weight, 4.0 / 9.0)
     x = 0.5 / np.sqrt(3.0 * (1.0 - weight))
@@ -42,7 +39,7 @@ def softened(weight: float) -> tuple[Array, Array]:
 
 
 def _square(across):
-    """E I about the centroid over E A, where it is largest."""
+    """The largest E I about the centroid over E A."""
     if across.simple:
         return across.mesh.height**2 / 12.0
     EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
@@ -61,21 +58,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 class CableKernel(ElementKernel):
-    """The kernel of a cable.
-
-    Parameters
-    ----------
-    across
-        A body with its section, a :class:`~skfem_ancf.sections.Across`, of an
-        ``ElementBeamCable``.
-    formulation
-        That of the beam; its first term has the Gauss points along the axis.
-
-    Attributes
-    ----------
-    points
-        On [0, 1] of each element, (points,).
-    """
+    """The kernel of a cable; ``points`` (points,) are its Gauss points on [0, 1]."""
 
     def __init__(self, across: Across, formulation: Formulation) -> None:
         mesh, element = across.mesh, across.element
@@ -87,7 +70,7 @@ class CableKernel(ElementKernel):
             self._rule = softened(alpha * MIDDLE * _square(across) / length**2)
         else:
             if self.constant is None and _has_alone(mesh.t):
-                n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
+                n = max(n, element.axis_degree)  # no neighbour stabilises modes of fewer points
             self._rule = gauss(n)
         self.points, self._across = self._rule[0], across
         self.points_number = len(self.points)
@@ -96,7 +79,7 @@ class CableKernel(ElementKernel):
         self.tables = [self._table(mesh, element, same)]
 
     def _table(self, mesh, element, same):
-        """The tables of the reference element times powers of the lengths, of one or of each."""
+        """Tables of the reference element scaled by the lengths, for one or all elements."""
         ne, nb, n = mesh.nelements, self.nd, self.points_number
         L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
         unit = np.concatenate([element.axis(self.points, d).T for d in (1, 2)])
@@ -154,7 +137,7 @@ class CableKernel(ElementKernel):
         return strains(apart(self.tables[0]), u_e).reshape(2, self.points_number, -1)
 
     def outer_stretches(self, u: Array) -> Array:
-        """Stretch of the fibres at the bottom and at the top, (2, points, ne)."""
+        """Stretch of the bottom and top fibres, (2, points, ne)."""
         t, (eps, kappa) = self.tables[0], first_order(self.strain(u))
         a, b = np.split(t.frame, 2, axis=1)
         kappa0 = (cross(a, b) / np.sum(a * a, axis=-1)).T

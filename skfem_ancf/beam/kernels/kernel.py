@@ -1,4 +1,4 @@
-"""Kernels of one beam: energy, internal force and tangent of all its elements."""
+"""Kernels of one beam."""
 
 from __future__ import annotations
 
@@ -13,28 +13,21 @@ from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from . import arrays
 from .law import LINEAR, law_evaluate
-from .strain import (FORCE, GIVEN, GRADIENTS, MEAN, PUSH, PUSH_MEAN, PUSH_TANGENT, STRESS, TANGENT,
-                     VISCOUS, evaluate)
+from .strain import (EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT, FORCE, GIVEN, GRADIENTS,
+                     MEAN, STRESS, TANGENT, VISCOUS, evaluate)
 from .tables import StrainTables, apart, linearised, repeated, scaled
 
-#: Elements, about, whose energies are found at once.
+#: Approximate number of elements whose energies are evaluated together.
 TOGETHER = 4096
 
 
 class ElementKernel:
-    """What kernels of all kinds of beams share.
+    """Base class of the kernels of one beam.
 
-    Displacements u of the nodes are of shape (N,), forces of elements (ne, nb, 2), weighted
-    stresses (ne, ns) for each of :attr:`tables`.
-
-    Attributes
-    ----------
-    tables
-        The :class:`~skfem_ancf.beam.kernels.tables.StrainTables` of the terms of the strain energy.
-    constant
-        The stabilisation, shape (ne, 2 nb, 2 nb) or (1, ...), or None.
-    points_number
-        Integration points of an element.
+    Displacements u are (N,), element forces (ne, nb, 2), weighted stresses (ne, ns) for each of
+    :attr:`tables`, the :class:`~skfem_ancf.beam.kernels.tables.StrainTables` of the terms of the
+    strain energy. ``constant`` is the stabilisation, (ne, 2 nb, 2 nb) or (1, ...), or None;
+    ``points_number`` the number of integration points of an element.
     """
 
     tables: list[StrainTables]
@@ -46,27 +39,27 @@ class ElementKernel:
         self.N = self.nd * mesh.p.shape[1]
 
     def gather(self, u: Array, elements: Any = slice(None)) -> Array:
-        """Element values (ne, nb, 2) of degrees of freedom (N,)."""
+        """Element values (ne, nb, 2) of DOFs (N,)."""
         nodes, t = u.reshape(-1, self.nd), self.t[:, elements]
         return np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1).reshape(t.shape[1], self.nd, 2)
 
     def scatter(self, force: Array) -> Array:
-        """The sum (N,) of element vectors (ne, nb, 2)."""
+        """Sum (N,) of element vectors (ne, nb, 2)."""
         out = np.zeros(self.N, dtype=force.dtype)
         nodes, parts = out.reshape(-1, self.nd), force.reshape(-1, 2, self.nd)
-        nodes[self.t[0]] += parts[:, 0]  # a node is the left end of one element at most
+        nodes[self.t[0]] += parts[:, 0]  # left nodes are unique
         nodes[self.t[1]] += parts[:, 1]
         return out
 
     def _checked(self, u):
         if u.shape != (self.N,):
-            raise InputError(f"this beam has {self.N} coordinates: their displacement is of shape "
-                             f"({self.N},), got {u.shape}; the state of another mesh?")
+            raise InputError(f"the displacement of this beam must have the shape ({self.N},), got "
+                             f"{u.shape}: is it the state of another mesh?")
         return u if np.iscomplexobj(u) else np.ascontiguousarray(u, dtype=float)
 
     @property
     def shared(self) -> bool:
-        """One table serves all elements."""
+        """True if all elements have the same table."""
         return len(self.tables[0].G) == 1
 
     @property
@@ -75,7 +68,7 @@ class ElementKernel:
         return all(t.law.kind == LINEAR for t in self.tables)
 
     def energy(self, u: Array) -> Any:
-        """Strain energy of a displacement (N,), or of many, (k, N): shape () or (k,)."""
+        """Strain energy of a displacement (N,), or of several, (k, N): shape () or (k,)."""
         if u.ndim == 1:
             return np.sum(self.energies(u))
         n = max(1, TOGETHER // self.t.shape[1])
@@ -87,12 +80,12 @@ class ElementKernel:
         return self._energies(self._checked(u)[None])[0]
 
     def _energies(self, u):
-        """Those of displacements (k, N), as of k times the elements; shape (k, ne)."""
+        """Energies (k, ne) of displacements (k, N)."""
         out = np.zeros(u.shape[0] * self.t.shape[1], dtype=u.dtype)
         for t in self.tables:
             many = t if len(u) == 1 else repeated(t, len(u), self.N)
             out += _energies_of(many, u.ravel())
-            arrays.add_held_energies(many, u.ravel(), out)
+            arrays.add_constant_energies(many, u.ravel(), out)
         return out.reshape(len(u), -1)
 
     def force(self, u: Array) -> Array:
@@ -104,31 +97,28 @@ class ElementKernel:
         return self._forces(self.tables, FORCE, u)
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        """A force (N,) whose work from u0 to u1 is the change of the energy."""
+        """The force (N,) whose work from u0 to u1 is the change of the energy."""
         return self.scatter(self._forces(self.tables, MEAN, u0, u1))
 
     def forces_of(self, stresses: list[Array], u: Array) -> Array:
-        """Forces of the elements of given stresses."""
+        """Element forces of given stresses."""
         return self._forces(self.tables, GIVEN, u, given=stresses)
 
-    def pushed_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:
-        """What strains without stress change of :meth:`forces`, or of their mean from u to end.
+    def eigenstrain_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:
+        """Change of :meth:`forces`, or of their mean from u to ``end``, by eigenstrains.
 
-        Parameters
-        ----------
-        given
-            Stresses of tables of linear laws, and strains at the points of others, (3, points, ne).
-        u, end
-            Displacements, shape (N,).
+        ``given`` are stresses for tables of linear laws, and strains at the points of others,
+        (3, points, ne).
         """
-        return self._forces(self.tables, PUSH if end is None else PUSH_MEAN, u, end, given)
+        what = EIGENSTRAIN if end is None else EIGENSTRAIN_MEAN
+        return self._forces(self.tables, what, u, end, given)
 
-    def pushed_tangents(self, given: list[Array], u: Array) -> Array:
-        """What :meth:`pushed_forces` adds to the :meth:`tangents`."""
-        return self._tangents(PUSH_TANGENT, u, given)
+    def eigenstrain_tangents(self, given: list[Array], u: Array) -> Array:
+        """Change of the :meth:`tangents` by eigenstrains, see :meth:`eigenstrain_forces`."""
+        return self._tangents(EIGENSTRAIN_TANGENT, u, given)
 
     def _forces(self, tables, what, u, v=None, given=None):
-        """What :func:`~skfem_ancf.beam.kernels.strain.evaluate` does, of each element."""
+        """Element forces by :func:`~skfem_ancf.beam.kernels.strain.evaluate`."""
         u = self.gather(self._checked(u)).ravel()
         v = u if v is None else self.gather(self._checked(v)).ravel()
         out = np.zeros_like(u)
@@ -138,23 +128,19 @@ class ElementKernel:
         return out.reshape(self.t.shape[1], -1, 2)
 
     def viscous_forces(self, u: Array, v: Array, time: float) -> Array:
-        """Forces of the elements that resist the rate v of the displacement."""
+        """Viscous element forces for the rate v of the displacement."""
         return self._forces(self.viscous_tables(time), VISCOUS, u, v)
 
     def small_forces(self, u: Array) -> Array:
-        """Forces of the elements of a small displacement: linear in it.
-
-        Of a :func:`~skfem_ancf.core.linear.step` from the reference configuration they are one,
-        too.
-        """
+        """Linearised element forces; complex for a :func:`~skfem_ancf.core.linear.step`."""
         z = self._checked(u if np.iscomplexobj(u) else step(0.0, u))
         out = 1j * self._forces(map(linearised, self.tables), FORCE, z).imag  # without round-off
         return out if np.iscomplexobj(u) else first_order(out)
 
     def small_energy(self, u: Array) -> float:
-        """The quadratic part of the strain energy: that of small displacements."""
+        """The quadratic part of the strain energy."""
         u_e = self.gather(u)
-        u_e[:, self.nd // 2] -= u_e[:, 0]  # seen from the first node: less round-off
+        u_e[:, self.nd // 2] -= u_e[:, 0]  # relative to the first node: less round-off
         u_e[:, 0] = 0.0
         return 0.5 * float(np.sum(u_e * self.small_forces(u)))
 
@@ -163,12 +149,12 @@ class ElementKernel:
         return self._tangents(TANGENT, u)
 
     def geometric(self, u: Array, stress: Array) -> Array:
-        """The part of the element tangents (ne, 2 nb, 2 nb) due to stresses, (ne, m).
+        """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m).
 
-        These are those of :attr:`tables` beside each other; what follows them is not used.
+        The stresses of all :attr:`tables` are side by side; further columns are ignored.
         """
         given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
-        return self._tangents(PUSH_TANGENT, u, given, map(linearised, self.tables))
+        return self._tangents(EIGENSTRAIN_TANGENT, u, given, map(linearised, self.tables))
 
     def _tangents(self, what, u, given=None, tables=None):
         u, n = self.gather(self._checked(u)).ravel(), 2 * self.nd
@@ -182,13 +168,13 @@ class ElementKernel:
         return out
 
     def gradients(self, u: Array) -> tuple[Array, Array, Array]:
-        """The material part of the element tangents as ``B^T HB``: in B nothing cancels.
+        """Factors of the material element tangents ``B^T HB``, without cancellation in B.
 
         Returns
         -------
         B, HB
-            Derivatives of the strains and of the weighted stresses, (ne, m, 2 nb); what is
-            stabilised is a strain too.
+            Derivatives of strains and weighted stresses, (ne, m, 2 nb), including the
+            stabilisation.
         stress
             Weighted stresses, (ne, m): ``B^T stress`` is the internal force.
         """
@@ -207,17 +193,17 @@ class ElementKernel:
         return *np.concatenate(found, axis=2), np.concatenate(stresses, axis=1)
 
     def viscous_tables(self, time: float) -> list[StrainTables]:
-        """The tables of a linear law with ``time`` times the moduli at no strain."""
+        """Tables of a linear law with ``time`` times the moduli at zero strain."""
         return [scaled(t, time) for t in self.tables]
 
     def inverted(self, u: Array) -> bool:
-        """True if the body is turned inside out somewhere: no deformation of a real one."""
+        """True if the body is turned inside out somewhere."""
         return False
 
 
 def _square_root(K):
-    """R with R^T R = K, semidefinite stiffnesses (k, n, n)."""
-    size = np.sqrt(np.diagonal(K, axis1=1, axis2=2))  # degrees of freedom have units
+    """R with R^T R = K, for semidefinite matrices (k, n, n)."""
+    size = np.sqrt(np.diagonal(K, axis1=1, axis2=2))  # units of the DOFs differ
     size = np.where(size > 0.0, size, 1.0)[:, :, None]
     values, V = np.linalg.eigh(K / (size * size.transpose(0, 2, 1)))
     values = np.where(values > 1e-12 * values[:, -1:], values, 0.0)
@@ -231,22 +217,22 @@ def strains(t: StrainTables, u: Array) -> Array:
 
 
 def _energies_of(t, u):
-    """The energies of the strains of the elements, (ne,)."""
+    """Energies of the elements, (ne,)."""
     strain = strains(t, u)
     if t.law.kind == LINEAR:
-        H = arrays.own_moduli(t, 0, len(t.start))
+        H = arrays.linear_moduli(t, 0, len(t.start))
         return 0.5 * np.sum(strain * arrays.weighted(t, H, strain), axis=0)
     E = arrays.at_points(t, strain)
     return energy_at(t, E)
 
 
 def energy_at(t: StrainTables, E: Array) -> Array:
-    """The energy (ne,) of strains (3, points, ne) at the points of integration."""
+    """Energy (ne,) of strains (3, points, ne) at the integration points."""
     W = np.empty((1, *E.shape[1:]), E.dtype)
     law_evaluate(t.law, E, W)
     return np.sum(arrays.weights_of(t) * W[0], axis=0)
 
 
 def stresses_of(t: StrainTables, strain: Array) -> Array:
-    """Weighted stresses (ne, ns) of strains (ns, ne) by the law with constant moduli."""
-    return arrays.weighted(t, arrays.own_moduli(t, 0, len(t.start)), strain).T.copy()
+    """Weighted stresses (ne, ns) of strains (ns, ne) with constant moduli."""
+    return arrays.weighted(t, arrays.linear_moduli(t, 0, len(t.start)), strain).T.copy()

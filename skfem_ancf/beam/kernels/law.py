@@ -1,4 +1,4 @@
-"""Laws in kernels: Hooke's, functions of the strain at a point, and methods of any other."""
+"""Constitutive laws in kernels: linear, pointwise functions of the strain, and laws in Python."""
 
 import weakref
 from itertools import count
@@ -10,41 +10,27 @@ from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
 from ...core.source import F1, F2, indices, primitive, source
 
-#: Kinds of laws: constant moduli, a function of the strain at a point, and any other.
-LINEAR, POINTWISE, OWN = 0, 1, 2
+#: Kinds of laws: constant moduli, a function of the strain at a point, a law in Python.
+LINEAR, POINTWISE, CUSTOM = 0, 1, 2
 
-#: By handle, as long as a kernel has them: compiled code holds no Python objects.
+#: Laws by handle, as long as a kernel uses them; compiled code has no Python objects.
 _LAWS: dict[int, Any] = {}
 _handles = count(1)
 
 
 class LawTables(NamedTuple):
-    """A law as compiled code takes it; :func:`law_tables` makes it.
+    """A law for kernels; :func:`law_tables` makes it."""
 
-    Attributes
-    ----------
-    kind, handle
-        :data:`LINEAR`, :data:`POINTWISE` or :data:`OWN`, and what finds the law of the latter two.
-    address
-        That of the compiled law; 0 in NumPy.
-    D
-        Moduli, those without strain where they depend on it, shape (3, 3).
-    constants
-        Of a pointwise law.
-    scale
-        Factors on the strain, and on the stress: that of shear is sqrt(k_s). Shape (3,).
-    """
-
-    kind: int
-    handle: int
-    address: int
-    D: F2
-    constants: F1
-    scale: F1
+    kind: int  # LINEAR, POINTWISE or CUSTOM
+    handle: int  # of a law that is not linear
+    address: int  # of the compiled law, or 0
+    D: F2  # moduli, at zero strain if they vary, (3, 3)
+    constants: F1  # of a pointwise law
+    scale: F1  # factors of strain and stress, sqrt(k_s) for shear, (3,)
 
 
 @primitive("skfem_ancf.equations.loops")
-def own_evaluate(handle, strain, out):
+def custom_evaluate(handle, strain, out):
     """Stress (3, n, elements), moduli (9, ...) or energy (1, ...) of a law in Python."""
     law = _LAWS[handle]
     found = {1: law.energy, 3: law.stress, 9: law.moduli}[len(out)](strain)
@@ -53,32 +39,25 @@ def own_evaluate(handle, strain, out):
 
 @primitive("skfem_ancf.equations.loops")
 def evaluate_points(law, strain, out):
-    """Energy, stress or moduli of a pointwise law; compiled, by its address."""
+    """Energy, stress or moduli of a pointwise law; compiled code calls its address."""
     out[...] = _LAWS[law.handle].evaluated(strain, len(out))
 
 
 def point_of(law: LawTables) -> Any:
-    """The function of the strain at a point, None for a law without."""
+    """The function of a pointwise law, or None."""
     return _LAWS[law.handle].point if law.kind == POINTWISE else None
 
 
 @source
 def law_evaluate(law, strain, out):
-    """Second Piola-Kirchhoff stress, moduli or energy per volume of a law that is not linear.
+    """Second Piola-Kirchhoff stress, moduli or energy per volume of a nonlinear law.
 
-    Parameters
-    ----------
-    law
-        LawTables.
-    strain
-        (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements).
-    out
-        The stress, if of shape (3, n, elements), the moduli (9, ...), (c, d) at 3 c + d, or the
-        energy (1, ...).
+    ``strain`` is (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements). The shape of ``out`` selects
+    the result: (3, n, elements) stress, (9, ...) moduli (c, d) at 3 c + d, (1, ...) energy.
     """
     n, size = strain.shape[1], strain.shape[2]
     x = np.empty(strain.shape, strain.dtype)
-    for c in range(3):  # the strain of the law: with its shear corrected
+    for c in range(3):  # with the shear correction
         y = law.scale[c]
         for p in indices(n):
             for e in indices(size):
@@ -86,7 +65,7 @@ def law_evaluate(law, strain, out):
     if law.kind == POINTWISE:
         evaluate_points(law, x, out)
     else:
-        own_evaluate(law.handle, x, out)
+        custom_evaluate(law.handle, x, out)
     for k in range(len(out)):
         y = 1.0 if len(out) == 1 else law.scale[k // (len(out) // 3)]
         y *= law.scale[k % 3] if len(out) == 9 else 1.0
@@ -97,18 +76,9 @@ def law_evaluate(law, strain, out):
 
 @source
 def conserve(law, middle, change, S):
-    """Make the stress's product with the change of the strain that of the law's energy.
+    """Correct the mean stress S so that its work equals the change of energy, by Gonzalez (2000).
 
-    The discrete gradient of Gonzalez (2000).
-
-    Parameters
-    ----------
-    law
-        LawTables.
-    middle, change
-        Mean of both strains and their difference, shape (3, n, elements).
-    S
-        The stress of the mean; changed.
+    ``middle`` and ``change`` are the mean of both strains and their difference, (3, n, elements).
     """
     n, size = S.shape[1], S.shape[2]
     x, W = np.empty((3, 2 * n, size), S.dtype), np.empty((1, 2 * n, size), S.dtype)
@@ -132,20 +102,12 @@ def conserve(law, middle, change, S):
 
 
 def law_tables(law: Any, owner: Any) -> LawTables:
-    """The LawTables of a law; one in Python is kept as long as its ``owner`` lives.
-
-    Parameters
-    ----------
-    law
-        Of a material: an object with ``energy``, ``stress`` and ``moduli``.
-    owner
-        What asks it.
-    """
+    """The LawTables of a law; a law in Python is registered while its ``owner`` lives."""
     one = np.ones(3)
     if isinstance(law, LinearLaw):
         return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
-    handle, kind, constants = next(_handles), OWN, np.zeros(3)
+    handle, kind, constants = next(_handles), CUSTOM, np.zeros(3)
     if isinstance(base, PointwiseMaterial) and base.is_pointwise:
         kind, constants = POINTWISE, np.array(base.constants, dtype=float)
     _LAWS[handle] = base
@@ -155,5 +117,5 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     return LawTables(kind, handle, 0, np.array(D), constants, np.array(scale, dtype=float))
 
 
-#: Of cables, which have moduli alone.
+#: For cables, which have moduli only.
 NO_LAW = LawTables(LINEAR, 0, 0, np.zeros((3, 3)), np.zeros(3), np.ones(3))

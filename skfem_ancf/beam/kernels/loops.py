@@ -153,7 +153,7 @@ def put_stresses(T, first, more, out):
 
 
 @source
-def own_moduli(t, first, last):
+def linear_moduli(t, first, last):
     H = np.empty((t.H.shape[1], last - first))
     for q in range(len(H)):
         for e in range(last - first):
@@ -418,7 +418,7 @@ def add_changes(B, start, x, T):
 
 
 @source
-def add_pushes(B, start, T, f):
+def add_transposed(B, start, T, f):
     k, ns, n = B.shape
     for e in range(len(start)):
         for s in range(ns):

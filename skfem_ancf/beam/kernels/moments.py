@@ -1,4 +1,4 @@
-"""Moments that turn with a section."""
+"""Moments on sections."""
 
 from typing import NamedTuple
 
@@ -10,26 +10,13 @@ TINY = 1e-200
 
 
 class MomentPack(NamedTuple):
-    """Moments on sections.
+    """Moments on sections, whose direction is ``start + c u[dofs]``."""
 
-    Attributes
-    ----------
-    dofs, c
-        Coordinates (moments, 2, k) and weights (moments, k): a section's direction is ``start +
-        c u[dofs]``. What is left over has no weight.
-    start
-        Directions in the reference configuration, (moments, 2).
-    M
-        Sizes, counterclockwise.
-    opposite
-        Number of the moment that acts on another section as the opposite of this one, or -1.
-    """
-
-    dofs: I3
-    c: F2
-    start: F2
-    M: F1
-    opposite: I1
+    dofs: I3  # (moments, 2, k)
+    c: F2  # weights, padded with zeros, (moments, k)
+    start: F2  # directions in the reference configuration, (moments, 2)
+    M: F1  # moments, counterclockwise
+    opposite: I1  # number of the opposite moment of a couple, or -1
 
 
 @source
@@ -56,12 +43,12 @@ def add_moments(moments, factors, u, f):
 
 @source
 def mean_turning(a, b, g):
-    """A mean derivative of the angle from e to d, whose work from a to b is its change exactly.
+    """A mean derivative of the angle from e to d, whose work from a to b is the change of angle.
 
-    Columns of a, b and g are of d and e. The angle is a function of ``c = e . d`` and ``s = e x
-    d``. Its discrete gradient by both (Gonzalez 1996), times their derivatives in the middle of the
-    step, has no moment on d and e together, as both are bilinear and do not change where d and e
-    turn alike.
+    The rows of a, b and g are components of d and e. The angle is a function of ``c = e . d`` and
+    ``s = e x d``. Its discrete gradient by both (Gonzalez 1996), times their derivatives in the
+    middle of the step, has no resultant moment, since both are invariant under common rotations of
+    d and e.
     """
     for e in indices(a.shape[1]):
         c0, s0 = a[2, e] * a[0, e] + a[3, e] * a[1, e], a[2, e] * a[1, e] - a[3, e] * a[0, e]
@@ -83,10 +70,9 @@ def mean_turning(a, b, g):
 
 @source
 def add_mean_moments(moments, factors, u0, u1, f):
-    """Add the forces whose work from u0 to u1 is the moments times the angles turned.
+    """Add the mean forces from u0 to u1, whose work is the moments times the rotations.
 
-    Moments on the ground and on two sections, by the angle between both, of which these take
-    forces without moment in the middle of the step: :func:`mean_turning`.
+    A couple acts on the angle between its two sections, without resultant moment.
     """
     M, opposite = moments.M, moments.opposite
     a, b, g = np.empty((4, 1)), np.empty((4, 1)), np.empty((4, 1))
@@ -119,10 +105,7 @@ def _add_force(moments, k, x, y, f):
 
 @source
 def add_moment_stiffness(moments, factors, u, flat, ld):
-    """Subtract the derivative of the moments' forces from entries (i, j), i >= j, of a band.
-
-    They are at ``flat[j * ld + i - j]``.
-    """
+    """Subtract the derivative of the forces from a lower half, at ``flat[j * ld + i - j]``."""
     dofs, c, M = moments.dofs, moments.c, moments.M
     for k in range(M.size):
         x, y = moment_direction(moments, k, u)

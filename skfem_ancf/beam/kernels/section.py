@@ -1,6 +1,6 @@
-"""Tables of beams with sections: Green-Lagrange strains, sampled as a formulation says.
+"""Tables of beams with sections: Green-Lagrange strains, sampled as the formulation says.
 
-Rows are those of d/dX, then of d/dY, each at the points where some strain takes them.
+Rows are d/dX, then d/dY, at the points of the samples.
 """
 
 from __future__ import annotations
@@ -21,53 +21,27 @@ from .kernel import ElementKernel
 from .law import LINEAR, law_tables
 from .tables import OF_FRAME, SECTION, StrainTables, products_of
 
-#: A modulus between samples that is smaller beside what it is a sum of is round-off.
+#: Relative size of a modulus between samples that is round-off.
 ORTHOGONAL = 1e-14
 
 
 class Integral(NamedTuple):
-    """One term of the strain energy of one layer.
-
-    Attributes
-    ----------
-    layer, term
-        A :class:`~skfem_ancf.sections.section.Layer` and a
-        :class:`~skfem_ancf.formulations.Term`.
-    samples
-        Its :class:`Samples`.
-    volumes
-        What the points of integration stand for, (1 or ne, points).
-    first
-        True of the first of a layer.
-    """
+    """One term of the strain energy of one layer."""
 
     layer: Layer
     term: Term
     samples: Samples
-    volumes: Array
-    first: bool
+    volumes: Array  # of the integration points, (1 or ne, points)
+    first: bool  # the first term of its layer
 
     @property
     def section_points(self) -> int:
-        """Integration points across the section."""
+        """Number of integration points across the section."""
         return len(self.term.section[0])
 
 
 class SectionKernel(ElementKernel):
-    """The kernel of a beam with sections.
-
-    Parameters
-    ----------
-    across
-        A body with its section, a :class:`~skfem_ancf.sections.Across`.
-    formulation
-        A :class:`~skfem_ancf.formulations.Formulation`.
-
-    Attributes
-    ----------
-    integrals
-        The :class:`Integral` of each of the tables.
-    """
+    """The kernel of a beam with sections; ``integrals`` has the :class:`Integral` of each table."""
 
     def __init__(self, across: Across, formulation: Formulation) -> None:
         super().__init__(across.mesh, across.element)
@@ -76,8 +50,8 @@ class SectionKernel(ElementKernel):
         rows: dict[Any, Any] = {}
         for layer, terms in across.terms(formulation):
             for k, term in enumerate(terms):
-                held = self.constant if not self.tables else None
-                samples, volumes = self._add(layer, term, held, rows)
+                constant = self.constant if not self.tables else None
+                samples, volumes = self._add(layer, term, constant, rows)
                 self.integrals.append(Integral(layer, term, samples, volumes, k == 0))
         self.points_number = sum(one.volumes.shape[1] for one in self.integrals)
 
@@ -116,7 +90,7 @@ class SectionKernel(ElementKernel):
 
     @property
     def volume(self) -> float:
-        """Volume of the body, by the rules of the first terms."""
+        """Volume of the body."""
         return sum(float(np.sum(one.volumes)) * (self.t.shape[1] // len(one.volumes))
                    for one in self.firsts)
 
@@ -128,7 +102,7 @@ class SectionKernel(ElementKernel):
             if one.first)
 
     def _gradients(self, u, component):
-        """Rows g and h (n, 2, ne) of the samples of a component, of the first terms."""
+        """Rows g and h (n, 2, ne) of the samples of a component, in the first terms."""
         for one, t in zip(self.integrals, self.tables):
             if one.first:
                 x = t.frame if len(t.frame) == 1 else t.frame[t.at[:, OF_FRAME]]
@@ -140,52 +114,31 @@ class SectionKernel(ElementKernel):
                        for x, y in self._gradients(u, 2))
 
     def shortest(self, u: Array) -> Any:
-        """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
+        """Smallest axial stretch where eps_xx is sampled."""
         return min(np.sqrt(np.min(np.sum(x * x, axis=1))) for x, _ in self._gradients(u, 0))
 
 
 def beam_gradients(mesh: MeshBeam, element: ElementBeam, X: Array,
                    tind: Array | None = None) -> tuple[Array, Array]:
-    """Derivatives of the local functions along the axis and across the section.
+    """Derivatives of the shape functions along the axis and across it, and the beam frame.
 
-    Parameters
-    ----------
-    mesh, element
-        A MeshBeam and a scalar beam element.
-    X
-        Reference points, shape (2, npoints).
-    tind
-        Elements, or None for all.
-
-    Returns
-    -------
-    G : ndarray
-        Shape (2, nelements, npoints, 2 nodal_dofs).
-    frame : ndarray
-        The beam's frame, transposed to (2, nelements, npoints, 2): e_1 and e_2.
+    Shapes are (2, nelements, npoints, 2 nodal_dofs) and (2, nelements, npoints, 2); X (2, npoints)
+    are points of the reference cell.
     """
     slopes, frame = element.slopes(mesh.mapping(), X, tind)
     G = np.ascontiguousarray(slopes.transpose(1, 2, 3, 0))
-    # the positions of both nodes together are a translation: exactly, or round-off resists it
+    # derivatives of a translation vanish exactly
     G[..., element.nodal_dofs] = -G[..., 0]
     return G, frame.transpose(1, 2, 3, 0)
 
 
 class Samples(NamedTuple):
-    """Where the strains of a term are sampled.
+    """Sampling points of the strains of a term."""
 
-    Attributes
-    ----------
-    X, where
-        Points (2, n), and which of them are those of the rows along the axis, and across it.
-    rows, component
-        As in :class:`~skfem_ancf.beam.kernels.tables.StrainTables`, and 0, 1 or 2 of each sample.
-    """
-
-    X: Array
-    where: list[Array]
-    rows: Array
-    component: Array
+    X: Array  # points, (2, n)
+    where: list[Array]  # numbers of the points of the axial rows, and of the others
+    rows: Array  # as in StrainTables
+    component: Array  # 0, 1 or 2 of each sample
 
     def __hash__(self):
         return id(self.X)
@@ -196,7 +149,7 @@ class Samples(NamedTuple):
 
 @lru_cache(64)
 def samples_of(at_xx: Any, at_yy: Any, at_xy: Any, eta: Any) -> Samples:
-    """The :class:`Samples` of places along the axis of xx, yy and xy, and of places across."""
+    """The :class:`Samples` for axial coordinates of xx, yy and xy, and coordinates across."""
     along, across = (np.union1d(at, at_xy) for at in (at_xx, at_yy))
     places, n, m = np.union1d(along, across), len(along) * len(eta), len(eta)
 
@@ -212,7 +165,7 @@ def samples_of(at_xx: Any, at_yy: Any, at_xy: Any, eta: Any) -> Samples:
 
 
 def _rows(mesh, element, samples, tind):
-    """G and the frame, (1 or ne, rows, nb - 1) and (1 or ne, rows, 2)."""
+    """G (1 or ne, rows, nb - 1) and frame (1 or ne, rows, 2)."""
     X, (x, y) = samples.X, samples.where
     if mesh.is_straight and mesh.heights is None and element.by_reference:
         unit, n, h = element.unit_slopes(X[:, x], X[:, y]), len(x), mesh.height
@@ -232,14 +185,14 @@ def _rows(mesh, element, samples, tind):
 
 
 def _interpolation(samples, term):
-    """From the samples, each of its component, to the points of integration, (points, ns)."""
+    """Matrix (points, ns) from the samples of each component to the integration points."""
     n = len(term.quadrature[1])
     matrices = [term.matrix(name) for name in ("xx", "yy", "xy")]
     return np.concatenate([np.eye(n) if x is None else x for x in matrices], axis=1)
 
 
 def _moduli(samples, term, law, weights):
-    """Pairs of samples with a modulus between them, and these, (2, nq) and (1 or ne, nq)."""
+    """Pairs of coupled samples (2, nq), and their moduli (1 or ne, nq)."""
     A, c = _interpolation(samples, term), samples.component
     D = law.D[c[:, None], c] if law.kind == LINEAR else np.ones((len(c), len(c)))
     s, t = np.nonzero(np.triu((np.abs(A).T @ np.abs(A) > 0.0) & (D != 0.0)

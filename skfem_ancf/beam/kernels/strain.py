@@ -1,8 +1,8 @@
-"""The kernels: stresses, forces and tangents of elements with the same samples of strain.
+"""Kernels: stresses, forces and tangents of elements with the same samples of strain.
 
-They take the displacement u of the nodes, and its change du in a step: what is found for a step
-is for its middle, in such a way that forces do the work that the strain energy changes by.
-Stresses are weighted, of shape (ne, ns); see :mod:`.tables`.
+They take the displacement u and its change du in a step. Results for a step belong to its middle,
+so that the work of the forces equals the change of the strain energy. Stresses are weighted, (ne,
+ns); see :mod:`.tables`.
 """
 
 import numpy as np
@@ -10,21 +10,21 @@ import numpy as np
 from ...core.source import primitive, shaped, source
 from .arrays import (add_constant, add_forces, add_geometric, add_material, add_products,
                      add_stiffness, add_to_band, at_points, block, changed, derivatives,
-                     difference, displaced, from_points, middle, moduli_of, moved, own_moduli,
+                     difference, displaced, from_points, middle, moduli_of, moved, linear_moduli,
                      put_columns, put_stresses, sampled, shifted, stresses_at, weighted)
 from .law import LINEAR, conserve, law_evaluate
 from .tables import Destination
 
-#: What :func:`evaluate` finds; given as ``np.int64``, or Numba compiles for each.
-(FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS, GIVEN, GRADIENTS, TURNED, PUSH, PUSH_MEAN,
- PUSH_TANGENT) = range(12)
+#: Results of :func:`evaluate`; passed as ``np.int64``, so that Numba compiles once.
+(FORCE, TANGENT, MEAN, STRESS, LINEARISED, VISCOUS, GIVEN, GRADIENTS, UNSYMMETRIC,
+ EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT) = range(12)
 
 
 @source
 def _moduli(t, first, strain, shift):
-    """Moduli (nq, ne) between samples; what a shift changes of them if there is one."""
+    """Moduli (nq, ne) between samples, or their change by a shift of the strain."""
     if t.law.kind == LINEAR:
-        return own_moduli(t, first, first + strain.shape[1])
+        return linear_moduli(t, first, first + strain.shape[1])
     E = at_points(t, strain)
     D = np.empty((9, E.shape[1], E.shape[2]))
     law_evaluate(t.law, E, D)
@@ -37,9 +37,9 @@ def _moduli(t, first, strain, shift):
 
 @source
 def _stress(t, first, strain, change, shift):
-    """Stresses (ns, ne) at the mean strain of a change; what a shift changes of them if any."""
+    """Stresses (ns, ne) for the mean of a change of strain, or their change by a shift."""
     if t.law.kind == LINEAR:
-        return weighted(t, own_moduli(t, first, first + strain.shape[1]), strain)
+        return weighted(t, linear_moduli(t, first, first + strain.shape[1]), strain)
     E = at_points(t, strain)
     C = at_points(t, change) if change.size > 0 else np.empty((3, 0, 0))
     S = np.empty_like(E)
@@ -53,7 +53,7 @@ def _stress(t, first, strain, change, shift):
 
 @source
 def _law_stress(t, E, C, S):
-    """The stress at the points, whose work on the change C is that of the energy."""
+    """Stress at the points, whose work on the change C is the change of energy."""
     law_evaluate(t.law, E, S)
     if C.size > 0:
         conserve(t.law, E, C, S)
@@ -61,25 +61,14 @@ def _law_stress(t, E, C, S):
 
 @source
 def add_forces_at(t, what, u, du, given, shift, out, f):
-    """Add forces to f, and write the stresses of which they are.
+    """Add forces to f, and write the stresses.
 
-    Parameters
-    ----------
-    t
-        :class:`~skfem_ancf.beam.kernels.tables.StrainTables`.
-    what
-        As of :func:`evaluate`.
-    u, du
-        Displacement and its change or rate, (N,), of size 0 for none.
-    given
-        Stresses whose forces are wanted in place of those of the strain, or of size 0.
-    shift
-        Strains added at the points of a law that is not linear, (3, points, ne), or of size 0.
-    out, f
-        Stresses, and forces (N,); of size 0 where they are not wanted.
+    ``what`` is as in :func:`evaluate`; ``du`` (N,) the change or rate of the displacement;
+    ``given`` stresses replace those of the strain; ``shift`` (3, points, ne) is added to the strain
+    of nonlinear laws; ``out`` are stresses, f (N,) forces. Arrays of size 0 are not used.
     """
-    rate = what == CARRY or what == VISCOUS
-    mean = what == MEAN or what == PUSH_MEAN
+    rate = what == LINEARISED or what == VISCOUS
+    mean = what == MEAN or what == EIGENSTRAIN_MEAN
     for first in range(0, len(t.start), block()):
         last = min(first + block(), len(t.start))
         d = displaced(t, first, last, u)
@@ -96,17 +85,17 @@ def add_forces_at(t, what, u, du, given, shift, out, f):
         else:
             T = _stress(t, first, middle(strain, change), change, shift)
         if out.size > 0 and what != VISCOUS:
-            put_stresses(T, first, given if what == CARRY else given[:0], out)
-        if f.size > 0 and what != CARRY:
+            put_stresses(T, first, given if what == LINEARISED else given[:0], out)
+        if f.size > 0 and what != LINEARISED:
             add_forces(t, first, X, stresses_at(given, first, last) if given.size > 0 else T, f)
 
 
 @source
 def add_tangent(t, u, given, material, shift, out, f, to):
-    """Add forces to f, tangents to a band, and write the stresses.
+    """Add forces to f and tangents to a band, and write the stresses.
 
-    The geometric part is that of ``given`` stresses, unless these are of size 0; it is alone if not
-    ``material``. Other arguments are those of :func:`add_forces_at`.
+    ``given`` stresses, if any, are those of the geometric part, which is alone unless ``material``.
+    Other arguments are as in :func:`add_forces_at`.
     """
     n = 2 * t.G.shape[2]
     for first in range(0, len(t.start), block()):
@@ -132,7 +121,7 @@ def add_tangent(t, u, given, material, shift, out, f, to):
 
 
 @source
-def add_turned(t, u, du, to):
+def add_unsymmetric(t, u, du, to):
     """Add ``B(u)^T H (B(u + du) - B(u))`` to a matrix in two halves."""
     n, shift = 2 * t.G.shape[2], np.empty((3, 0, 0))
     for first in range(0, len(t.start), block()):
@@ -150,14 +139,14 @@ def add_turned(t, u, du, to):
 
 @source
 def add_constant_force(t, u, f):
-    """Add the forces of the constant stiffness to f."""
+    """Add the forces of the constant stiffness."""
     for first in range(0, len(t.start) if len(t.C) > 0 else 0, block()):
         add_constant(t, first, min(first + block(), len(t.start)), u, f)
 
 
 @source
 def put_gradients(t, u, B, HB):
-    """Write the derivatives of the strains and of the stresses, (ne, ns, 2 nb) each."""
+    """Write the derivatives of strains and stresses, (ne, ns, 2 nb) each."""
     ns, n = t.rows.shape[1], 2 * t.G.shape[2]
     for first in range(0, len(t.start), block()):
         last = min(first + block(), len(t.start))
@@ -172,13 +161,13 @@ def put_gradients(t, u, B, HB):
 
 @primitive("skfem_ancf.equations.loops")
 def run(t, what, u, v, f, given, out, flat, ld):
-    """As :func:`evaluate`; compiled once, and not again in each function that calls it."""
+    """:func:`evaluate`; compiled code calls its address, so that it is compiled once."""
     evaluate(t, what, u, v, f, given, out, flat, ld)
 
 
 @source
 def evaluate(t, what, u, v, f, given, out, flat, ld):
-    """One thing of the elements of one table.
+    """Evaluate the elements of one table.
 
     Parameters
     ----------
@@ -186,23 +175,23 @@ def evaluate(t, what, u, v, f, given, out, flat, ld):
         StrainTables.
     what
         ``FORCE``, ``MEAN``, ``STRESS``, ``TANGENT``: forces at u, their mean from u to v, stresses,
-        forces and tangent, with those of the constant stiffness. ``CARRY``: ``given`` stresses and
-        what a change v makes of them, linearised at u. ``TURNED``: :func:`add_turned`.
-        ``VISCOUS``: forces of the stresses that a linear law has of the rate v. ``GIVEN``: forces
-        of given stresses alone. ``GRADIENTS``: :func:`put_gradients`, and the tangent of given
-        stresses if ``flat`` is not of size 0. ``PUSH``, ``PUSH_MEAN``, ``PUSH_TANGENT``: what
-        ``given`` changes, stresses of linear laws, strains of others.
+        forces and tangent, with the constant stiffness. ``LINEARISED``: ``given`` stresses plus
+        their linearised change by v at u. ``UNSYMMETRIC``: :func:`add_unsymmetric`. ``VISCOUS``:
+        forces of the stresses of a linear law for the rate v. ``GIVEN``: forces of given stresses.
+        ``GRADIENTS``: :func:`put_gradients`, and the tangent at given stresses unless ``flat`` is
+        empty. ``EIGENSTRAIN``, ``EIGENSTRAIN_MEAN``, ``EIGENSTRAIN_TANGENT``: change by ``given``
+        eigenstrains (stresses for linear laws, strains for others).
     u, v
         Displacement, and at the end for a mean, shape (N,).
     f
         Forces, added to.
     given, out
-        Stresses, and what is written, flat; of size 0 for none.
+        Given and written stresses, flat; or of size 0.
     flat, ld
         A :class:`~skfem_ancf.beam.kernels.tables.Destination`.
     """
     ne, ns, none = len(t.start), t.rows.shape[1], u[:0]
-    shifted = what >= PUSH and t.law.kind != LINEAR
+    shifted = what >= EIGENSTRAIN and t.law.kind != LINEAR
     shift = shaped(given if shifted else none, (3, t.weights.shape[1], ne if shifted else 0))
     stresses = none if shifted else given
     T = shaped(stresses, (stresses.size // ns, ns))
@@ -211,15 +200,15 @@ def evaluate(t, what, u, v, f, given, out, flat, ld):
         put_gradients(t, u, both[0], both[1])
     S = shaped(none if what == GRADIENTS else out, (-1, ns))
     du = none
-    if what == MEAN or what == PUSH_MEAN or what == TURNED:
+    if what == MEAN or what == EIGENSTRAIN_MEAN or what == UNSYMMETRIC:
         du = v - u
-    elif what == CARRY or what == VISCOUS:
+    elif what == LINEARISED or what == VISCOUS:
         du = v
-    if what == TURNED:
-        add_turned(t, u, du, Destination(flat, ld))
-    elif what == TANGENT or what == PUSH_TANGENT or what == GRADIENTS:
+    if what == UNSYMMETRIC:
+        add_unsymmetric(t, u, du, Destination(flat, ld))
+    elif what == TANGENT or what == EIGENSTRAIN_TANGENT or what == GRADIENTS:
         if flat.size > 0:
-            add_tangent(t, u, T, what != PUSH_TANGENT or shifted, shift, S, f,
+            add_tangent(t, u, T, what != EIGENSTRAIN_TANGENT or shifted, shift, S, f,
                         Destination(flat, ld))
     else:
         add_forces_at(t, what, u, du, T, shift, S, f)
