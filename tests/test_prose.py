@@ -26,7 +26,7 @@ WORDS = {
     r"lanes": "vectorised index",
     r"slabs?": "layer",
     r"weld(ed)? to the ground": "clamp, clamped",
-    r"begins? (anew|afresh)": "again",
+    r"[a-z]+s (anew|afresh)|made anew": "again",
     r"may be had": "is available",
     r"texts? of (a|the) kernel": "kernel",
     r"spread (load|force|moment)s?": "distributed load",
@@ -57,12 +57,13 @@ def sentences(text):
 
 
 def strings(module):
-    """Docstrings of a module and messages of its errors."""
+    """Docstrings of a module and messages of its errors and warnings."""
     for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             yield ast.get_docstring(node, clean=False) or ""
-        elif isinstance(node, ast.Raise) and node.exc:
-            yield " ".join(part.value for part in ast.walk(node.exc)
+        elif isinstance(node, ast.Raise) or (
+                isinstance(node, ast.Call) and getattr(node.func, "id", "") == "warn"):
+            yield " ".join(part.value for part in ast.walk(node)
                            if isinstance(part, ast.Constant) and isinstance(part.value, str))
 
 
@@ -76,6 +77,11 @@ def dialect(text):
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_pages_have_no_dialect(page):
     assert not dialect(re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.py")), ids=lambda p: p.stem)
+def test_demos_have_no_dialect(demo):
+    assert not dialect(demo.read_text(encoding="utf-8").replace("\n# ", " "))
 
 
 def test_docstrings_and_errors_have_no_dialect():
