@@ -79,11 +79,6 @@ def test_pages_have_no_dialect(page):
     assert not dialect(re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8")))
 
 
-@pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.py")), ids=lambda p: p.stem)
-def test_demos_have_no_dialect(demo):
-    assert not dialect(demo.read_text(encoding="utf-8").replace("\n# ", " "))
-
-
 def test_docstrings_and_errors_have_no_dialect():
     found = [f"{module.relative_to(ROOT)}: {words}" for module in MODULES
              for text in strings(module) for words in dialect(text)]
