@@ -37,6 +37,7 @@ def test_a_quarter_of_a_circle_bends_as_one(tmp_path):
 
 @pytest.mark.parametrize("text", [
     "x;y\n0;0\n0,5;0\n1,0;0\n1,5;0\n", "# s\n0 0\n0.5 0\n\n1 0\n1.5 0\n", "0,0\n5e-1,0\n1,0\n1.5,0",
+    '"x","y"\n"0","0"\n"0.5","0"\n"1","0"\n"1.5","0"\n',
     "\ufeffx [m]\ty [m]\n0\t0\n0.5\t0\n1\t0\n1.5\t0\n"])
 def test_files_of_text(tmp_path, text):
     path = tmp_path / "points.txt"
@@ -73,6 +74,12 @@ def test_what_is_wrong_is_said(tmp_path):
                             "folds")):
         with pytest.raises(MeshError, match=message):
             MeshBeam.from_points(points, height=1.5)
+    with pytest.raises(MeshError, match="points 4 and 5 are both at"):  # the spline would turn
+        MeshBeam.from_points(np.insert(quarter(9), 5, quarter(9)[4] + 1e-9, axis=0), 0.1)
+    with pytest.raises(MeshError, match="in order along the axis"):
+        MeshBeam.from_points(quarter(9)[[0, 1, 4, 2, 3, 5, 6, 7, 8]], 0.1)
+    with pytest.raises(MeshError, match="more than noise=0.0001"):
+        MeshBeam.from_points(quarter(200, 1e-3), 0.1, elements=8, noise=1e-4)
     with pytest.raises(MeshError, match="noise"):
         MeshBeam.from_points(quarter(9), 0.1, noise=-1)
     with pytest.raises(FileError, match="cannot be read"):

@@ -63,6 +63,8 @@ def test_grid_is_updated_in_place(state, recover):
     other.to_pyvista(fields=["displacement", "stress"], out=mesh)
     assert mesh.n_points == smooth.n_points
     assert_allclose(mesh.point_data["stress"], smooth.point_data["stress"])
+    state.to_pyvista(fields=["displacement", "S_xx"], out=mesh)
+    assert set(mesh.point_data) == {"displacement", "S_xx"}  # no stress of another state
     with pytest.raises(InputError, match="out must be a mesh"):
         other.to_pyvista(out=3)
     with pytest.raises(InputError, match="of the same scene"):

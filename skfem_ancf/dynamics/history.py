@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -412,8 +413,8 @@ class History(MaterialPoints):
     def save(self, filename: StrPath, progress: bool | None = None, *,
              subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
              undeformed: bool = False, recover: bool = True, fields: Any = None,
-             precision: str = "double", encoding: str | None = None) -> None:
-        """Write a time series for ParaView.
+             precision: str = "double", encoding: str | None = None) -> Path:
+        """Write a time series for ParaView; returns its path.
 
         Parameters
         ----------
@@ -436,3 +437,4 @@ class History(MaterialPoints):
         with made as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
             writer.extend(self, lambda: bar.update(1))
+        return path

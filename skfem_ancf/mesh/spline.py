@@ -12,6 +12,8 @@ from ..core.types import Array
 
 #: Chords per interval between two points for its length.
 PIECES = 32
+#: Smallest distance of adjacent points, relative to the largest.
+CLOSE = 1e-6
 
 
 def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array]:
@@ -25,8 +27,8 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
         raise MeshError(f"an axis needs at least two points, got {n}" if n < 2 else
                         f"noise must not be negative, got {noise!r}")
     steps = np.hypot(*np.diff(x, axis=0).T)
-    if not np.all(steps > 0):
-        k = int(np.argmin(steps))
+    k = int(np.argmin(steps))
+    if not steps[k] > CLOSE * np.max(steps):  # the spline would turn between them
         raise MeshError(f"the points {k} and {k + 1} are both at {x[k].tolist()}: leave one out")
     s = np.append(0.0, np.cumsum(steps))
     (t, c, k), _ = splprep(x.T, u=s, s=n * noise**2, k=min(3, n - 1))
@@ -52,7 +54,8 @@ def _table(filename):
     if lines and any(letter.isalpha() and letter not in "eE" for letter in lines[0]):
         lines = lines[1:]
     try:
-        rows = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None, ndmin=2)
+        rows = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None, ndmin=2,
+                          quotechar='"')
     except ValueError as error:
         raise MeshError(f"{path} must hold rows of two numbers, x and y: {error}") from None
     if rows.shape[1] != 2:

@@ -144,6 +144,8 @@ def _fill(block, grid, body, facts):
             block.copy_from(new)
         block = new if block is None else block
     block.points[:] = body.points
+    for name in [x for x in block.point_data if x in FIELDS and x not in body.data]:
+        del block.point_data[name]  # of another state
     for name, values in body.data.items():
         if name in block.point_data:
             block.point_data[name][:] = values
