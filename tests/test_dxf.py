@@ -62,7 +62,7 @@ def test_closed_polylines_and_lines_that_nearly_meet(drawn):
 
 @pytest.mark.parametrize("draw, message", [
     (lambda space: space.add_arc((0, 0), 1, 0, 90, dxfattribs=on("bow")), "ARC in the layer 'bow'"),
-    (lambda space: space.add_lwpolyline([(0, 0, 0, 0, 0.5), (2, 0)]), "has a ARC"),
+    (lambda space: space.add_lwpolyline([(0, 0, 0, 0, 0.5), (2, 0)]), "has ARC"),
     (lambda space: space.add_text("nothing"), "no lines"),
     (lambda space: space.add_line((0, 0, 0), (0, 3, 1)), "z = ")])
 def test_what_is_no_frame_is_said(drawn, draw, message):

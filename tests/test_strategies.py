@@ -162,6 +162,18 @@ def test_a_wire_over_a_drum_hangs_down_on_both_sides(friction):
     assert abs(x - (R + h / 2)) < 0.02 and y < -0.7
 
 
+def test_a_truss_without_diagonals_is_refused_in_a_few_lines():
+    """Cells with one bar each between the chords, all hinged: no posts, so many motions."""
+    n = 3
+    points = [(k, y) for y in (0, 1) for k in range(n + 1)]
+    bars = [pair for k in range(n) for pair in ((k, k + 1), (n + 1 + k, n + 2 + k), (k, n + 2 + k))]
+    frame = Frame.from_lines(points, bars, hinges="all", height=0.01, width=0.01, material=steel())
+    frame.pin(0).hold(n, "y").point_force((0, -1), at=1)
+    with pytest.raises(SupportError, match="leave rigid motions free") as error:
+        frame.solve_static()
+    assert "others" in str(error.value) and len(str(error.value)) < 2000
+
+
 def test_what_nothing_holds_is_refused():
     beam = Beam(line(8), ElementBeamCable(5), steel(), width=0.01)
     free = "the supports leave rigid motions free"

@@ -21,7 +21,7 @@ from ..beam.rigid import RigidBody
 from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..core.origin import ours
 from ..core.types import Array
-from .mobility import advice, free_rigid_motions, who
+from .mobility import advice, first_of, free_rigid_motions, who
 from .redundancy import repeated, shared
 from .signature import DENSE, FREE, first_dependent
 
@@ -496,7 +496,7 @@ class Constraints:
         free = self.free_rigid_motions()
         if not free:
             return ""
-        return ("the supports leave rigid motions free: " + "; ".join(free)
+        return ("the supports leave rigid motions free: " + first_of(free, "; ")
                 + (", along which the springs have no stiffness before the load"
                    if self._stiffness is not None else "")
                 + f". Add a support, for example {advice(self)}, or solve in time with "

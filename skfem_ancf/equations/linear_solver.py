@@ -110,13 +110,20 @@ class LinearSolver:
         self._joined = NullSpace(s.K, J, entries, constraints, self._pattern)
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
-        """Solve for forces (N,) and constraint residuals (m,); returns x and multipliers."""
+        """Solve for forces (N,) and constraint residuals (m,); returns x and multipliers.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the last factorisation failed.
+        """
         s = self._system
         b, none = residual * s.constraints.mask, np.zeros(0)
         if not self.coupled:
             return s.K.solve(b), none
         solver = self._joined if self.condensed is None else self.condensed
-        assert solver is not None
+        if solver is None or (solver is self.condensed and not solver.ready):
+            raise np.linalg.LinAlgError("there are no factors")
         return solver.solve(b, none if phi is None else phi)
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,

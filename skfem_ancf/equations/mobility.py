@@ -13,6 +13,9 @@ from ..beam.domain import Domain
 from ..beam.rigid import RigidBody
 from .signature import DENSE, null_space, row_sizes, unit_rows
 
+#: Largest number of motions, and of parts of each, that a message names.
+SHOWN = 4
+
 
 def who(members: Any, k: int) -> str:
     """Name of beam or body number k for messages."""
@@ -122,4 +125,10 @@ def _describe(v, bodies):
             x = origin + np.array([-b, a]) * size / c
             x = np.where(np.abs(x) < 1e-9 * size, 0.0, x)
             parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
-    return " with ".join(parts)
+    return first_of(parts, " with ")
+
+
+def first_of(texts: list[str], between: str) -> str:
+    """The first of some texts, joined, and how many others there are."""
+    others = f"{between}{len(texts) - SHOWN} others" if len(texts) > SHOWN else ""
+    return between.join(texts[:SHOWN]) + others

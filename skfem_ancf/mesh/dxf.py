@@ -47,7 +47,7 @@ def mesh_of_dxf(path: Path) -> Any:
             elif kind == "POINT":
                 points.append((entity.dxf.layer, part.dxf.location.xyz))
             elif kind in CURVES:
-                raise MeshError(f"{path} has a {kind} in the layer {entity.dxf.layer!r}, which is "
+                raise MeshError(f"{path} has {kind} in the layer {entity.dxf.layer!r}, which is "
                                 "no straight line: explode blocks, and draw curves as polylines")
     if not lines:
         raise MeshError(f"{path} has no lines and no polylines in its model space")
