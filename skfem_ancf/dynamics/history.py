@@ -292,9 +292,7 @@ class History(MaterialPoints):
     def to_pyvista(self, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                    lagrange: bool = False, undeformed: bool = False,
                    recover: bool = True) -> Series:
-        """A pyvista mesh that can be moved to every instant.
-
-        ``mesh`` shows the first instant, ``update(k)`` moves it to the instant k.
+        """A pyvista mesh at the first instant; ``update(k)`` moves it to the instant k.
 
         Parameters
         ----------
@@ -361,14 +359,14 @@ class History(MaterialPoints):
         Parameters
         ----------
         x, y
-            "t"; the name of a sensor with one number at each instant; a pair of the name and the
-            component of one with more, as ("tip", 1); or an array (nt,).
+            "t", the name of a scalar sensor, the name and component of a vector sensor such as
+            ("tip", 1), or an array (nt,).
         ax, title, filename, dpi
             As for :meth:`plot`.
         xlabel, ylabel
             Labels of the axes; the names of sensors by default.
         **line
-            Of matplotlib's ``Axes.plot``, as ``color=`` and ``label=``.
+            Options of matplotlib's ``Axes.plot``, such as ``color=`` and ``label=``.
 
         Returns
         -------
@@ -419,8 +417,8 @@ class History(MaterialPoints):
         Parameters
         ----------
         filename
-            Ends with .pvd, for a list and one .vtu for each instant, or with .vtkhdf, for one file
-            with all of them, in which the cells are stored once.
+            Ends with .pvd, for a list and a .vtu file per instant, or with .vtkhdf, for a single
+            file in which the cells are stored once.
         progress
             Show a progress bar: True, False, or None for long runs only.
         subdivide, lagrange, undeformed, recover, fields, precision, encoding

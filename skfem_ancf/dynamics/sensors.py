@@ -135,14 +135,14 @@ class Readings(dict[str, "Array"]):
         raise NameUnknown("sensor", name, self)
 
     def to_csv(self, filename: StrPath) -> FilePath:
-        """Write a table of text, and return its file.
+        """Write the readings to a CSV file, and return its path.
 
-        The columns are ``t`` and the sensors; of one with several numbers ``tip 0``, ``tip 1``.
+        The columns are ``t`` and the sensors; those of a vector are called ``tip 0``, ``tip 1``.
 
         Parameters
         ----------
         filename
-            Ends with .csv; missing folders are made.
+            Ends with .csv; missing folders are created.
         """
         return readings_to_csv(self.t, self, filename)
 

@@ -1,4 +1,4 @@
-"""A member of a state as points, cells and arrays with the names and components that VTK knows."""
+"""A member of a state as points, cells and arrays with VTK's names and components."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .grids import Grid, in_space
 
 logger = logging.getLogger(__name__)
 
-#: Components of VTK's symmetric tensors, and of vectors, in its order.
+#: Components of VTK's symmetric tensors and of vectors, in order.
 COMPONENTS = {6: ("xx", "yy", "zz", "xy", "yz", "xz"), 3: ("x", "y", "z")}
 
-#: Values beside a node that differ by less than this part of the largest are one value.
+#: Relative tolerance, of the largest value, of a field that is continuous between elements.
 ROUND_OFF = 1e-9
 
 
@@ -38,14 +38,14 @@ def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenie
     Parameters
     ----------
     grid, fields
-        The member, and what is known there: arrays are NaN where a field is not.
+        The member and its fields; undefined values are NaN.
     undeformed
-        Put the points at their places in the reference configuration.
+        Points in the reference configuration.
     lenient
-        Fields that a material does not give are NaN; else they raise InputError.
+        Fields that a material does not define are NaN; by default they raise InputError.
     share
-        Neighbouring elements have the points between them in common where the displacement and all
-        fields are continuous; else each element has points of its own.
+        Merge the coincident points of neighbouring elements where the displacement and all fields
+        are continuous; otherwise each element has its own points.
     """
     points, cells = grid.points(undeformed), grid.cells
     data = {field.name: _array(field, grid, lenient) for field in fields}
@@ -57,14 +57,14 @@ def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenie
         values = values.reshape(len(points), -1)
         size = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
         one &= np.all(np.isclose(values[a], values[b], 0.0, ROUND_OFF * size, True), axis=1)
-    number, kept = np.arange(len(points)), np.ones(len(points), dtype=bool)
-    number[b[one]], kept[b[one]] = a[one], False
-    new = np.cumsum(kept) - 1
-    return Body(points[kept], new[number[cells]], {name: x[kept] for name, x in data.items()})
+    number, unique = np.arange(len(points)), np.ones(len(points), dtype=bool)
+    number[b[one]], unique[b[one]] = a[one], False
+    new = np.cumsum(unique) - 1
+    return Body(points[unique], new[number[cells]], {name: x[unique] for name, x in data.items()})
 
 
 def _array(field, grid, lenient):
-    """A field as VTK takes it; NaN where there is none, or where a law has none."""
+    """A field with VTK's components; NaN if it is undefined."""
     n = grid.x.shape[1]
     if field.name == "displacement":
         return in_space(grid.u)
@@ -76,7 +76,7 @@ def _array(field, grid, lenient):
     except InputError as error:
         if not lenient and not isinstance(grid.values, DomainValues):
             raise
-        logger.info("%s is not a number: %s", field.name, error)
+        logger.info("%s is undefined: %s", field.name, error)
         return nan
     if field.components == 1:
         return value
@@ -87,7 +87,7 @@ def _array(field, grid, lenient):
 
 
 def _normal(field, values):
-    """The component of a tensor normal to the plane, (n,); NaN where the law does not say it."""
+    """The out-of-plane component of a tensor, (n,); NaN if the law does not define it."""
     try:
         strain, cable = values.elastic, not values.beam.has_sections
         if field.name == "strain":
@@ -104,9 +104,9 @@ def _normal(field, values):
 
 
 def facts_of(state: Any) -> dict[str, Array]:
-    """What is known of the whole: numbers of named members, load factor, time, and version.
+    """Field data of a file: numbers of named members, load factor, time, version.
 
-    VTK takes ``TimeValue`` for the time of a file.
+    VTK reads ``TimeValue`` as the time of the file.
     """
     from .. import __version__
 

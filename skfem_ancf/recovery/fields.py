@@ -368,7 +368,7 @@ def _table():
     yield Field("cauchy_stress", lambda v: v.sigma, "Cauchy stress", area, True, 3, "global")
 
 
-#: What a force per area is called, by the units of force and length.
+#: Units of force per area, by those of force and length.
 PRESSURES = {("N", "m"): "Pa", ("kN", "m"): "kPa", ("MN", "m"): "MPa", ("N", "mm"): "MPa"}
 
 
@@ -378,7 +378,7 @@ def units_of(state: Any) -> tuple[str, str] | None:
 
 
 def unit_of(field: Field, units: tuple[str, str] | None) -> str:
-    """The unit of a field by those of force and length, or None; "1" of numbers.
+    """The unit of a field from those of force and length; "1" if dimensionless.
 
     Examples
     --------
