@@ -86,12 +86,12 @@ class Descent:
     method.
 
     ``stride`` is the initial radius, the largest change of a scaled DOF. It is halved if
-    corrections reverse, and grows to five times that if they continue. ``turned`` is True once a
-    direction of negative curvature was met.
+    corrections reverse, and grows to five times that if they continue. ``saw_unstable`` is True
+    once a direction of negative curvature was met.
     """
 
     def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
-        self.system, self.turned = system, False
+        self.system, self.saw_unstable = system, False
         self._weights = position_weights(system)
         self._sizes = system.constraints.coordinate_sizes
         self._radius, self._largest = stride, min(5.0 * stride, LARGEST)
@@ -142,7 +142,7 @@ class Descent:
                 down = system.solver.inertia().negative == 0 if system.symmetric else R @ du >= 0.0
             except NO_FACTORS:
                 return None
-            self.turned = self.turned or (shift == 0.0 and not down)
+            self.saw_unstable = self.saw_unstable or (shift == 0.0 and not down)
             return (du, dm) if down and np.max(np.abs(du / self._sizes)) <= self._radius else None
 
         least = 1e-14 * scale
@@ -226,8 +226,8 @@ def way_down(increment: Any) -> tuple[Equilibrium | None, bool]:
             continue
         if (not options.route.proportional or start.load == 0.0
                 or heads_on(system, start, found.u, level)):
-            return found, descent.turned
-        first = (found, descent.turned) if first[0] is None else first
+            return found, descent.saw_unstable
+        first = (found, descent.saw_unstable) if first[0] is None else first
     return first
 
 
@@ -245,7 +245,7 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
         u, multipliers, _ = found
         if verdict(system, u, load, multipliers, increment.time).stability != "unstable":
             return found
-        descent.turned = True
+        descent.saw_unstable = True
         directions = descent.directions(1)
         if not directions:  # the unstable direction does not move the nodes
             break

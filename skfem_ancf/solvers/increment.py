@@ -91,7 +91,7 @@ class Increment:
             raise Unstable("the equilibrium found is unstable", found)
         if (start.rejected and route.proportional and start.load > 0.0
                 and not descent.heads_on(system, start, found.u, self.level)):
-            raise Unstable("the equilibrium found lies on the other side", found)
+            raise Unstable("the equilibrium found lies on the side away from the load", found)
         return found
 
     def reached(self, found: Equilibrium) -> StaticResult:
@@ -247,8 +247,8 @@ class Increment:
                            "loads have no potential by which to find a stable equilibrium")
             return failure.found
         with np.errstate(all="ignore"):
-            found, turned = descent.way_down(self)
-        if turned and not start.doubt:
+            found, saw_unstable = descent.way_down(self)
+        if saw_unstable and not start.doubt:
             start.doubt = (
                 f"the path loses its stability between the load levels {start.load:.6g} and "
                 f"{self.level:.6g}; the solution followed the unstable direction to a stable "

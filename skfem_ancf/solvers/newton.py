@@ -284,7 +284,7 @@ class Search:
                 found = step.solve(self._wanted(route))
             if self._elsewhere(route, found):
                 self.other = self.other or step.reached(found)
-                raise Unstable("the equilibrium found lies on the other side", found)
+                raise Unstable("the equilibrium found lies on the side away from the load", found)
         except Soft:
             self.soft = True
             raise

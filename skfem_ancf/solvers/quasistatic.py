@@ -54,7 +54,7 @@ def first(system: System, t: float, u: Array | None, memory: Array | None, rules
             try:
                 return Instant(t, search.at_rest(), "at rest")
             except StepFailed:
-                logger.debug("t = %.6g: something acts", t)
+                logger.debug("t = %.6g: not at rest", t)
         result = search.find()
     return Instant(t, result, result.attempts[-1].strategy)
 

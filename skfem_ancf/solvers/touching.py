@@ -56,7 +56,7 @@ def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
 
 
 @contextmanager
-def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
+def bound(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
     """Bind flagged points to obstacles without friction inside the block."""
     memory = contacts.tables.memory
     before = memory.copy()
@@ -146,7 +146,7 @@ def _from_soft(climb, _, most=None):
 def _released(climb, flags):
     """The equilibrium on soft obstacles, starting from bound points."""
     contacts = climb.contacts
-    with held(contacts, flags):
+    with bound(contacts, flags):
         found = climb.solve(None, True)
     contacts.harden(soft(contacts, found[0], climb.t), *climb.start)
     if contacts.anchored:
