@@ -1,5 +1,7 @@
 """What frames are made of: lines and names of mesh files, and points that nearly meet."""
 
+import warnings
+
 import meshio
 import numpy as np
 import pytest
@@ -150,6 +152,16 @@ def test_gaps_stay_open_where_that_is_asked_for_or_said():
     assert sway(points, lines, tol=1e-3) == pytest.approx(exact, rel=0.02)
     with pytest.warns(ModelWarning, match="apart, are different nodes"):
         assert sway(points, lines, tol=6e-4) > 3.0 * exact
+
+
+def test_a_node_on_a_line_that_passes_is_said():
+    with pytest.warns(ModelWarning, match=r"node 2 at \(1, 0\) is on line 0 .*not joined"):
+        Frame.from_lines([(0, 0), (2, 0), (1, 0), (1, 1)], [(0, 1), (2, 3)], **OPTIONS)
+    with warnings.catch_warnings():  # lines may cross, and a curve may pass
+        warnings.simplefilter("error")
+        Frame.from_lines([(0, 0), (2, 2), (0, 2), (2, 0)], [(0, 1), (2, 3)], **OPTIONS)
+        Frame.from_lines([(0, 0), (2, 0), (1, 0), (1, -1)], [(0, 1), (2, 3)], curves={
+            0: lambda s: np.array([2 * s, np.sin(np.pi * s)])}, **OPTIONS)
 
 
 def test_numbers_of_points_and_lines_stay_where_some_are_one():

@@ -118,6 +118,28 @@ class FrameGraph:
                 raise MeshError(f"lines {i} and {j} are the same: both join the points "
                                 f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
                                 "them a curve")
+        self._warn_of_passing()
+
+    def _warn_of_passing(self):
+        """Warn of nodes on a straight line between its ends: lines are joined at their ends only.
+        """
+        some = np.setdiff1d(self.kept, list(self.curves))
+        a, b = (self.points[:, ends].T for ends in self.lines[:, some])
+        half = 0.5 * np.hypot(*(b - a).T)
+        used = np.unique(self.lines[:, self.kept])
+        found = scipy.spatial.cKDTree(self.points[:, used].T).query_ball_point(
+            0.5 * (a + b), half * (1.0 - 1e-6))
+        k = np.repeat(np.arange(len(some)), [len(one) for one in found])
+        node = used[np.concatenate([*found, []]).astype(int)]
+        x, along = self.points[:, node].T - a[k], (b - a)[k] / (2.0 * half[k, None])
+        on = np.abs(along[:, 0] * x[:, 1] - along[:, 1] * x[:, 0]) <= max(self.tol,
+                                                                       NEAR * self.size)
+        if np.any(on):
+            node, line = node[on][0], some[k[on][0]]
+            more = f", and {np.sum(on) - 1} other(s) likewise" if np.sum(on) > 1 else ""
+            warn(f"the node {node} at {_at(self.points[:, node])} is on line {line} between its "
+                 f"ends{more}, and not joined to it: divide the line there if it should be",
+                 ModelWarning)
 
     def _merge(self, tol):
         """Merge points within a tolerance into one node."""
