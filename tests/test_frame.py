@@ -515,7 +515,7 @@ def test_what_is_not_held_is_said():
     (lambda f: f.clamp("grund"), NameUnknown, "did you mean 'ground'"),
     (lambda f: f.clamp((0.5, 0.5)), MeshError, "no node .* nearest is number"),
     (lambda f: f.clamp(9), InputError, "number of a node"),
-    (lambda f: f.clamp(0, beam=0), InputError, "held and loaded at nodes"),
+    (lambda f: f.clamp(0, beam=0), InputError, "supported and loaded at nodes"),
     (lambda f: f.clamp(0, thickness="fixed"), NameUnknown, "thickness.*known: 'free'"),
     (lambda f: f.hold(0, "z"), NameUnknown, "what is held"),
     (lambda f: f.clamp(lambda x: x[0] > 7), MeshError, "selects none of the 4 nodes"),

@@ -1,4 +1,4 @@
-"""Loads whose place depends on time: a force that moves along a beam, and a train of them."""
+"""Moving loads: a force that moves along a beam, and a train of forces."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 class TimedLoad(Load):
     """A force that depends on time and not on the displacement.
 
-    A subclass defines :meth:`places` or :meth:`at`. In statics, where time is the load factor, the
-    load is that of the time 1; in :meth:`skfem_ancf.Scene.run` and in motions that of the time.
+    A subclass defines :meth:`places` or :meth:`at`. Single static solutions take the load at time
+    1; :meth:`skfem_ancf.Scene.run` and motions take the current time.
     """
 
     constant = False
@@ -35,11 +35,11 @@ class TimedLoad(Load):
     _last: Any = None
 
     def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
-        """The forces (2,) at a time, each with its element and its reference point (2,)."""
+        """Forces (2,) at time t, each with its element and reference point (2,)."""
         raise NotImplementedError
 
     def at(self, t: float) -> tuple[Array, Spread]:
-        """The force (N,) at a time, and how it is spread over the beam; that of :meth:`places`."""
+        """Force (N,) at time t and its distribution; by default from :meth:`places`."""
         return on_points(self.beam, self.places(t))
 
     @property
@@ -77,8 +77,8 @@ class MovingForce(TimedLoad):
     force
         The force, shape (2,).
     at
-        A function of time that returns the place (x, y) in the reference configuration on which the
-        force acts, shape (2,), on the axis or not; None while it is not on the beam.
+        A function of time that returns the point (x, y) in the reference configuration, shape (2,);
+        None while the force is not on the beam.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
 
@@ -109,22 +109,22 @@ class MovingForce(TimedLoad):
 
 
 class Train(TimedLoad):
-    """Forces at given distances that run along the axis of a beam, from its left end on.
+    """Forces at fixed distances that move along the axis of a beam, from its left end.
 
     Parameters
     ----------
     forces
         The force of each axle, shape (n,), along ``direction``.
     distances
-        How far each is behind the first, along the axis, shape (n,).
+        Distance of each from the first along the axis, shape (n,).
     speed
         Length per time, positive.
     beam
-        The beam, its name or its number.
+        The beam, its name or number.
     start
-        Where the first axle is at the time 0, along the axis.
+        Position of the first axle along the axis at time 0.
     direction
-        Of the forces, shape (2,).
+        Direction of the forces, shape (2,).
     amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
 

@@ -1,4 +1,4 @@
-"""A series of states in time for ParaView."""
+"""Time series of states for ParaView."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ logger = logging.getLogger(__name__)
 
 
 class PvdWriter(SeriesWriter):
-    """Writes one .vtu a frame, and a .pvd that lists them with their times.
+    """Writes one .vtu file for each frame, and a .pvd file that lists them with their times.
 
     Both are complete after every :meth:`add`, so that ParaView can follow a run. Frames are called
-    ``stem_00000.vtu`` and so on and lie beside the .pvd; outlines of obstacles are a second part.
+    ``stem_00000.vtu`` and so on, in the folder of the .pvd; outlines of obstacles are a second
+    part.
 
     Parameters
     ----------
     filename
-        Path that ends with .pvd. Missing folders are made; an older file is replaced by the first
-        frame.
+        Path that ends with .pvd. Missing folders are created; the first frame replaces an older
+        file.
     subdivide, lagrange, undeformed, recover, fields, precision, encoding
         As for :func:`~skfem_ancf.io.vtu.save_vtu`.
 
@@ -64,14 +65,14 @@ class PvdWriter(SeriesWriter):
             logger.info("wrote %s: %d frames", self.path, len(self.frames))
 
     def add(self, state: Any, t: float) -> Path:
-        """Write a frame, and return its file.
+        """Write a frame; returns its file.
 
         Parameters
         ----------
         state
-            A State, or anything with its ``beams`` and ``u_of``.
+            A State, or an object with ``beams`` and ``u_of``.
         t
-            Its time, later than that of the frame before.
+            Its time, later than that of the previous frame.
         """
         t = require_next(state, t, self.frames[-1][0] if self.frames else None)
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"

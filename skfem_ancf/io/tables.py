@@ -1,4 +1,4 @@
-"""Fields and readings of sensors as labelled arrays of xarray, and as text."""
+"""Fields and sensor data as xarray data sets, and as text."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ ENERGIES = "strain_energy", "kinetic_energy", "potential_energy", "total_energy"
 def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = None,
               line: int | None = None, subdivide: tuple[int, int] = (8, 4),
               recover: bool = True) -> Any:
-    """Fields as an ``xarray.Dataset``, with the names of files, and units where they are known.
+    """Fields as an ``xarray.Dataset``, with the names of files, and units if they are known.
 
-    Its dimensions are "point", "component" (x, y) of vectors, "tensor" (xx, yy, xy), and of a
-    History first "time". Coordinates "x" and "y" are the places of the points in the reference
-    configuration, in the body also "member", the name of their beam.
+    Its dimensions are "point", "component" (x, y) of vectors, "tensor" (xx, yy, xy), and for a
+    History first "time". Coordinates "x" and "y" are reference positions; points all over the body
+    have the coordinate "member", the name of their beam.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
         Points of the body as for :meth:`State.displacement <skfem_ancf.State.displacement>`, shape
         (2,) or (2, n); by default points all over it, as many as ``subdivide`` says.
     subdivide, recover
-        Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+        As for :func:`skfem_ancf.io.vtu.save_vtu`.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
 
 
 def _of_body(state, wanted, subdivide, recover, lenient):
-    """Coordinates of points all over the body, and fields there by name."""
+    """Coordinates of points all over the body, and fields by name."""
     found = grids(state, subdivide, False, recover)
     bodies = [body_of(grid, wanted, True, lenient, share=False) for grid in found]
     x = np.concatenate([body.points for body in bodies]).T
@@ -108,20 +108,20 @@ def _of_body(state, wanted, subdivide, recover, lenient):
 
 
 def _rows(field, values):
-    """Values at points with the points first, (n,) or (n, components)."""
+    """Values with the points first, (n,) or (n, components)."""
     return np.reshape(values, -1) if field.components == 1 else (
         np.reshape(values, (field.components, -1)).T)
 
 
 def _about(field, units):
-    """Attributes of an array: what it is, and its unit if it is known."""
+    """Attributes of an array: its description, and its unit if known."""
     name = re.sub(r"\s*\$[^$]*\$", "", field.title) or field.name
     unit = "1" if field.unit == "1" else "" if units is None else unit_of(field, units)
     return {"long_name": name} | ({"units": unit} if unit else {})
 
 
 def find_xarray() -> Any:
-    """The module xarray; raises MissingExtra."""
+    """The module xarray, or MissingExtra."""
     try:
         import xarray
     except ImportError:
@@ -137,7 +137,7 @@ def readings_to_xarray(t: Array, values: Mapping[str, Array]) -> Any:
 
 
 def readings_to_csv(t: Array, values: Mapping[str, Array], filename: StrPath) -> Path:
-    """Write a column for the time and one for each component of arrays (nt, ...) by name."""
+    """Write columns for the time and each component of arrays (nt, ...) by name."""
     path, names, columns = require_path("filename", filename, (".csv",)), ["t"], [t]
     for name, x in values.items():
         x = x.reshape(len(t), -1)

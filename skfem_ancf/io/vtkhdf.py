@@ -1,4 +1,4 @@
-"""A series of states in one temporal VTKHDF file."""
+"""Time series of states in one temporal VTKHDF file."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from ..recovery.fields import find_fields
 from ..recovery.grids import CELL_TYPES
 from .vtu import PRECISIONS, SeriesWriter, body_fields, require_next, save_obstacles
 
-#: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose
-#: writing fails, and takes the process with it.
+#: Bytes of a spare file, deleted if the disk is full: HDF5 aborts the process if it cannot close a
+#: file.
 SPARE = 2**22
 
 
 class VtkHdfWriter(SeriesWriter):
-    """Writes a series into one file, in which the cells are stored once.
+    """Writes a series into one file, which stores the cells once.
 
-    The file appears under its name when the series is closed, as the end of a ``with`` block does.
+    The file appears under its name when the series is closed, as at the end of a ``with`` block.
 
     Parameters
     ----------
     filename
-        Path that ends with .vtkhdf. Missing folders are made.
+        Path that ends with .vtkhdf. Missing folders are created.
     subdivide, lagrange, undeformed, recover, fields, precision
         As for :func:`~skfem_ancf.io.vtu.save_vtu`.
 
     Raises
     ------
     FileError
-        If the file cannot be written; what was there stays.
+        If the file cannot be written; an older file is kept.
     MissingExtra
         If h5py is not installed.
 
@@ -62,7 +62,7 @@ class VtkHdfWriter(SeriesWriter):
             for beside in self.path, self.path.with_suffix(".spare"):
                 self._made.append(new_file(beside))
             self._temporary, self._spare = self._made
-            self._spare.write_bytes(os.urandom(SPARE))  # which no file system makes shorter
+            self._spare.write_bytes(os.urandom(SPARE))  # incompressible
             self._file = files.File(self._temporary, "w", rdcc_nbytes=0)  # chunks are whole frames
         except BaseException as error:
             self._remove()
@@ -97,18 +97,18 @@ class VtkHdfWriter(SeriesWriter):
                 path.unlink()
 
     def _cannot(self, error):
-        why = os.strerror(error.errno) if error.errno else error  # HDF5 says it in ten lines
+        why = os.strerror(error.errno) if error.errno else error  # HDF5's text has ten lines
         return FileError(f"cannot write {str(self.path)!r}: {why}")
 
     def add(self, state: Any, t: float) -> Path:
-        """Append a frame, and return the file that there will be.
+        """Append a frame; returns the path of the file.
 
         Parameters
         ----------
         state
-            A State, or anything with its ``beams`` and ``u_of``.
+            A State, or an object with ``beams`` and ``u_of``.
         t
-            Its time, later than that of the frame before.
+            Its time, later than that of the previous frame.
         """
         t = require_next(state, t, self.times[-1] if self.times else None)
         body = body_fields(state, **self.options, share=False)  # as many in all frames
@@ -170,7 +170,7 @@ class VtkHdfWriter(SeriesWriter):
 
 
 def _cells(body):
-    """What is stored once of a body: connectivity, offsets and types of cells, their numbers."""
+    """Data stored once: connectivity, offsets and types of cells, their numbers."""
     sizes = np.concatenate([np.full(len(c), c.shape[1]) for _, c in body.cells])
     return (np.concatenate([c.ravel() for _, c in body.cells]).astype("i8"),
             np.append(0, np.cumsum(sizes)).astype("i8"),

@@ -1,4 +1,4 @@
-"""The deformed body with its strains and stresses, as points and cells, and as a .vtu file."""
+"""The deformed body with its fields as points and cells, and as a .vtu file."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 
 
 class BodyFields(NamedTuple):
-    """The body of a state on points: the arguments of a ``meshio.Mesh``.
+    """The body of a state: the arguments of a ``meshio.Mesh``.
 
     ``points`` have the shape (n, 3). ``cells`` has for each beam its cell type and its cells, as
-    rows of point numbers; of each rigid body its outline; of each domain its triangles or quads.
-    ``point_data`` has fields by name, (n,), (n, 3) of vectors, with a third component of zero, and
-    (n, 6) of symmetric tensors (xx, yy, zz, xy, yz, xz). ``cell_data`` has the numbers ``beam`` and
-    ``element``, one array for each beam, ``field_data`` what is known of the whole.
+    rows of point numbers; for each rigid body its outline; for each domain its triangles or quads.
+    ``point_data`` has fields by name, (n,), (n, 3) for vectors, with a third component of zero, and
+    (n, 6) for symmetric tensors (xx, yy, zz, xy, yz, xz). ``cell_data`` has the numbers ``beam``
+    and ``element``, one array for each beam, ``field_data`` global data.
     """
 
     points: np.ndarray
@@ -55,7 +55,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     state, subdivide, lagrange, undeformed, recover, fields
         As for :func:`save_vtu`.
     share
-        False for elements with points of their own, of which there are as many in each state.
+        False for elements without common points, so that all states have equally many.
 
     Examples
     --------
@@ -87,9 +87,9 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              fields: Any = None, precision: str = "double", encoding: Any = None) -> Path:
     """Write the deformed body of a state for ParaView.
 
-    All beams go into one file, which replaces an older one only once it is complete. Neighbouring
-    elements share the points between them where all fields of the file agree to round-off, as
-    recovered fields do; where one jumps, each has points of its own.
+    All beams go into one file, which replaces an older one once it is complete. Neighbouring
+    elements share points where all fields of the file agree to round-off, as recovered fields do;
+    where one jumps, the points are doubled.
 
     =============  ==========================================================================
     on points      meaning
@@ -102,32 +102,29 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     von_mises      von Mises stress
     =============  ==========================================================================
 
-    What a law does not say, as the component zz in plane strain, is NaN. The file says the load
-    factor, the time and the version, the numbers of members that have names, and units
-    (:meth:`Scene.units <skfem_ancf.Scene.units>`), as VTK's field data and ``UNITS_LABEL``.
-
-    ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
-    outline, numbered behind the beams, without strain and stress (NaN). A domain has its
-    own cells, halved, and its strain in global axes. The outlines of obstacles
-    go into a file of lines beside it, ``name_obstacles``, with their numbers in ``obstacle``.
+    Undefined values, as the component zz in plane strain, are NaN. VTK's field data contain the
+    load factor, the time, the version and the numbers of named members; ``UNITS_LABEL`` contains
+    units (:meth:`Scene.units <skfem_ancf.Scene.units>`). ``beam`` and ``element``, on cells, are
+    their numbers. A rigid body is the polygon of its outline, numbered after the beams, with NaN
+    for strain and stress. A domain has its cells, halved, and its strain in global axes. Outlines
+    of obstacles are lines in a second file, ``name_obstacles``, with numbers ``obstacle``.
 
     Parameters
     ----------
     state
-        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
+        A :class:`~skfem_ancf.results.State`, or an object with ``beams`` and ``u_of``.
     filename
-        Path that ends with .vtu (or .vtk). Missing folders are made.
+        Path that ends with .vtu (or .vtk). Missing folders are created.
     subdivide
         Number of straight quads along and across each element.
     lagrange
         Write each element as one VTK_LAGRANGE_QUADRILATERAL of the degree of the axis, or N if that
-        is larger: the deformed geometry is exact up to degree 10, the largest that VTK evaluates,
-        but for cables, whose sections follow the unit normal.
+        is larger: the deformed geometry is exact up to degree 10, the limit of VTK, except for
+        cables, whose sections follow the unit normal.
     undeformed
-        Put the points at their undeformed places. ParaView's filter "Warp By Vector" then moves
-        them by any multiple of ``displacement``.
+        Write reference positions; ParaView's filter "Warp By Vector" applies ``displacement``.
     recover
-        Recovered strain and stress where the state has them; False for those of the elements.
+        Recovered strain and stress if available; False for those of the elements.
     fields
         Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; those of the table
         by default.
@@ -166,7 +163,7 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
 
 
 def save_obstacles(walls: list[Array], path: Path, dtype: Any = np.float64) -> None:
-    """Write the outlines of obstacles, (m, 2, 2) each, into a file beside that of the body."""
+    """Write the outlines of obstacles, (m, 2, 2) each, beside the file of the body."""
     if not walls:
         return
     points = in_space(np.concatenate(walls).reshape(-1, 2).T)
@@ -190,7 +187,7 @@ def _write(path, body, dtype, units=()):
 
 
 def _completed(text, body, units):
-    """A file of meshio with what it does not write: field data, names of components, units."""
+    """Add field data, names of components and units, which meshio does not write."""
     facts = "".join(
         f'<DataArray type="{"Int64" if x.dtype.kind == "i" else "Float64"}" Name={quoteattr(name)}'
         f' NumberOfTuples="{len(x)}" format="ascii">{" ".join(map(repr, x.tolist()))}</DataArray>\n'
@@ -212,7 +209,7 @@ def _completed(text, body, units):
 
 
 class SeriesWriter:
-    """What writers of a series share, besides ``add(state, t)`` for a frame."""
+    """Base class of writers of a series; subclasses define ``add(state, t)`` for a frame."""
 
     def __enter__(self) -> Any:
         return self
@@ -223,7 +220,7 @@ class SeriesWriter:
         Parameters
         ----------
         states
-            Each a State with a time ``t``.
+            States with a time ``t``.
         done
             Called after each of them.
         """
@@ -233,7 +230,7 @@ class SeriesWriter:
 
 
 def require_next(state: Any, t: Any, before: float | None) -> float:
-    """The time of the next frame of a series after that of the one before, which may be None."""
+    """The time of a frame, later than ``before``, which may be None."""
     require_like("state", state, "State", "beams", "u_of")
     t = require_finite_scalar("t", t)
     if before is not None and t <= before:

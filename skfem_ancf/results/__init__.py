@@ -1,4 +1,4 @@
-"""Results: what a solution knows."""
+"""Results: states, modes and paths."""
 
 from .state import Reaction, State
 

@@ -1,4 +1,4 @@
-"""What acts on a beam in a state, as :mod:`skfem_ancf.recovery` takes it."""
+"""Actions on the beams of a state, for :mod:`skfem_ancf.recovery`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..recovery.section_forces import NotRecovered, SectionForces
 
 
 def stations(state: Any) -> list[list[float]]:
-    """Where supports and joints act on each beam: axial coordinates element + xi, a list a beam."""
+    """Axial coordinates (element + xi) of supports and joints, a list for each beam."""
     system = state.system
     fixed = np.zeros(system.N, dtype=bool)
     fixed[system.constraints.fixed] = True
@@ -42,7 +42,7 @@ def stations(state: Any) -> list[list[float]]:
 
 
 def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[float]]:
-    """Densities of force elements that act all along a beam, and the stations of other parts."""
+    """Densities of distributed force elements, and the axial coordinates of concentrated ones."""
     system = state.system
     sampled: list[Sampled] = []
     places: list[float] = []
@@ -55,7 +55,7 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
                                                 state.u - state.base.u))
     for element in elements:
         if element.along is None:
-            raise NotRecovered(f"how {element!r} acts along the beam is not known to it")
+            raise NotRecovered(f"the distribution of {element!r} along the beam is not known")
         where, facets, at = element.along
         if where is not beam:
             continue
@@ -71,9 +71,9 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
 
 def recover(state: Any, number: int, at: list[float], u: Array,
             unit: Any) -> Recovery | NotRecovered:
-    """The recovered field of a beam, or why there is none; ``u`` (N,) may be a step.
+    """The recovered field of a beam, or the reason why there is none.
 
-    Supports and joints are at its :func:`stations`; ``unit`` is what factors of loads are times.
+    ``u`` (N,) may be a step; ``unit`` multiplies load factors.
     """
     beam, system = state.beams[number], state.system
     if state.base is not None and not np.iscomplexobj(unit):

@@ -1,4 +1,4 @@
-"""What enters the equations of a scene from outside: states and degrees of freedom."""
+"""Checks of states and displacements for the equations of a scene."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..core.types import Array
 from ..equations.system import System
 from .state import State
 
-#: What two meshes have in common whose states may be exchanged, and what is said where not.
+#: What meshes must have in common to exchange states, with messages.
 _GEOMETRY = {
     "nelements": "its mesh has {} elements, that of the scene {}",
     "height": "its height is {:.9g}, that of the scene {:.9g}",
@@ -23,7 +23,7 @@ _GEOMETRY = {
 
 
 def difference(a: Beam, b: Beam) -> str | None:
-    """Why degrees of freedom of a beam mean something else on that of the scene; or None."""
+    """Why degrees of freedom of a beam do not fit that of the scene; None if they do."""
     if a is b or (a.mesh is b.mesh and a.element is b.element):
         return None
     if repr(a.element) != repr(b.element) or not _same(a.element.doflocs, b.element.doflocs):
@@ -40,7 +40,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
-    """The displacement (N,) of a State, ``name`` in messages, for the equations of a scene."""
+    """Displacement (N,) of a State for a scene; ``name`` is for messages."""
     if not isinstance(state, State):
         raise InputError(f"{name} is a State, as solve_static returns it, got "
                          f"{type(state).__name__}; scene.state(u) makes one of coordinates "
@@ -65,7 +65,7 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
 
 
 def configuration(system: System, state: State) -> State:
-    """A State with its multipliers, as one of the equations of a scene."""
+    """A State with its multipliers, for a scene."""
     u = displacement(system, state, "state")
     if state.system is system:
         return state

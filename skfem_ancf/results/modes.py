@@ -1,4 +1,4 @@
-"""Natural frequencies with their shapes, and linear buckling loads."""
+"""Natural frequencies and modes, and linear buckling loads."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .state import State
 
 #: Round-off of the frequency of a rigid motion, over that of the slowest bending.
 ROUND_OFF = 1e-7
-#: A velocity at which what is quadratic in it can be left out.
+#: A velocity with negligible quadratic terms.
 SLOW = 1e-6
 
 
@@ -22,22 +22,21 @@ SLOW = 1e-6
 class Modes(NearMisses):
     """Natural frequencies and shapes, the lowest first.
 
-    A motion ``shape * exp(i omega t)`` has ``omega^2`` as its eigenvalue. Where all loads have a
-    potential every eigenvalue is real. Loads that follow the body may cause complex pairs: two
-    motions that oscillate, one of which grows, which is flutter.
+    A motion ``shape * exp(i omega t)`` has the eigenvalue ``omega^2``, which is real if all loads
+    have a potential. Follower forces may cause complex pairs: two oscillations, one of which grows
+    (flutter).
 
     Attributes
     ----------
     frequencies
-        Angular frequencies in rad/s, shape (k,): the square roots of the eigenvalues. That of a
-        negative eigenvalue, a motion that leaves the state without oscillating, is given as a
-        negative number: minus its rate of growth. With :attr:`flutter` the array is complex: the
-        real part is the angular frequency, and minus the imaginary part the rate of growth.
+        Angular frequencies in rad/s, shape (k,): square roots of the eigenvalues. For a negative
+        eigenvalue (divergence) minus the growth rate. With :attr:`flutter` the array is complex:
+        the real part is the angular frequency, and minus the imaginary part the growth rate.
     shapes
         Displacements of the degrees of freedom, shape (k, N), of unit modal mass; complex with
         flutter.
     state
-        The state about which the beam vibrates.
+        The state of linearisation.
     eigenvalues
         ``omega^2``, shape (k,), complex.
     """
@@ -52,7 +51,7 @@ class Modes(NearMisses):
 
     @property
     def flutter(self) -> bool:
-        """True if an oscillation grows: there is a complex pair among the eigenvalues."""
+        """True if an oscillation grows: there is a complex pair of eigenvalues."""
         return bool(np.any(self.eigenvalues.imag != 0.0))
 
     @property
@@ -62,11 +61,11 @@ class Modes(NearMisses):
 
     @property
     def damping_ratios(self) -> np.ndarray:
-        """The damping ratio of each motion, shape (k,): what it decays with over its frequency.
+        """Damping ratio of each mode, shape (k,).
 
-        ``shape . D shape / (2 omega)`` with what resists small velocities: exact for Rayleigh's
-        and modal damping and damped materials of one kind, of first order in the ratios where
-        damping joins motions of different shape. NaN where a motion does not oscillate.
+        ``shape . D shape / (2 omega)`` with the damping matrix D: exact for Rayleigh and modal
+        damping and for viscoelastic materials of one kind, of first order where damping couples
+        modes. NaN where a motion does not oscillate.
 
         Examples
         --------
@@ -92,15 +91,15 @@ class Modes(NearMisses):
         return out
 
     def mode(self, i: int, amplitude: float) -> State:
-        """The state displaced along a shape, to plot or save; along the real part of a complex one.
+        """The state displaced along a mode (its real part), to plot or save.
 
-        It is linearised about :attr:`state`, and with the inertia of the vibration in equilibrium.
+        It is linearised about :attr:`state`, in equilibrium with the inertia of the vibration.
         About the reference configuration its strain energy is ``(omega amplitude)^2 / 2``.
 
         Parameters
         ----------
         i, amplitude
-            Number of the shape, negative ones from the end; what it is multiplied by.
+            Number of the mode, negative ones from the end; factor.
         """
         i = require_index("i", i, len(self.shapes))
         amplitude = require_finite_scalar("amplitude", amplitude)
@@ -112,7 +111,7 @@ class Modes(NearMisses):
                      multipliers=self.state.multipliers + self._joint_forces(d, inertia))
 
     def _joint_forces(self, d, inertia):
-        """What a displacement and its inertia change the multipliers of the joints by, (m,)."""
+        """Changes of the multipliers due to a displacement and its inertia, (m,)."""
         state, system = self.state, self.state.system
         if not system.constraints.m:
             return np.zeros(0)
@@ -135,8 +134,8 @@ class Buckling(NearMisses):
     shapes
         Displacements of the degrees of freedom, shape (k, N).
     follower : bool
-        The loads follow the body and have no potential: it may flutter at a lower factor, which
-        these of divergence do not say; :func:`modes` about a state under load does.
+        The loads have no potential: these are factors of divergence, and flutter is possible below
+        them; see ``scene.modes`` about a loaded state.
     """
 
     factors: np.ndarray
@@ -149,5 +148,5 @@ class Buckling(NearMisses):
 
 
 def _listed(numbers):
-    """The first of some numbers, for people."""
+    """The first of some numbers, as text."""
     return ", ".join(f"{x:.6g}" for x in numbers[:6]) + ", ..." * (len(numbers) > 6)

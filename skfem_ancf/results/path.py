@@ -1,4 +1,4 @@
-"""An equilibrium path as a result."""
+"""Equilibrium paths."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class CriticalPoint:
     Attributes
     ----------
     kind : str
-        "limit", where the load turns, or "bifurcation", where another path crosses.
+        "limit" (extremum of the load) or "bifurcation".
     load, arc
         Load factor, and arc length along the path.
     state : State
@@ -34,7 +34,7 @@ class CriticalPoint:
     change
         Change of the number of negative eigenvalues; None if it is not known.
     critical
-        What the solver found, from which ``scene.continuation(branch=...)`` goes on.
+        The solver's data for ``scene.continuation(branch=...)``.
     """
 
     kind: str
@@ -50,14 +50,14 @@ class CriticalPoint:
 
 
 class Path(MaterialPoints):
-    """The equilibria that a continuation found.
+    """The equilibria of a continuation.
 
     Parameters
     ----------
     system
         The :class:`~skfem_ancf.equations.system.System`.
     points, critical
-        What :func:`skfem_ancf.solvers.continuation.continuation` returned.
+        Results of :func:`skfem_ancf.solvers.continuation.continuation`.
 
     Attributes
     ----------
@@ -69,10 +69,9 @@ class Path(MaterialPoints):
         Whether each equilibrium is stable, and the number of negative eigenvalues of its tangent;
         None where the loads have no potential.
     error
-        Size of the last correction of each point in the energy norm, relative to the work done,
-        shape (n,): all of them are equilibria to this accuracy, however long the steps.
+        Last correction of each point in the energy norm relative to the work done, shape (n,).
     critical_points : list of CriticalPoint
-        Limit and bifurcation points in the order of the path, each solved for as a point of it.
+        Limit and bifurcation points in the order of the path, converged as points of it.
     """
 
     def __init__(self, system: System, points: Sequence[Any],
@@ -118,14 +117,14 @@ class Path(MaterialPoints):
         return np.zeros_like(self.u)
 
     def limit_points(self) -> Array:
-        """Load factors at the turning points of the load, in the order of the path."""
+        """Load factors at limit points, in the order of the path."""
         return self._loads("limit")
 
     def bifurcation_points(self) -> Array:
-        """Load factors where other paths cross this one, in its order.
+        """Load factors at bifurcations, in the order of the path.
 
         :attr:`critical_points` has their states and modes; ``scene.continuation(branch=...)`` with
-        one of them follows the other path.
+        one of them follows the branch.
         """
         return self._loads("bifurcation")
 

@@ -1,4 +1,4 @@
-"""Displacement, position and velocity of material points, of one state or of many."""
+"""Displacement, position and velocity of material points, for states, motions and paths."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from ..equations.system import System
 
 
 class MaterialPoints(NearMisses):
-    """What a solution knows of material points by its degrees of freedom alone.
+    """Methods for material points that use degrees of freedom only.
 
-    Arrays of a motion and of a path have the instants, or the points of the path, as their first
-    axis.
+    For a motion or a path the first axis of arrays is that of instants, or of points of the path.
 
     Other Parameters
     ----------------
     point
-        A material point by its place (x, y) in the reference configuration, shape (2,); or many: a
-        list of points, or an array (2, n) whose columns are points; of displacement, position and
-        velocity also a RigidBody for its centre of mass.
+        A material point (x, y) in the reference configuration, shape (2,); or many: a list of
+        points, or an array (2, n) whose columns are points; for displacement, position and velocity
+        also a RigidBody for its centre of mass.
     beam
-        The beam or rigid body, its name or its number; found for each point if it is not given.
+        Beam or rigid body, name or number; by default found for each point.
     line
-        The number of the line, of a frame; found for each point if it is not given. A point that is
-        in several lines or beams is one of that whose axis is nearest, here as in all loads and
-        probes; of the first of them if several are as near, as at a node.
+        Number of the line of a frame; by default found for each point. A point in several lines or
+        beams belongs to the one with the nearest axis, here as in all loads and probes; to the
+        first of them if several are equally near, as at a node.
     body
-        A RigidBody, its name or its number.
+        A RigidBody, its name or number.
     """
 
     system: System
@@ -40,7 +39,7 @@ class MaterialPoints(NearMisses):
 
     @property
     def _places(self) -> Array:
-        """Displacement of the degrees of freedom, of a linear solution a step."""
+        """Displacement of the degrees of freedom; for a linear solution a step."""
         return self.u
 
     def _dofs(self, member):
@@ -49,17 +48,11 @@ class MaterialPoints(NearMisses):
                                        member))
 
     def u_of(self, beam: WhichMember) -> Array:
-        """Coordinate displacements (..., n) of one beam or rigid body."""
+        """Displacements of the DOFs (..., n) of one beam or rigid body."""
         return self.u[..., self._dofs(beam)]
 
     def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
-        """Displacement of material points, (..., 2) or (..., 2, n).
-
-        Raises
-        ------
-        MeshError
-            If a point is outside the body.
-        """
+        """Displacement of material points, (..., 2) or (..., 2, n); MeshError outside the body."""
         return first_order(self.system.points.find(point, beam, line).displacement(self._places))
 
     def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
@@ -72,12 +65,12 @@ class MaterialPoints(NearMisses):
         return self.system.points.find(point, beam, line).velocity(self.u, self.v)
 
     def angle(self, body: WhichMember) -> Any:
-        """The angle (...) of a rigid body, in radians, no more than pi from that of the start."""
+        """Rotation (...) of a rigid body in radians, at most pi in magnitude."""
         found = require_body(self.system, body)
         return first_order(found.angle_at(self._places[..., self.system.of(found)]))
 
     def angular_velocity(self, body: WhichMember) -> Any:
-        """The angular velocity (...) of a rigid body, counterclockwise; zero without motion."""
+        """Angular velocity (...) of a rigid body, counterclockwise; zero without motion."""
         found = require_body(self.system, body)
         s = self.system.of(found)
         return found.angular_velocity(self.u[..., s], self.v[..., s])

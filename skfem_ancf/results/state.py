@@ -1,4 +1,4 @@
-"""What a solution knows: positions, strains, stresses, energies, reactions."""
+"""States: positions, strains, stresses, energies, reactions of a configuration."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ logger = logging.getLogger(__name__)
 
 
 class Reaction(NamedTuple):
-    """What a support does to the beam.
+    """Reaction of a support on the beam.
 
     Attributes
     ----------
     force
-        Resultant, shape (2,); of a History (nt, 2), and what follows (nt,).
+        Resultant, shape (2,); for a History (nt, 2), and the others (nt,).
     moment
-        Moment about the deformed position of the support's axis point, counterclockwise; of a
-        rigid body about its centre of mass, of a domain about the mean of the nodes held.
+        Moment about the deformed position of the support's axis point, counterclockwise; for a
+        rigid body about its centre of mass, for a domain about the mean of the fixed nodes.
     coordinates
-        The force on each fixed coordinate by name, summed over the nodes.
+        Generalised force of each fixed degree of freedom by name, summed over the nodes.
     """
 
     force: np.ndarray
@@ -82,7 +82,7 @@ class State(Immutable, MaterialPoints):
     load
         Load factor.
     converged, iterations, message, steps
-        How the solver got here; ``steps`` holds the residuals of every iteration.
+        Status of the solver; ``steps`` has the residuals of every iteration.
     multipliers
         Lagrange multipliers of the joints, shape (m,).
     t
@@ -90,25 +90,24 @@ class State(Immutable, MaterialPoints):
     acceleration
         Of the degrees of freedom, shape (N,), in a motion and of a mode; else None.
     doubt : str
-        Where and how the way to it left the path from the reference configuration; empty if it did
+        Where and how the solution left the path from the reference configuration; empty if it did
         not.
     memory
-        What load steps have left behind at obstacles, shape (n,), or None.
+        History data of load steps at obstacles, shape (n,), or None.
     base : State or None
-        The state about which this one is linearised: of a linear solution that without load, of a
-        mode that which vibrates. All that is asked is of first order in the difference: strain,
-        stress, section forces, rotations, reactions; the strain energy of second order. None of a
-        state of large displacements.
+        The state of linearisation, for linear solutions and modes: strain, stress, section
+        forces, rotations and reactions are of first order in the difference, the strain energy of
+        second order. None for a state of large displacements.
 
     Other Parameters
     ----------------
     recover
-        The recovered field, see :mod:`skfem_ancf.recovery.recovered`, where there is one
-        (:attr:`recovered`); False for that of the element at the point.
+        Use the recovered field, see :mod:`skfem_ancf.recovery.recovered`, if there is one
+        (:attr:`recovered`); False for that of the element.
     field
-        A field of :data:`skfem_ancf.recovery.fields.FIELDS`, by its name, or a function or Field.
+        The name of a field in :data:`skfem_ancf.recovery.fields.FIELDS`, or a function or Field.
     filename, options
-        The file, and options of the function that is named.
+        The file, and options of the named function.
     """
 
     system: System
@@ -151,7 +150,7 @@ class State(Immutable, MaterialPoints):
         self._motion, self._origin = motion, origin
 
     def replace(self, **changes: Any) -> State:
-        """The same state with other attributes, as ``replace(message="guess")``.
+        """A copy with changed attributes, as ``replace(message="guess")``.
 
         ``error_estimate``, ``scene`` and ``refinements`` are those of an adaptive solution.
 
@@ -218,9 +217,7 @@ class State(Immutable, MaterialPoints):
 
     @cached_property
     def checks(self) -> Checks:
-        """How far the state is from what law and mesh are good for: a
-        :class:`~skfem_ancf.results.checks.Checks`.
-        """
+        """Checks of the law's range and the mesh, a :class:`~skfem_ancf.results.checks.Checks`."""
         return check(self)
 
     @property
@@ -235,7 +232,7 @@ class State(Immutable, MaterialPoints):
 
     @property
     def q(self) -> Array:
-        """Degrees of freedom in place, beam after beam, shape (N,)."""
+        """Degrees of freedom in the deformed configuration, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.system.members]) + self.u
 
     @property
@@ -244,14 +241,16 @@ class State(Immutable, MaterialPoints):
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
     def _contact_memory(self):
-        """A context in which the obstacles have the memory of this state."""
+        """A context in which the obstacles have the history data of this state."""
         return self.system.forces.contacts.lent(self.memory)
 
     # linear solutions
 
     @cached_property
     def _places(self) -> Array:
-        """Where fields are evaluated, (N,): of a linear solution a step from its base."""
+        """Displacement at which fields are evaluated, (N,); for a linear solution a step from its
+        base.
+        """
         return self.u if self.base is None else step(self.base.u, self.u)
 
     def _places_of(self, beam):
@@ -259,18 +258,18 @@ class State(Immutable, MaterialPoints):
 
     @property
     def _unit(self):
-        """What factors of loads are times: of a linear solution from rest a step, else 1."""
+        """Factor of load factors: a step for a linear solution from rest, else 1."""
         base = self.base
         return 1.0 if base is None or base.load or base.u.any() else step(0.0, 1.0)
 
     @property
     def _acted(self):
-        """Where forces act, as a displacement (N,): in linear theory where the base is."""
+        """Displacement at which forces act, (N,): that of the base in linear theory."""
         return self.u if self.base is None else self.base.u
 
     @property
     def _time(self):
-        """The time at which joints are asked: in statics the load factor."""
+        """The time for joints: in statics the load factor."""
         return self.load if self.t is None else self.t
 
     # at material points
@@ -279,12 +278,12 @@ class State(Immutable, MaterialPoints):
                line: int | None = None) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
-        Of a linear solution the linear strain.
+        For a linear solution the linear strain.
 
         Raises
         ------
         InputError
-            If several lines or beams are as near to a point, as at a node: their strains differ.
+            If several lines or beams are equally near to a point, as at a node.
         """
         at, numbers = self._find(point, beam, recover, line)
         values = at.gather([part.strain(self._places, self._recovery_of(k) if recover else None)
@@ -300,8 +299,7 @@ class State(Immutable, MaterialPoints):
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
-        """Any field at material points, () or (n,); vectors and tensors have their components
-        first.
+        """Any field at material points, () or (n,); components of vectors and tensors come first.
 
         Examples
         --------
@@ -322,7 +320,7 @@ class State(Immutable, MaterialPoints):
                           for k, part in zip(numbers, at.parts)])
 
     def _find(self, point, beam, recover, line):
-        """Points, and the numbers of the beams of their parts."""
+        """Points, and the numbers of their beams."""
         require_flag("recover", recover)
         at = self.system.points.find(point, beam, line, ask=True)
         return at, [part.number for part in at.parts]
@@ -333,7 +331,7 @@ class State(Immutable, MaterialPoints):
         Parameters
         ----------
         beam, part
-            One of the beams, and points numbered by its degrees of freedom alone.
+            One of the beams, and its points.
         """
         return Values(part, self._places_of(beam), partial(self.recovery, beam) if recover else
                       None, self._eigenstrains(beam))
@@ -348,12 +346,12 @@ class State(Immutable, MaterialPoints):
     def recovery(self, beam: WhichBeam = None) -> Recovery | None:
         """The recovered field of a beam, a :class:`~skfem_ancf.recovery.recovered.Recovery`.
 
-        None where the field cannot be recovered; :attr:`recovered` says why.
+        None where the field cannot be recovered; :attr:`recovered` has the reason.
         """
         return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
 
     def _recovery_of(self, k, fields=True):
-        """That of beam ``k``, or with fields=False the one that has section forces at least."""
+        """:meth:`recovery` of beam ``k``; with ``fields=False`` section forces suffice."""
         if k not in self._recoveries:
             self._recoveries[k] = recover(
                 self, k, self._stations[k], self._places_of(k), self._unit)
@@ -369,10 +367,10 @@ class State(Immutable, MaterialPoints):
 
     @property
     def recovered(self) -> dict[Any, str]:
-        """For each beam, by name or number, "" if its fields are recovered, else why not: dict.
+        """For each beam, by name or number, "" if its fields are recovered, else the reason: dict.
 
-        Recovered fields need an equilibrium, of statics or of a motion, under loads of which it is
-        known where they act. Elsewhere strain and stress are those of the elements.
+        Recovery needs an equilibrium, static or dynamic, and known distributions of loads.
+        Otherwise strain and stress are those of the elements.
         """
         out = {}
         for k, beam in enumerate(self.beams):
@@ -395,16 +393,16 @@ class State(Immutable, MaterialPoints):
         Parameters
         ----------
         at
-            Points through which the sections go: one, shape (2,), or many, shape (2, n) or a list;
-            None for nine sections in each element, and both sides of forces between nodes.
+            Points on the sections: one, shape (2,), or many, shape (2, n) or a list; None for nine
+            sections in each element, and both sides of forces between nodes.
         recover
-            From the equilibrium of the body, exact up to the iteration of the solution, where it
-            can be had (:attr:`recovered`); False for the stress of the elements, integrated.
+            From the equilibrium of the body, to the accuracy of the solution, if possible
+            (:attr:`recovered`); False to integrate the stress of the elements.
 
         Raises
         ------
         InputError
-            If several lines or beams are as near to a point, as at a node: each has its own.
+            If several lines or beams are equally near to a point, as at a node.
 
         Examples
         --------
@@ -437,8 +435,9 @@ class State(Immutable, MaterialPoints):
     # of the whole
 
     def contact(self, obstacle: int | None = None) -> Contact:
-        """Where the body touches an obstacle, by its number, or all, and how hard; raises
-        InputError if there is none.
+        """Contact points and pressures of an obstacle, by its number, or of all.
+
+        Raises InputError if there is no obstacle.
         """
         with self._contact_memory():
             return contact_of(self, obstacle)
@@ -447,8 +446,8 @@ class State(Immutable, MaterialPoints):
     def strain_energy(self) -> float:
         """Strain energy of the scene.
 
-        It is W(E) of all the strain, also under temperatures and eigenstrains E0: these are loads,
-        and their potential is what W(E - E0), the field "energy", has less.
+        It is W(E) of the total strain, also under temperatures and eigenstrains E0: the field
+        "energy" is W(E - E0), and the difference is the potential of these loads.
         """
         with self._contact_memory():
             if self.base is not None:
@@ -466,18 +465,18 @@ class State(Immutable, MaterialPoints):
         return self._force
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
-        """What the supports at a boundary do to the beam: force, moment, and by coordinate.
+        """Reactions of the supports at a boundary: force, moment, and by degree of freedom.
 
-        Supports are clamps, pins and what is fixed, at any angle, and joints that hold a section,
-        or a rigid body, to the ground by linear equations, as a line or a given position.
+        Supports are clamps, pins and fixed DOFs, at any angle, and joints between a section, or a
+        rigid body, and the ground with linear equations, as a line or a given position.
 
         Parameters
         ----------
         boundary
-            A boundary name, or anything else scikit-fem takes for facets; of a frame nodes, see
+            The name of a boundary, or other facets as in scikit-fem; nodes of a frame, see
             :meth:`Frame.nodes <skfem_ancf.scene.frame.Frame.nodes>`.
         beam
-            The beam, its name or its number, in a scene of several; of a frame not needed.
+            Beam, name or number, in a scene of several; not for a frame.
         """
         system, frame = self.system, self.system.constraints.frame
         if frame is not None and beam is None:
@@ -507,7 +506,7 @@ class State(Immutable, MaterialPoints):
         return Reaction(one @ forces[:, 0], float(moment), names)
 
     def _support_force(self):
-        """What supports do to the scene, (N,): all other forces and inertia, negated."""
+        """Force of the supports, (N,): minus all other forces and inertia."""
         system = self.system
         loads = system.external_force(self.u, self.t) if self.base is None else (
             linear_external_force(system, self.base.u, self.u - self.base.u))
@@ -518,7 +517,7 @@ class State(Immutable, MaterialPoints):
         return total
 
     def joint_force(self, joint: Joint) -> Array:
-        """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""
+        """Force of a joint on its first beam, in the order of ``joint.equations``; (m,)."""
         return self.system.constraints.joint_force(
             joint, self.multipliers, self._support_force(), self._acted, self._time)
 

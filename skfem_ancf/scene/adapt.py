@@ -1,4 +1,4 @@
-"""Elements where the error is, of a higher degree where the solution is smooth."""
+"""Adaptive solutions: h-refinement, or p-refinement where the solution is smooth."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ from .solve import solve_static
 
 logger = logging.getLogger(__name__)
 
-#: Part of the squared error whose elements are halved.
+#: Fraction of the squared error whose elements are halved (bulk criterion).
 BULK = 0.7
 
-#: By what a higher degree has to divide the error of a beam, for the solution to be called smooth.
+#: Least reduction of the error by a higher degree for a smooth solution.
 SMOOTH = 10.0
 
-#: What the error is measured in.
+#: Error measures.
 GOALS = ("displacement", "strain")
 
-#: Number of elements up to which meshes are refined, by default and at most.
+#: Default and largest limit of the number of elements.
 MOST_ELEMENTS, MAX_ELEMENTS = 20000, 10**7
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What one round of an adaptive solution did to a beam, by its number in the scene.
+    """One round of an adaptive solution for one beam.
 
-    ``kind`` is "degree" if the degree along the axis was raised, "split" if elements were halved;
-    ``degree`` and ``elements`` are those after it, ``error`` the estimate that led to it.
+    ``beam`` is its number; ``kind`` is "degree" if the degree along the axis was raised, "split" if
+    elements were halved; ``degree`` and ``elements`` are the new ones, ``error`` the estimate
+    before.
     """
 
     beam: int
@@ -54,18 +55,18 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_deg
                    find: Callable[..., StaticResult]) -> State:
     """Solve with higher degrees or on finer meshes until the estimated error is small enough.
 
-    With the goal "displacement" each round solves twice. Beams of an element that has a higher
-    degree (:meth:`~skfem_ancf.elements.ElementBeam.raised`) are compared with the same of the next
-    degree, as long as each degree divides their error by ten and more: there the solution is
-    smooth. All others are compared with the same whose elements are halved. The difference is the
-    estimate: in the displacement of the beams' ends relative to the size of the scene, and relative
-    in the strain energy. Smooth beams take the higher degree for the next round; of the others the
-    elements are halved that contribute most to the difference in the energy norm. On a curve only
-    halving brings the axes of elements closer to it.
+    With the goal "displacement" each round solves twice. The second solution has the next degree
+    (:meth:`~skfem_ancf.elements.ElementBeam.raised`) for beams whose error decreased at least
+    tenfold with each degree so far (smooth solutions), and halved elements for the others. The
+    difference is the estimate: of the displacement of the beams' ends relative to the size of the
+    scene, and of the strain energy, relative. For the next round smooth beams take the higher
+    degree; in the others the elements are halved that contribute most to the difference in the
+    energy norm. Beams on a curve are always halved, as a higher degree does not improve their
+    geometry.
 
     With the goal "strain" the estimate is the difference of the elements' strain and the recovered
-    one (:mod:`skfem_ancf.recovery`), in the L2 norm over the body relative to that of the strain,
-    and the elements that contribute most to it are halved.
+    one (:mod:`skfem_ancf.recovery`) in the L2 norm, relative to that of the strain, and the
+    elements that contribute most are halved.
 
     References
     ----------
@@ -79,8 +80,8 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_deg
         return _solve_for_strain(scene, tol, max_elements, find)
     rounds = _Rounds(scene, tol, max_degree)
     while True:
-        # each mesh from the reference configuration: what a coarse mesh does not see as strain a
-        # finer one does, which makes its solution a poor start
+        # each mesh starts from the reference configuration: the solution of a coarse mesh has
+        # spurious strains on a finer one, and is a poor start
         coarse, state = rounds.scene, rounds.state or solve_static(
             rounds.scene.system, None, None, find)
         fine = rounds.finer()
@@ -99,7 +100,7 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_deg
 
 
 class _Rounds:
-    """The beams of an adaptive solution: which have a higher degree next, and which are split."""
+    """The beams of an adaptive solution, and their next refinement."""
 
     def __init__(self, scene: Any, tol: float, max_degree: int) -> None:
         self.scene, self.tol, self._most = scene, tol, max_degree
@@ -109,7 +110,7 @@ class _Rounds:
         self._refinements: tuple[Refinement, ...] = ()
 
     def _raised(self, k):
-        """The element of a beam of the next degree; None if its elements are to be split."""
+        """The element of a beam of the next degree; None if its elements are to be halved."""
         element = self.scene.beams[k].element
         # of a curve elements have cubics, which a higher degree brings no closer to it
         may = (k not in self._rough and element.axis_degree + 2 <= self._most
@@ -125,7 +126,7 @@ class _Rounds:
                         [self._raised(k) for k in range(len(self.scene.beams))])
 
     def done(self, errors: list[float], scene: Any) -> tuple[Refinement, ...]:
-        """All that was done, with what leads to another scene from the one there is."""
+        """All refinements, with those from the current scene to another one."""
         return self._refinements + tuple(
             Refinement(k, "split" if new.mesh.nelements > old.mesh.nelements else "degree",
                        new.element.axis_degree, new.mesh.nelements, errors[k])
@@ -133,7 +134,7 @@ class _Rounds:
             if new.nd > old.nd or new.mesh.nelements > old.mesh.nelements)
 
     def judge(self, errors: list[float]) -> bool:
-        """Find where a higher degree gains little; False if that is not known yet, or news."""
+        """Find beams that gain little from a higher degree; False if that is unknown or new."""
         sure = True
         for k, error in enumerate(errors):
             if self._raised(k) is None:
@@ -148,7 +149,7 @@ class _Rounds:
         return sure
 
     def advance(self, state: State, fine: Any, better: State, errors: list[float]) -> None:
-        """Take the higher degrees that gain, and split the elements that matter in other beams."""
+        """Raise degrees where that pays; halve the elements that matter in other beams."""
         beams = self.scene.beams
         split = [new.mesh.nelements > old.mesh.nelements for old, new in zip(beams, fine.beams)]
         raised = [None if self._small(error) and k in self._before else self._raised(k)
@@ -166,7 +167,7 @@ class _Rounds:
 
 
 def _changed(scene, marked, elements):
-    """The scene with beams of other elements where they are given, else of halved ones."""
+    """The scene with other elements, or halved ones."""
     return scene.replace(beams=[
         b.replace(mesh=b.mesh.refined(m)) if e is None else b.replace(element=e)
         for b, m, e in zip(scene.beams, marked, elements)])
@@ -207,7 +208,7 @@ def _solve_for_strain(scene, tol, max_elements, find):
 
 
 def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
-    """Squared L2 norm of recovered minus elements' strain, and of the strain, by element."""
+    """Squared L2 norms by element: recovered minus elements' strain, and the strain."""
     recovery = state.recovery(beam)
     if recovery is None:
         k = list(state.beams).index(beam)
@@ -238,9 +239,9 @@ def _prolong(old, marked, u):
 
 
 def _collect(old, marked, force):
-    """A force on the mesh with the marked elements halved, on that before: the transposed.
+    """Restrict a force from the refined mesh: the transpose of :func:`_prolong`.
 
-    Of each node, (n, nb, 2), and which nodes of the finer mesh are new.
+    By node, (n, nb, 2), with the new nodes of the finer mesh.
     """
     nb, t = old.element.nodal_dofs, old.mesh.t[:, marked]
     there = np.insert(np.zeros(old.mesh.p.shape[1], dtype=bool), t[1], True)
@@ -253,14 +254,14 @@ def _collect(old, marked, force):
 
 
 def _halving(beam, marked):
-    """What makes of coordinates at both ends those in the middle of elements, (n, nb, 2 nb)."""
+    """Matrices (n, nb, 2 nb) from DOFs at both ends to those in the middle of elements."""
     nb, slope = beam.element.nodal_dofs, np.array([f[1] for f in beam.element.functionals])
     L = beam.mesh.lengths[marked][:, None, None]
     return (beam.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]
 
 
 def _compare(coarse, state, fine, better):
-    """The estimate, and for each beam what it has of the larger of its parts."""
+    """The estimate, and the contribution of each beam to the larger of its parts."""
     total, changes, energies = better.strain_energy, [], []
     for a, b in zip(coarse.beams, fine.beams):
         u, v = state.u_of(a), better.u_of(b)
@@ -274,11 +275,10 @@ def _compare(coarse, state, fine, better):
 
 
 def _mark(coarse, state, fine, better, split):
-    """The elements of the coarse mesh that make up most of the difference in the energy norm.
+    """Elements of the coarse mesh with most of the difference in the energy norm.
 
-    Of beams that are not ``split`` none: their elements were not halved, but of a higher degree.
-    Where the loads of both meshes differ, as those that jump within an element, the work of that
-    on the difference counts too: it bends elements far from there.
+    Only beams that are ``split`` have any. Where the loads of both meshes differ, as those that
+    jump within an element, the work of their difference is included.
     """
     before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
     errors = []
@@ -299,7 +299,7 @@ def _mark(coarse, state, fine, better, split):
 
 
 def _largest(errors, numbers):
-    """For each beam its elements among those that make up most of the squared error."""
+    """For each beam its elements among those with most of the squared error."""
     order = np.argsort(-errors)
     keep = order[:1 + int(np.searchsorted(np.cumsum(errors[order]), BULK * errors.sum()))]
     chosen = np.zeros(len(errors), dtype=bool)

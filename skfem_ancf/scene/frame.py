@@ -1,4 +1,4 @@
-"""Frames: lines between nodes, rigid or hinged where they meet."""
+"""Frames: lines between nodes with rigid or hinged connections."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from ..results.state import State
 from ..sections import Section
 from .scene import Scene
 
-#: What is given for all lines, or for those of a group.
+#: Arguments for all lines, or for those of a group.
 BEAM = "height", "material", "width", "section", "element", "formulation", "damping", "compiled"
-#: The element of lines that are given none.
+#: Default element.
 CABLE = ElementBeamCable(5)
-#: Elements of a line, at most.
+#: Largest number of elements of a line.
 MOST = 2**16
-#: Name of the beam of lines that are in no group.
+#: Name of the beam of lines without a group.
 REST = "lines"
 
 
@@ -58,7 +58,7 @@ class NodeForce(Load):
 
 
 class NodeMoment(EndMoment):
-    """A moment on the section at an end, whose angle is counted from -pi to pi."""
+    """A moment on the section at an end, with the angle in (-pi, pi]."""
 
     def __init__(self, end: int, M: float, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -92,19 +92,19 @@ def _(load, layout):
 class Frame(Scene):
     """A :class:`Scene` of lines between nodes: use :meth:`from_lines` or :meth:`from_meshio`.
 
-    Lines that meet at a node share its position, and those that are not hinged there the rotation
-    of the section. Unknowns of the solution are these of the nodes: the coordinates of the lines
-    are condensed to them, so that cost and memory are those of a sparse matrix with three rows a
-    node, however many elements a line has. The lines of a group are one beam with the name of the
-    group: ``beam="columns"`` in loads, section forces and pictures. Supports, forces and moments
-    take nodes: a name, a number, a point (x, y), a function of the points, or a list of these.
+    Lines that meet at a node share its position, and unless hinged its rotation. The degrees of
+    freedom of the lines are condensed to those of the nodes, so that cost and memory are those of a
+    sparse matrix with three rows for each node, independent of the number of elements. The lines of
+    a group are one beam with the name of the group: ``beam="columns"`` in loads, section forces and
+    pictures. Supports, forces and moments take nodes: a name, a number, a point (x, y), a function
+    of the points, or a list of these.
 
     Parameters
     ----------
     net
-        The lines, a :class:`~skfem_ancf.mesh.frame_graph.FrameGraph`.
+        The graph, a :class:`~skfem_ancf.mesh.frame_graph.FrameGraph`.
     beams
-        A Beam with a chain for each line of a group, group after group, and then for the others.
+        A Beam with a chain for each line of a group, for all groups, and one for the other lines.
     lines
         Numbers of the lines in the order of the chains, shape (m,).
     hinged
@@ -159,35 +159,35 @@ class Frame(Scene):
             Pairs of numbers of points: a list, or an array of shape (m, 2).
         groups
             Numbers of lines by name: each group is a beam of that name. A line is in one group at
-            most; those in none are the beam "lines".
+            most; the other lines are the beam "lines".
         nodes
             Numbers of points by name, for supports and loads.
         hinges
-            Where lines may turn: "all" for a truss; or a list of numbers and names of nodes, where
-            all lines are hinged, and of pairs (line, node), each by its number or its name; or an
-            array of such pairs, shape (k, 2).
+            "all" for a truss; or a list of numbers and names of nodes, where all lines are hinged,
+            and of pairs (line, node), each by number or name; or an array of such pairs, shape (k,
+            2).
         curves
-            By the number of a line a function of parameters s (k,), from 0 to 1, that returns the
-            points (2, k) of its axis.
+            For the number of a line a function of parameters s (k,) in [0, 1] that returns points
+            (2, k) of its axis.
         elements
-            How many elements a line is divided into, or for each line, shape (m,).
+            Number of elements of every line, or of each line, shape (m,).
         sections
-            Of these arguments, from ``height`` on, those of a group where they differ:
+            Arguments of a group, from ``height`` on, that differ from those of the others:
             ``{"columns": {"height": 0.3}}``.
         tol
-            Points not farther apart than this are one node, at the place of the first of them, and
-            a line between two of them is left out; numbers of points and lines stay. By default
-            1e-5 of the size of the frame, or 1e-3 of its longest line if that is less, and a
-            ModelWarning names such points. It also names points that are nearly as close, and stay
-            apart. With 0 all points are nodes of their own.
+            Points closer than this are merged into one node, at the place of the first, and a line
+            between two of them is omitted; the numbering of points and lines does not change. By
+            default 1e-5 of the size of the frame, at most 1e-3 of its longest line, with a
+            ModelWarning that lists merged points and points that are nearly as close. With 0
+            nothing is merged.
         height
-            Of the section: a number, or of tapered lines a function of s (n,), which runs from 0 to
-            1 along each line from its first point to its second, that returns heights (n,), with
-            kinks at nodes of the elements; or a list with one of these for each line, in
-            ``sections`` for each line of the group.
+            Of the section: a number, or for tapered lines a function of s (n,), from 0 to 1 along
+            each line from its first point to its second, that returns heights (n,), with kinks at
+            nodes of the elements; or a list with one of these for each line, in ``sections`` for
+            each line of the group.
         material, width, section, element, formulation, damping, compiled
-            As for :class:`~skfem_ancf.Beam`; the element is ``ElementBeamCable(5)`` by default.
-            Functions of material coordinates (x, y), as of a width or a modulus, take s for x.
+            As for :class:`~skfem_ancf.Beam`; the element is ``ElementBeamCable(5)`` by default. The
+            material coordinate x of functions (x, y) is s.
 
         Examples
         --------
@@ -219,25 +219,24 @@ class Frame(Scene):
                     section: Section | None = None, element: ElementBeam = CABLE,
                     formulation: str | Formulation | type[Formulation] = "assumed",
                     damping: KelvinVoigt | None = None, compiled: bool = True) -> Frame:
-        """A frame of the line cells of a mesh: of Gmsh's ``.msh``, ``.vtu``, and others.
+        """A frame of the line cells of a mesh: Gmsh's ``.msh``, ``.vtu``, and others.
 
         Parameters
         ----------
         mesh
-            A ``meshio.Mesh``, or the name of a file that meshio reads, or of a drawing in DXF,
-            whose layers are sets. Each cell "line", or "line3", "line4", ..., which are curved, is
-            a line. Cell sets and physical groups are names: those of vertices, and point sets, of
-            nodes, those of lines of their ends, and in :meth:`line_load` of the lines. Other kinds
-            of cells are refused.
+            A ``meshio.Mesh``, or a file that meshio reads, or a DXF drawing, whose layers are sets.
+            Each cell "line", or a curved "line3", "line4", ..., is a line. Cell sets and physical
+            groups are names: those of vertices and point sets name nodes, those of lines name their
+            ends, and in :meth:`line_load` the lines. Other kinds of cells are refused.
         hinges, elements, sections, tol
             As for :meth:`from_lines`.
         height, material, width, section, element, formulation, damping, compiled
             As for :meth:`from_lines`.
         groups
-            Names of the sets of lines that are beams, no line in two of them; other sets may
-            overlap. By default those that are named in ``sections``, and those that share no line
-            with another set. Names that meshio writes into files without sets, as numbers called
-            "column-girder", are read if one of them is named here or in ``sections``.
+            Names of the sets of lines that are beams, without common lines; other sets may overlap.
+            By default those named in ``sections``, and those that share no line with another set.
+            In files without sets, where meshio stores names as data called "column-girder", one of
+            the names must appear here or in ``sections``.
 
         Examples
         --------
@@ -296,7 +295,7 @@ class Frame(Scene):
 
     @property
     def points(self) -> Array:
-        """Places of the nodes, shape (2, n)."""
+        """Positions of the nodes, shape (2, n)."""
         return self.net.points
 
     def nodes(self, place: Any) -> Array:
@@ -305,26 +304,26 @@ class Frame(Scene):
         Parameters
         ----------
         place
-            The name of nodes, or of lines for their ends, the number of a node, a point as a tuple
-            (x, y), a function of the points x (2, n) that returns n truth values, an array of
-            numbers, an array of points (k, 2), or a list of these.
+            The name of nodes, or of lines for their ends, the number of a node, a point (x, y) as a
+            tuple, a function of points x (2, n) that returns n truth values, an array of numbers,
+            an array of points (k, 2), or a list of these.
         """
         return self.net.nodes_at(place)
 
     # supports
 
     def hold(self, place: Any, *what: str) -> Frame:
-        """Hold nodes: their displacement along x, along y, or their rotation.
+        """Fix the displacement of nodes along x or y, or their rotation.
 
         Parameters
         ----------
         place, *what
-            Nodes, see :meth:`nodes`, and of "x", "y" and "angle".
+            Nodes, see :meth:`nodes`, and some of "x", "y" and "angle".
         """
         return self._hold(place, require_names("what is held", list(what), HELD))
 
     def _hold(self, place, names, settled=None):
-        """Hold nodes; they may be displaced."""
+        """Fix nodes, with optional displacements."""
         nodes, held, known = self.nodes(place), self._nodes.held.copy(), self._nodes
         for name in names:
             held[nodes, HELD.index(name)] = True
@@ -337,20 +336,20 @@ class Frame(Scene):
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
                y: float | Callable[[float], float] | None = None,
                angle: float | Callable[[float], float] | None = None) -> Frame:
-        """Displace nodes along x or y, or turn them, by what is given; it is held, too.
+        """Prescribe the displacement of nodes along x or y, or their rotation.
 
         Parameters
         ----------
         place
             Nodes, see :meth:`nodes`.
         x, y, angle
-            By how much, from where the nodes are in the reference configuration, the rotation in
-            radians, counterclockwise: a number, which grows with the load of a static solution; or
-            a function of time, in statics of the load factor, for motions as well.
+            Displacement from the reference configuration; rotation in radians, counterclockwise: a
+            number, proportional to the load factor of a static solution; or a function of time, in
+            statics of the load factor.
 
         Examples
         --------
-        A girder of E I = 1 between clamps, one of which sinks by w, is sheared by 12 E I w / L^3:
+        Settlement w of a clamp of a girder, E I = 1, causes the shear force 12 E I w / L^3:
 
         >>> from skfem_ancf import Frame, StVenantKirchhoff
         >>> frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], height=0.01, width=0.01,
@@ -361,7 +360,7 @@ class Frame(Scene):
         """
         given = {name: value for name, value in zip(HELD, (x, y, angle)) if value is not None}
         if not given:
-            raise InputError("settle() displaces nodes: give x=, y= or angle=, a number or a "
+            raise InputError("settle() needs a displacement: give x=, y= or angle=, a number or a "
                              "function of time")
         settled, nodes = self._nodes.settled, self.nodes(place)
         for name, value in given.items():
@@ -376,9 +375,9 @@ class Frame(Scene):
             raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
 
     def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
-        """Hold nodes, see :meth:`nodes`: positions and, where a line is rigid, their rotation.
+        """Fix positions and rotations of nodes, see :meth:`nodes`; hinged lines stay hinged.
 
-        That of the best straight line through a section, which may still warp and change its
+        The rotation is that of the best-fit line of a section, which may warp and change its
         thickness. ``beam`` is None and ``thickness`` "free" for a frame.
         """
         _no_beam(beam)
@@ -386,7 +385,7 @@ class Frame(Scene):
         return self.hold(boundary, *HELD)
 
     def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
-        """Fix the positions of nodes, see :meth:`nodes`, which may turn; ``beam`` is None here."""
+        """Fix the positions of nodes, see :meth:`nodes`; ``beam`` is None for a frame."""
         _no_beam(beam)
         return self.hold(boundary, "x", "y")
 
@@ -394,9 +393,9 @@ class Frame(Scene):
 
     def point_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                     amplitude: TimeFunction = None) -> Frame:
-        """A dead force on each of some nodes, see :meth:`nodes`, or on a material point of a beam.
+        """A dead force on each of some nodes, see :meth:`nodes`, or on a material point.
 
-        With ``beam`` a material point (x, y) may lie between nodes.
+        With ``beam`` the point (x, y) may lie between nodes.
         """
         if beam is not None:
             super().point_force(force, at, beam, amplitude)
@@ -409,10 +408,7 @@ class Frame(Scene):
 
     def moment(self, boundary: Any, M: float, beam: WhichMember = None,
                amplitude: TimeFunction = None) -> Frame:
-        """A moment on each of some nodes, see :meth:`nodes`, at which a line is rigid.
-
-        ``beam`` is None for a frame.
-        """
+        """A moment on nodes, see :meth:`nodes`, each with a rigid line; ``beam`` is None."""
         _no_beam(beam)
         M = require_finite_scalar("M", M)
         self._require_rigid(self.nodes(boundary), "no line takes a moment there; leave one of them "
@@ -423,9 +419,9 @@ class Frame(Scene):
 
     def follower_force(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                        amplitude: TimeFunction = None, line: int | None = None) -> Frame:
-        """A force that turns with the tangent of a line: a :class:`~skfem_ancf.FollowerForce`.
+        """A force that rotates with a line: a :class:`~skfem_ancf.FollowerForce`.
 
-        ``line`` is the number of the line whose tangent it is, where several meet.
+        ``line`` is the number of the line whose tangent is used, where several meet.
         """
         points = self.system.points
         if line is not None:
@@ -455,7 +451,7 @@ class Frame(Scene):
         return self
 
     def _ends_at(self, place):
-        """Of nodes the beams (k,) whose ends lead there, and numbers of these ends (k,)."""
+        """Beams (k,) with ends at nodes, and numbers of these ends (k,)."""
         ends = self._nodes.leading(self.nodes(place))
         first = np.cumsum([0] + [chain_ends(beam).size for beam in self.beams])
         number = np.searchsorted(first, ends, side="right") - 1
@@ -464,9 +460,9 @@ class Frame(Scene):
     # results
 
     def rotations(self, state: State) -> Array:
-        """Rotations of the nodes, from -pi to pi, shape (n,); NaN where all lines are hinged.
+        """Rotations of the nodes in (-pi, pi], shape (n,); NaN where all lines are hinged.
 
-        Of a linear solution those of small displacements.
+        For a linear solution they are linear.
 
         Parameters
         ----------
@@ -496,12 +492,12 @@ class Frame(Scene):
 
 def _no_beam(beam):
     if beam is not None:
-        raise InputError(f"a frame is held and loaded at nodes, got beam={shown(beam)}: name the "
-                         "nodes, by a name, a number, or a point (x, y)")
+        raise InputError("a frame is supported and loaded at nodes, got beam="
+                         f"{shown(beam)}: give a name, a number, or a point (x, y)")
 
 
 def _elements(elements, m):
-    """How many elements each line has, (m,)."""
+    """Number of elements of each line, (m,)."""
     if isinstance(elements, (int, np.integer)) and not isinstance(elements, bool):
         return np.full(m, require_integer("elements", elements, 1, MOST))
     found = require_finite("elements", elements, (m,))
@@ -512,7 +508,7 @@ def _elements(elements, m):
 
 
 def _heights(height, lines):
-    """A number or a function; or a list of them, one for each of some lines."""
+    """A number or a function, or a list with one for each line."""
     if callable(height):
         return height
     if not isinstance(height, (list, tuple)) and np.ndim(height) != 1:

@@ -1,4 +1,4 @@
-"""What a scene is made of: beams, rigid bodies and items, and the methods that add items."""
+"""The description of a scene: beams, rigid bodies and items, and methods that add items."""
 
 from __future__ import annotations
 
@@ -42,10 +42,7 @@ M = TypeVar("M", bound="Model")
 
 
 def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
-    """A method of a scene that adds an item of a class, whose arguments it takes.
-
-    The class describes them, so that ``help(Scene)`` is short.
-    """
+    """A method of a scene that adds an item of a class, with the arguments of the class."""
     def method(self, *arguments, **options):
         return self.add(item(*arguments, **options))
 
@@ -60,19 +57,19 @@ def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
 
 
 class Entry(NamedTuple):
-    """An item as it was given, with beams by number, and what it is on the DOFs of the scene."""
+    """An unbound item, with beams by number, and its bound parts."""
 
     given: Item
     bound: tuple[Any, ...]
 
 
 class Model(NearMisses):
-    """Beams, rigid bodies, and what acts on them: the description of a :class:`Scene`."""
+    """Beams, rigid bodies, and items: the description of a :class:`Scene`."""
 
     def __init__(self, *beams: Any) -> None:
         if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
             beams = tuple(beams[0])
-        #: Beams, bodies and the numbers of their degrees of freedom.
+        #: Beams, bodies and their numbering of degrees of freedom.
         self.layout = Layout(*beams)
         self._entries: tuple[Entry, ...] = ()
         self._fixed: dict[int, float] = {}
@@ -82,7 +79,7 @@ class Model(NearMisses):
         self._lock = RLock()
 
     def __getstate__(self):
-        """Without the equations, which are built again."""
+        """Without the equations, which are rebuilt."""
         return {name: value for name, value in vars(self).items() if name != "_lock"} | {
             "_system": None}
 
@@ -111,7 +108,7 @@ class Model(NearMisses):
 
     @property
     def items(self) -> tuple[Item, ...]:
-        """All that acts, as it was given, in the order in which it was added."""
+        """All items in the order in which they were added."""
         return tuple(entry.given for entry in self._entries)
 
     @property
@@ -126,18 +123,18 @@ class Model(NearMisses):
 
     @property
     def elements(self) -> tuple[ForceElement, ...]:
-        """The force elements, bound: springs, foundations, masses, obstacles, your own."""
+        """The bound force elements: springs, foundations, masses, obstacles, user-defined ones."""
         return self._all(ForceElement)
 
     def _all(self, kind):
         return tuple(one for entry in self._entries for one in entry.bound if isinstance(one, kind))
 
     def beam(self, beam: WhichMember = None) -> Any:
-        """The Beam or RigidBody meant by itself, a name, a number, or None for the only beam."""
+        """The Beam or RigidBody for itself, a name, a number, or None for the only beam."""
         return self.layout.beam(beam)
 
     def _bound(self, item):
-        """An entry, of which nothing is kept yet."""
+        """An entry; the scene is not changed."""
         if not isinstance(item, Item):
             raise InputError(f"the item must be an Item, as a Spring, a Load or a Joint, got "
                              f"{shown(item)}: derive yours from skfem_ancf.Item")
@@ -148,7 +145,7 @@ class Model(NearMisses):
         return Entry(given, tuple(bound))
 
     def _numbered(self, value):
-        """The number of a Beam, tuples and lists with numbers in place of them, or the value."""
+        """Replace Beams by numbers, in tuples and lists too."""
         if isinstance(value, Beam):  # rigid bodies stay the same on other meshes
             return self.layout.number(value)
         if not isinstance(value, (tuple, list)):
@@ -157,9 +154,9 @@ class Model(NearMisses):
         return value if all(a is b for a, b in zip(inner, value)) else tuple(inner)
 
     def _put(self, *items):
-        """Bind everything, then keep it: what fails leaves the scene as it was.
+        """Bind all items before adding them, so that errors leave the scene unchanged.
 
-        Returns what the items are bound to.
+        Returns the bound parts.
         """
         with self._lock:
             entries, fixed = [self._bound(item) for item in items], dict(self._fixed)
@@ -172,13 +169,13 @@ class Model(NearMisses):
         return bound
 
     def add(self, item: Item) -> Self:
-        """Add a load, a support, a joint, a force element, or a custom item.
+        """Add a load, a support, a joint, a force element, or a user-defined item.
 
         Parameters
         ----------
         item
-            An :class:`~skfem_ancf.Item`. The scene keeps it as it is now, and binds a copy to its
-            beams; on another mesh, as for ``solve_static(adapt=...)``, it is bound again.
+            An :class:`~skfem_ancf.Item`. The scene stores a copy and binds another to its beams,
+            again for every other mesh, as in ``solve_static(adapt=...)``.
 
         Examples
         --------
@@ -195,14 +192,14 @@ class Model(NearMisses):
         return self
 
     def units(self, force: str, length: str) -> Self:
-        """Say in which units the numbers of the scene are, for pictures, files and tables.
+        """Set the units of the scene for pictures, files and tables.
 
-        No number changes: all units fit together, as N, mm, MPa and tonnes.
+        Numbers do not change: use consistent units, as N, mm, MPa and tonnes.
 
         Parameters
         ----------
         force, length
-            As "N" and "mm": stresses are then said to be in MPa, in other units in "lbf/in²".
+            As "N" and "mm", with stresses in MPa; other units give a compound, as "lbf/in²".
 
         Examples
         --------
@@ -247,8 +244,8 @@ class Model(NearMisses):
     def joint(self, joint: str | Joint, **options: Any) -> Joint:
         """Add a joint, enforced by Lagrange multipliers.
 
-        In statics the time of a motion is the load factor. A joint that only fixes degrees of
-        freedom is eliminated like a support.
+        In statics the time of a prescribed motion is the load factor. A joint that only fixes
+        degrees of freedom is eliminated like a support.
 
         Parameters
         ----------
@@ -261,12 +258,12 @@ class Model(NearMisses):
             * ``"line", at=point, direction=(1, 0)``: a point slides on a line,
             * ``"circle", at=point, center=(0, 0)``: a point slides on a circle,
             * ``"position", at=point, r=function``: a point follows ``r(t)``,
-            * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``,
+            * ``"angle", at="left", angle=function``: a section rotates by ``angle(t)``,
             * ``"plane", at="left"``: a section stays in its plane,
             * ``"sleeve", at=(a, point), on=b``, ``"slot", at=(a, point), on=body, direction=d``:
-              a point slides along a beam, along a line of a body, see :meth:`slider`.
+              a point slides along a beam, or along a line of a body, see :meth:`slider`.
         **options
-            Arguments of the joint's class, where it is given by its name.
+            Arguments of the joint's class, for a name.
 
         Raises
         ------
@@ -278,17 +275,17 @@ class Model(NearMisses):
         return self._put(get_joint(joint, **options))[0]
 
     def hinge(self, *places: Any, name: str | None = None) -> Joint:
-        """Join material points of beams and rigid bodies: they stay together, and may turn.
+        """Join material points of beams and rigid bodies, with free rotation.
 
         Parameters
         ----------
         *places
-            One point (x, y), at which two beams or bodies or more meet; or a place for each of
+            One point (x, y), at which two or more beams or bodies meet; or a place for each of
             them: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, (beam, "right"), a
             point that only one of them has, ("ground", (x, y)), or a RigidBody for its centre of
             mass.
         name
-            What messages call the joint.
+            Name of the joint in messages.
 
         Examples
         --------
@@ -303,22 +300,22 @@ class Model(NearMisses):
         return self.joint(Hinge(*joined(self.layout, places), name))
 
     def weld(self, *places: Any, name: str | None = None, apart: bool = False) -> Joint:
-        """Join beams and rigid bodies: points stay together, and sections keep their angles.
+        """Join beams and rigid bodies rigidly: sections keep their relative angles.
 
-        The point of a beam may be anywhere, inside of an element too: so the end of one is welded
-        to the middle of another, or several meet in one point.
+        Points may be inside elements: the end of a beam can be welded to the middle of another, and
+        several beams can meet in a point.
 
         Parameters
         ----------
         *places
-            As for :meth:`hinge`; (beam, "right") is the axis at that end. Of a
-            :class:`~skfem_ancf.Domain` a boundary, as (domain, "right"), which moves with the end
-            or side of a beam, as (beam, "left"), or with a rigid body.
+            As for :meth:`hinge`; (beam, "right") is the axis at that end. For a
+            :class:`~skfem_ancf.Domain` a boundary, as (domain, "right"), which is bonded to the end
+            or side of a beam, as (beam, "left"), or to a rigid body.
         name
-            What messages call the joint.
+            Name of the joint in messages.
         apart
-            Allow that the points are apart in the reference configuration: the weld draws them
-            together.
+            Allow a distance between the points in the reference configuration, which the weld
+            closes.
         """
         return self.joint(Weld(*joined(self.layout, places), name, apart))
 
@@ -329,24 +326,23 @@ class Model(NearMisses):
         Parameters
         ----------
         at
-            The point: (x, y) if one beam or body alone has it, (beam, (x, y)) with a Beam, a
+            The point: (x, y) if only one beam or body has it, (beam, (x, y)) with a Beam, a
             RigidBody, a name or a number, ("ground", (x, y)), a RigidBody for its centre of mass.
         on
-            The beam, along whose axis it slides, however far that bends; or a RigidBody or
-            "ground".
+            The beam along whose axis it slides; or a RigidBody or "ground".
         direction
-            Direction of the line of a body or the ground in the state of the start, shape (2,).
+            Initial direction of the line of a body or the ground, shape (2,).
         angle
-            Keep the angle between the section at the point and the axis or the line: a sleeve that
-            carries a moment.
+            Keep the angle between the section at the point and the axis or the line: the slider
+            transmits a moment.
         name
-            What messages call the joint.
+            Name of the joint in messages.
         """
         return self.joint(slider(self.layout, at, on, direction, angle, name))
 
     def motor(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,
               other: Any = None) -> Joint | Load:
-        """Add a :class:`~skfem_ancf.Motor`; returns its joint, or the load of a torque.
+        """Add a :class:`~skfem_ancf.Motor`; returns its joint, or the load for a torque.
 
         Parameters
         ----------
@@ -356,18 +352,17 @@ class Model(NearMisses):
         return self._put(Motor(at, angle, speed, torque, other))[0]
 
     def damping(self, mass: float = 0.0, stiffness: float = 0.0, modal: ArrayLike = ()) -> Self:
-        """Damping of the whole scene: Rayleigh's, and of modes.
+        """Rayleigh and modal damping of the whole scene, which replaces an earlier one.
 
-        A mode of the angular frequency omega gets the damping ratio ``mass / (2 omega) + stiffness
-        omega / 2``. It acts in motions; materials may have their own, ``Beam(...,
-        damping=KelvinVoigt(time))``. A second call takes the place of the first.
+        A mode of the angular frequency omega has the damping ratio ``mass / (2 omega) + stiffness
+        omega / 2``. For damping of one material use ``Beam(..., damping=KelvinVoigt(time))``.
 
         Parameters
         ----------
         mass, stiffness
-            A rate by which velocities decay, and a retardation time of all beams.
+            Mass-proportional rate (1 / time), and a retardation time of all beams.
         modal
-            Damping ratios of the lowest modes that are no rigid motions, shape (k,).
+            Damping ratios of the lowest flexible modes, shape (k,).
         """
         with self._lock:
             self._damping, self._system = Damping(mass, stiffness, modal), None
@@ -376,7 +371,7 @@ class Model(NearMisses):
     # other beams, other loads
 
     def _bare(self, beams):
-        """A scene of other beams on which nothing acts that was added."""
+        """A scene of other beams without added items."""
         return type(self)(*beams, *self.bodies, *self.domains)
 
     def _on(self, beams):

@@ -1,4 +1,4 @@
-"""What a solution computes, keeps constant or skips, and why."""
+"""A description of what a solution computes, keeps constant or skips."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from ..core.switch import expecting
 from ..equations.system import System
 
 KINDS = ("static", "linear", "dynamic")
-#: Steps of a motion of which it is said whether they are compiled: how many there will be is not
-#: known.
+#: Assumed number of steps of a motion, which decides on compilation.
 STEPS = 1000
 
 
@@ -47,7 +46,6 @@ class Plan(tuple):
 
 
 def make_plan(system: System, kind: str = "static", sensors: int = 0) -> Plan:
-    """The plan of a scene."""
     require_option("kind of solution", kind, KINDS)
     dynamic, linear = kind == "dynamic", kind == "linear"
     return Plan([
@@ -58,12 +56,12 @@ def make_plan(system: System, kind: str = "static", sensors: int = 0) -> Plan:
 
 
 def _item(term, there, reason, missing, status="computed"):
-    """A term that is computed where there is something of it, and else skipped."""
+    """A term that is computed if ``there`` is true, else skipped."""
     return Item(term, status, reason) if there else Item(term, "skipped", missing)
 
 
 def _beams(s):
-    """The strain energy of the beams, their sections and stress-free strains."""
+    """Strain energy of the beams, their sections and eigenstrains."""
     beams = s.beams
     points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
     yield _item("strain energy", beams, f"{points} integration points, "
@@ -86,7 +84,6 @@ def _beams(s):
 
 
 def _matrices(dynamic, linear):
-    """Tangent and mass."""
     yield _item("geometric term", not linear, "the stress is not zero",
                 "no stress in a linear solve")
     yield Item("tangent", "constant", "one assembly, one factorisation") if linear else Item(
@@ -98,7 +95,7 @@ def _matrices(dynamic, linear):
 
 
 def _forces(s, dynamic, linear):
-    """What acts on the beams, and what holds them."""
+    """Loads, supports and joints."""
     yield _item("rigid bodies", s.bodies, f"{len(s.bodies)}: 4 coordinates each, a constant mass, "
                 "a multiplier for the length of the director", "there are none")
     lossy = sum(time > 0.0 for time in s.retardation)
@@ -130,7 +127,7 @@ def _forces(s, dynamic, linear):
 
 
 def _solution(s, dynamic, linear):
-    """How the equations are solved, and what is looked at."""
+    """Solution method and checks."""
     beams = s.beams
     yield Item("linear solver", "computed", _linear_solver(s, dynamic))
     rules = sorted({(b.element.order, t.section_points, t.layer.measure.spent)
@@ -153,7 +150,6 @@ def _solution(s, dynamic, linear):
 
 
 def _linear_solver(s, dynamic):
-    """How the linear systems of a system are solved."""
     bandwidth = s.K.bandwidth
     if dynamic and s.mass_solver.by_nodes:
         return ("lines condensed to displacements and rotations of nodes, sparse LDL^T of these, "
@@ -175,7 +171,7 @@ def _linear_solver(s, dynamic):
 
 
 def _section(beam):
-    """The section of a beam that is no rectangle of one height, width and material, in words."""
+    """A section that is not a uniform rectangle, as text."""
     mesh, layers = beam.mesh, len(beam.across.layers)
     what = [repr(beam.section)] if not beam.across.plain else []
     if mesh.heights is not None:
@@ -188,18 +184,17 @@ def _section(beam):
 
 
 def _listed(words):
-    """Different words in order."""
+    """Sorted unique words."""
     return ", ".join(sorted(set(words)))
 
 
 def _kinds(things):
-    """How many there are of each kind, in words."""
+    """Numbers of things by kind, as text."""
     return ", ".join(f"{n} {name}" for name, n in Counter(
         type(getattr(thing, "item", thing)).__name__.lstrip("_") for thing in things).items())
 
 
 def _obstacles(contacts, linear):
-    """Contact."""
     groups = [group for one in contacts.obstacles for group in one.groups]
     how = [text for text, there in (
         ("friction", contacts.anchored), ("augmented Lagrangian", contacts.augmented),

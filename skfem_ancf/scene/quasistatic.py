@@ -1,4 +1,4 @@
-"""Quasi-static runs: loads, supports and obstacles over a time without inertia."""
+"""Quasi-static runs: loads, supports and obstacles as functions of time, without inertia."""
 
 from __future__ import annotations
 
@@ -28,15 +28,12 @@ from ..solvers.quasistatic import JUMPED, Instant, first, follow
 
 logger = logging.getLogger(__name__)
 
-#: Iterations that an increment takes, about.
+#: Desired number of iterations of an increment.
 ITERATIONS = 8
 
 
 class QuasiStatic(Scheme):
-    """Equilibria without inertia; what the states of a :class:`StepHistory` name as their scheme.
-
-    A motion may go on from one of them, from rest.
-    """
+    """Scheme of the states of a :class:`StepHistory`; motions may start from them, at rest."""
 
     name = "quasi-static"
 
@@ -45,20 +42,20 @@ class QuasiStatic(Scheme):
 
 
 class StepHistory(History):
-    """A quasi-static run: its equilibria over the time of its steps.
+    """A quasi-static run: equilibria over the time of its steps.
 
-    It is read as any History: positions, strains, reactions, sensors, pictures, films and files.
-    Velocities and accelerations are zero; ``dissipated`` is the work of friction.
+    It has the methods of a History: positions, strains, reactions, sensors, pictures, films and
+    files. Velocities and accelerations are zero; ``dissipated`` is the work of friction.
 
     Attributes
     ----------
     plan : Steps or None
         The named steps.
     found_by : list of str
-        How each equilibrium was found: "followed" from the one before, or "jumped by ..." where
-        the path gave way and a strategy of statics led to another equilibrium.
+        How each equilibrium was found: "followed" from the previous one, or "jumped by ..." where
+        the path ended and a strategy of statics led to another equilibrium.
     iterations_at : ndarray
-        Linear systems solved for each, shape (nt,).
+        Number of linear systems solved for each, shape (nt,).
     """
 
     plan: Steps | None
@@ -67,11 +64,11 @@ class StepHistory(History):
 
     @property
     def jumps(self) -> Array:
-        """Times of the equilibria to which the scene has jumped, shape (n,)."""
+        """Times of equilibria reached by a jump, shape (n,)."""
         return self.t[[way.startswith(JUMPED) for way in self.found_by]]
 
     def during(self, step: str) -> Array:
-        """Numbers of the instants of a step, from its begin to its end."""
+        """Indices of the instants of a step, its start and end included."""
         if self.plan is None:
             raise InputError("the run had no named steps: scene.run(Steps(press=1, pull=1))")
         if step not in self.plan.names:
@@ -130,8 +127,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
 
 
 def _begin(system, t, start, u, rules, stable):
-    """The instant to begin with: that given, if it is one of a run of the scene, or found from it.
-    """
+    """The first instant: ``start`` if it belongs to a run of the scene, or computed from it."""
     memory = system.forces.contacts.of_state(start)
     motion = None if start is None else start._motion
     if motion is None or start.system is not system or not isinstance(
@@ -145,7 +141,7 @@ def _begin(system, t, start, u, rules, stable):
 
 
 class _Record:
-    """What has been found so far."""
+    """Results so far."""
 
     def __init__(self, system: System, plan: Steps | None,
                  sensors: Sequence[tuple[str, Sensor]]) -> None:

@@ -1,4 +1,4 @@
-"""A scene: beams, what acts on them, and what can be solved."""
+"""Scenes: beams, actions on them, and their solutions."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Scene(Model):
 
     def __init__(self, *beams: Any) -> None:
         super().__init__(*beams)
-        # number of the beam -> (as given, of its degrees of freedom)
+        # number of the beam -> (as given, for its degrees of freedom)
         self._velocities: dict[int, tuple[Any, Array]] = {}
         self._sensors: dict[str, Sensor] = {}
 
@@ -113,7 +113,7 @@ class Scene(Model):
 
     @property
     def system(self) -> System:
-        """The discrete equations, built when first asked for."""
+        """The discrete equations, built on first use."""
         with self._lock:
             if self._system is None:
                 self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
@@ -123,20 +123,20 @@ class Scene(Model):
 
     @property
     def free(self) -> Array:
-        """Numbers of the degrees of freedom that no support fixes: of what solvers change."""
+        """Numbers of the degrees of freedom without supports: the unknowns."""
         return np.flatnonzero(self.system.constraints.free)
 
     def basis(self, beam: WhichBeam = None) -> Basis:
         """The scikit-fem ``Basis`` of the position field of a beam.
 
-        Its quadrature is exact for products of two functions. Degree of freedom k of it is number
-        ``scene.layout.offset(beam) + k`` of the scene. The position in a State is
-        ``basis.interpolate(q)`` with ``q = state.q`` of a scene of one beam.
+        Its quadrature is exact for products of two functions. Its degree of freedom k is number
+        ``scene.layout.offset(beam) + k`` of the scene. In a scene of one beam the position of a
+        State is ``basis.interpolate(state.q)``.
 
         Parameters
         ----------
         beam
-            The beam, its name or its number; None for the only one.
+            Beam, name or number; None for the only one.
         """
         return select_beam(self.beams, beam).exact_basis()
 
@@ -146,14 +146,14 @@ class Scene(Model):
         Parameters
         ----------
         state
-            A State of this scene, also one of :meth:`state`; None for the reference configuration
+            A State of this scene, as from :meth:`state`; None for the reference configuration
             without loads.
 
         Returns
         -------
         SceneMatrices
-            A named tuple ``M, D, K, force, J``, of all degrees of freedom: solvers take those that
-            are :attr:`free`.
+            A named tuple ``M, D, K, force, J`` for all degrees of freedom; the unknowns are
+            :attr:`free`.
 
         Examples
         --------
@@ -186,34 +186,32 @@ class Scene(Model):
 
     def replace(self, beam: WhichBeam = None, loads: Sequence[Load] | None = None,
                 beams: Sequence[Beam] | None = None, **changes: Any) -> Self:
-        """The same scene with other loads, on other beams, or with arguments of one beam changed.
+        """The scene with other loads, on other beams, or with changed arguments of one beam.
 
         Parameters
         ----------
         beam
-            The beam that is changed, its name or its number; None for the only one.
+            The beam to change, name or number; None for the only one.
         loads
-            Loads in place of all that the scene has, as ``[PointForce((0, -2), at=(1, 0))]``; those
-            of ``scene.loads`` may be among them.
+            Loads instead of all loads of the scene, as ``[PointForce((0, -2), at=(1, 0))]``; may
+            contain those of ``scene.loads``.
         beams
-            As many beams as the scene has, in the same order: a boundary given by a name, a point
-            or a function is found again on them.
+            As many beams as the scene has, in the same order: boundaries given by a name, a point
+            or a function are found again on them.
         **changes
             Arguments of :class:`Beam`, as ``material=...``, ``width=...`` or ``mesh=...``.
 
         Returns
         -------
         Scene
-            Another one. A state of this scene is a good start for its
-            ``solve_static(start=state)``, if the mesh has not changed.
+            On an unchanged mesh a state of the old scene is a good ``solve_static(start=state)``.
 
         Raises
         ------
         NameUnknown
             If an argument or the beam is not known.
         InputError
-            If a boundary was given by facet numbers, or velocities by DOFs, and the mesh is
-            another.
+            If the mesh differs and a boundary was given by facet numbers, or velocities by DOFs.
         MeshError
             If a place or a point is not found on the other mesh.
 
@@ -242,7 +240,7 @@ class Scene(Model):
             return scene if loads is None else scene._loaded(loads)
 
     def _loaded(self, loads):
-        """The same scene with other loads."""
+        """The scene with other loads."""
         if not isinstance(loads, (list, tuple)) or not all(isinstance(x, Load) for x in loads):
             raise InputError("loads must be a list of Loads, as [PointForce((0, -2), at=(1, 0))], "
                              f"got {shown(loads)}; classes are in skfem_ancf.actions.loads")
@@ -275,19 +273,18 @@ class Scene(Model):
     def solve_linear(self) -> State:
         """The small-displacement solution: one assembly, one factorisation.
 
-        It is that of linear theory, in proportion to the load. All that is asked of the State is
-        linear: strain and stress of small displacements, rotations, section forces, reactions on
-        the undeformed body; the strain energy is ``u . K u / 2``. Loads keep the direction that
-        they have without displacement. ``state.stability`` is None, see :meth:`buckling`;
-        ``state.checks`` says how far the body turns, which is to be small; ``state.base`` is the
-        reference configuration.
+        All quantities of the State are linear in the load: strain and stress of small
+        displacements, rotations, section forces, reactions on the undeformed body; the strain
+        energy is ``u . K u / 2``. Loads keep the direction of the reference configuration.
+        ``state.stability`` is None, see :meth:`buckling`; ``state.checks`` tells whether rotations
+        are small; ``state.base`` is the reference configuration.
 
         Raises
         ------
         SupportError
-            If a rigid motion is free.
+            If a rigid motion is not constrained.
         InputError
-            If the solution enters an obstacle.
+            If the solution penetrates an obstacle.
         """
         with self._lock:
             return solve_linear(self.system)
@@ -297,40 +294,40 @@ class Scene(Model):
                      first_step: float = 1.0, min_step: float = 1e-4, stable: bool = True,
                      progress: bool | None = None, goal: str = GOALS[0],
                      max_elements: int = MOST_ELEMENTS, max_degree: int = DEGREES[-1]) -> State:
-        """The equilibrium under the full load.
+        """The equilibrium under full load.
 
         Parameters
         ----------
         start
-            A State to start from, of this scene or of one whose beams have equal meshes and
-            elements; the reference configuration by default. :meth:`state` makes one of DOFs.
+            A State to start from, of this scene or of one with equal meshes and elements; the
+            reference configuration by default. :meth:`state` makes one from DOFs.
         adapt
-            Tolerance of the error: raise the degree of elements that have one where the solution is
-            smooth, else refine the meshes. The state's ``error_estimate`` says what was reached,
-            its ``refinements`` what was done; its beams are the refined ones.
+            Tolerance of the error: raise the degree of elements where the solution is smooth,
+            refine the meshes elsewhere. The State has the refined beams, the estimate
+            ``error_estimate`` and the ``refinements``.
         method, tol, max_iterations, first_step, min_step, progress
             As for :func:`skfem_ancf.solvers.solve_static`.
         stable
-            Take stable equilibria alone; with False any that the load steps lead to, and
-            ``state.stability`` says what it is.
+            Return stable equilibria only; with False any equilibrium at the end of the load steps,
+            see ``state.stability``.
         goal, max_elements, max_degree
-            With ``adapt``: the error is that of the "displacement" or of the "strain", see
-            :func:`skfem_ancf.scene.adapt.solve_adaptive`; how far elements are added and raised.
+            For ``adapt``: the error of the "displacement" or of the "strain", see
+            :func:`skfem_ancf.scene.adapt.solve_adaptive`; limits of refinement.
 
         Raises
         ------
         SupportError
-            If a rigid motion is free.
+            If a rigid motion is not constrained.
         ConvergenceError
             If there is no convergence; its ``state`` is the last converged State.
 
         Warns
         -----
         StabilityWarning
-            If the path loses its stability before the full load, so that the solution went on to
-            another equilibrium, or if loads without a potential leave it unstable.
+            If the path loses stability before the full load and another equilibrium was found, or
+            if the equilibrium is unstable under loads without a potential.
         ModelWarning
-            If a fibre is compressed beyond what the law is good for, or the mesh is too coarse.
+            If a fibre is compressed beyond the range of the law, or the mesh is too coarse.
         """
         find = partial(newton.solve_static, method=method, tol=tol, max_iterations=max_iterations,
                        first_step=first_step, min_step=min_step, progress=progress, stable=stable)
@@ -353,16 +350,12 @@ class Scene(Model):
     def plot(self, ax: Any = None, *, nodes: bool = False, names: bool = False,
              loads: bool = True, supports: bool = True, thickness: float | str = "auto",
              title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
-        """Draw the scene before anything is solved: bodies, supports, joints, springs, loads.
+        """Draw the scene before it is solved: bodies, supports, joints, springs, loads.
 
         Parameters
         ----------
         ax, nodes, names, loads, supports, thickness, title, filename, dpi
             As for :func:`skfem_ancf.visuals.matplotlib.plot_scene`.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
 
         Examples
         --------
@@ -383,19 +376,19 @@ class Scene(Model):
                 field: Any = "eps_yy", limits: ArrayLike | None = None,
                 thickness: float | str = "auto", off_screen: bool | None = None,
                 window_size: tuple[int, int] = (1000, 700)) -> Explorer:
-        """A view of pyvista in which the equilibrium follows a slider, or a force that is dragged.
+        """A pyvista view in which the equilibrium follows a slider, or a force that is dragged.
 
         Parameters
         ----------
         load
-            A function of a number that returns an item that acts in addition, as a load, or another
-            scene of the same meshes: a slider sets the number. Or a PointForce that acts in
-            addition: its arrow is dragged by the handle at its tip.
+            A function of a number that returns an additional item, as a load, or another scene of
+            the same meshes: a slider sets the number. Or an additional PointForce: its arrow is
+            dragged by the handle at its tip.
         interval, value, title
             Ends of the slider, shape (2,), its start, by default the end, and its name.
         field, limits, thickness, off_screen, window_size
-            As for :func:`skfem_ancf.visuals.pyvista.view`. Without limits the colours are those of
-            the states at the ends and at the start.
+            As for :func:`skfem_ancf.visuals.pyvista.view`. Default limits are those of the states
+            at the ends and at the start.
 
         Returns
         -------
@@ -422,9 +415,9 @@ class Scene(Model):
 
     def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,
               load: float = 1.0) -> State:
-        """A State of this scene with a given displacement: a start, or a shape to look at.
+        """A State of this scene with a given displacement, as a start of solutions or for output.
 
-        It is no equilibrium, ``converged`` is False.
+        It is not an equilibrium: ``converged`` is False.
 
         Parameters
         ----------
@@ -432,9 +425,9 @@ class Scene(Model):
             Displacement of the DOFs from the reference configuration, beam after beam, shape (N,);
             zero by default.
         multipliers
-            Of the joints, shape (m,); zero by default.
+            Lagrange multipliers of the joints, shape (m,); zero by default.
         load
-            Factor on the loads, for modes about the state and its reactions.
+            Load factor, for modes about the state and its reactions.
 
         Examples
         --------
@@ -463,8 +456,8 @@ class Scene(Model):
         Parameters
         ----------
         branch
-            One of the ``critical_points`` of an earlier path of this scene, of kind "bifurcation":
-            follow the path that leaves the other one there.
+            A bifurcation in the ``critical_points`` of a path of this scene: follow the branch
+            there.
         steps, ds, ds_max, max_load, until, tol, max_iterations, locate, side, progress
             As for :func:`skfem_ancf.solvers.continuation`.
 
@@ -477,7 +470,7 @@ class Scene(Model):
 
         Examples
         --------
-        Euler's column buckles at pi^2 E I / (4 L^2); its two paths:
+        Buckling of a column at pi^2 E I / (4 L^2), with both paths:
 
         >>> import numpy as np
         >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
@@ -507,17 +500,17 @@ class Scene(Model):
                          beam: WhichMember = None) -> Self:
         """The velocity at the start of :meth:`integrate`.
 
-        What supports and joints do not allow of it they stop by impulses.
+        Components that violate supports and joints are removed by impulses.
 
         Parameters
         ----------
         v
-            The velocity of all points, shape (2,), or a function of the points x, shape (2, ...),
-            of the reference configuration that returns velocities (2, ...); or velocities of the
-            coordinates, shape (beam.N,). Of a rigid body the function is asked at its centre of
-            mass and beside it.
+            The velocity of all points, shape (2,), or a function of points x, shape (2, ...), of
+            the reference configuration that returns velocities (2, ...); or velocities of the
+            degrees of freedom, shape (beam.N,). For a rigid body the function is evaluated at its
+            centre of mass and near it.
         beam
-            The beam, its name or its number, in a scene of several; or a RigidBody.
+            Beam, name or number, in a scene of several; or a RigidBody.
         """
         with self._lock:
             k = self.layout.number(beam)
@@ -532,60 +525,58 @@ class Scene(Model):
                   breakpoints: ArrayLike = (), until: Callable[[State], float] | None = None,
                   checkpoint: StrPath | None = None, every: int | None = None,
                   check: bool = False, progress: bool | None = None) -> History:
-        """The motion from the reference configuration, or from a given one.
+        """The motion from the reference configuration, or from a given state.
 
         Parameters
         ----------
         t_end
             Time at the end.
         dt
-            Step size, or "auto": chosen by an estimate of the error of each step, see ``rtol``.
-            Functions of time are sampled ahead at 4097 times, so that no step passes over an event
-            that lasts longer than from one of these to the next; name shorter ones by
-            ``breakpoints``.
+            Step size, or "auto": controlled by an error estimate, see ``rtol``. Functions of time
+            are sampled at 4097 times, so that no step skips an event longer than the sampling
+            interval; give ``breakpoints`` for shorter ones.
         scheme
-            A scheme, a name from :data:`skfem_ancf.dynamics.SCHEMES`, or "auto": by joints,
-            damping, stiffness, contact and ``rtol``, as :meth:`plan` says.
+            A scheme, a name from :data:`skfem_ancf.dynamics.SCHEMES`, or "auto": chosen by joints,
+            damping, stiffness, contact and ``rtol``, see :meth:`plan`.
         start
             A State to start from, or None for the reference configuration. An instant of a motion
-            (``history.state(k)``) goes on with its velocity, from its time; every other State
-            starts with the scene's :meth:`initial_velocity`.
+            (``history.state(k)``) continues with its velocity and time; any other State starts with
+            the scene's :meth:`initial_velocity`.
         t_start
             Time at the start; by default that of ``start``, or 0.
         t_eval
-            Times to store, shape (n,); every step by default. An instant within a step is the end
-            of a shorter step from the same start: the steps of the motion do not depend on it.
+            Times to store, shape (n,); every step by default. An instant within a step is computed
+            by a shorter step from the same start, without effect on the motion.
         tol
-            Tolerance of the iteration in a step; the scheme's own by default.
+            Tolerance of the iteration in a step; that of the scheme by default.
         rtol
-            Tolerance of ``dt="auto"``: what a step adds to the error of the displacement of a point
-            is at most about ``rtol`` times the size of the scene, in proportion to the size of the
-            step. The error of the motion is more where small errors grow: ``check`` measures it.
+            Tolerance of ``dt="auto"``: the error of the displacement per step, relative to the size
+            of the scene and in proportion to the step size. The global error may be larger:
+            ``check`` measures it.
         breakpoints
-            Times, shape (n,), at which loads or motions jump or have a kink: a step ends there,
-            with the values before, and the next one starts from the values after.
+            Times, shape (n,), at which loads or motions jump or have a kink: a step ends there with
+            the values before, and the next one starts with the values after.
         until
-            A function of the State at an instant that returns a number: the motion ends where it
-            changes its sign, within a step; ``history.event`` is its time. It is asked after each
-            step: two changes within one are not seen. Not with ``checkpoint``.
+            A function of the State that returns a number: the motion ends where it changes its
+            sign, within a step; ``history.event`` is the time. It is evaluated after each step: two
+            changes within one step are not detected. Not with ``checkpoint``.
         checkpoint
-            A file to write now and then, ``.npz`` or ``.h5``, from which :meth:`resume` goes on.
+            A file (``.npz`` or ``.h5``) for checkpoints, from which :meth:`resume` continues.
         every
-            Steps between two checkpoints; by default a minute, and so that writing takes less than
-            a twentieth of the time.
+            Steps between two checkpoints; by default a minute, with at most a twentieth of the time
+            spent on writing.
         check
-            Integrate once more in steps half as long, three times the work in all:
-            ``history.error`` is the largest difference at the stored instants. Not with
-            ``checkpoint``.
+            Integrate again with half the step size: ``history.error`` is the largest difference at
+            the stored instants. Not with ``checkpoint``.
         progress
             Show a progress bar: True, False, or None for "if it takes long".
 
         Raises
         ------
         ConvergenceError
-            If a step fails; its ``state`` is the History up to there.
+            If a step fails; its ``state`` is the History so far.
         Interrupted
-            On Ctrl-C; its ``state`` is the History up to there.
+            On Ctrl-C; its ``state`` is the History so far.
 
         Examples
         --------
@@ -611,12 +602,12 @@ class Scene(Model):
     def run(self, steps: Steps | ArrayLike, increments: int = 20, start: State | None = None, *,
             tol: float = 1e-8, max_iterations: int = 30, min_step: float = 1e-4,
             stable: bool = True, progress: bool | None = None) -> StepHistory:
-        """Quasi-static steps: equilibria over a time, each from the one before.
+        """Quasi-static steps: equilibria over time, each from the previous one.
 
         Loads, supports, temperatures, obstacles and joints follow their functions of time, as in a
-        motion, without inertia. Friction remembers the way. An increment that fails is cut. Where
-        the equilibrium gives way (a snap), the strategies of :meth:`solve_static` lead to another
-        one, and ``history.jumps`` says when.
+        motion, without inertia. Friction depends on the history. An increment that fails is cut.
+        Where the path ends (a snap), the strategies of :meth:`solve_static` lead to another
+        equilibrium, and ``history.jumps`` has the time.
 
         Parameters
         ----------
@@ -624,27 +615,23 @@ class Scene(Model):
             :class:`~skfem_ancf.Steps` with names, or the time at the end, or several times at
             which an increment ends.
         increments
-            Increments of each step at least, if none is cut; each is an instant of the history.
+            Least number of increments of each step; each is an instant of the history.
         start
             A State to begin with, or None for the equilibrium at the time 0. An instant of a
             history goes on from its time, other states from 0. It may be one of a scene of the
-            same beams with other supports, joints and loads, as the phase before in an assembly.
-            Forces of supports and joints that are no longer there are reduced in load steps.
+            same beams with other supports, joints and loads, as the previous phase of an assembly.
+            Forces of removed supports and joints are reduced in load steps.
         tol, max_iterations, stable, progress
             As for :meth:`solve_static`.
         min_step
-            The smallest increment, as a part of the largest.
-
-        Returns
-        -------
-        StepHistory
+            The smallest increment, relative to the largest.
 
         Raises
         ------
         ConvergenceError
-            If no equilibrium is found; its ``state`` is the StepHistory up to there.
+            If no equilibrium is found; its ``state`` is the StepHistory so far.
         Interrupted
-            On Ctrl-C; its ``state`` is the StepHistory up to there.
+            On Ctrl-C; its ``state`` is the StepHistory so far.
 
         Examples
         --------
@@ -670,14 +657,14 @@ class Scene(Model):
 
     def sensor(self, name: str, what: str | Callable[[State], Any], at: Any = None,
                beam: WhichBeam = None, recover: bool = False, line: int | None = None) -> Self:
-        """Write something down at every step of motions: ``history.sensors[name]``.
+        """Record a quantity at every step of motions: ``history.sensors[name]``.
 
         States may then be stored sparsely, by ``integrate(..., t_eval=...)``.
 
         Parameters
         ----------
         name
-            Its name; a second sensor of a name takes the place of the first.
+            Its name; a second sensor of the same name replaces the first.
         what
             "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress"
             or another field there; "N", "Q", "M", "force", "curvature", "shear" or "angle" of
@@ -686,12 +673,12 @@ class Scene(Model):
             Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; a
             joint of the scene for its force; None for a function.
         beam
-            The beam, its name or its number; found if it is not given.
+            Beam, name or number; found from the points by default.
         recover
-            Recovered fields and section forces, a millisecond a step and beam; by default those of
-            the elements.
+            Recovered fields and section forces, at a cost of a millisecond per step and beam; by
+            default those of the elements.
         line
-            The number of the line, of a frame; found if it is not given.
+            Number of the line of a frame; found from the points by default.
 
         Examples
         --------
@@ -713,33 +700,33 @@ class Scene(Model):
         return self
 
     def _located(self):
-        """Names and sensors, which this scene has a place for."""
+        """Names and sensors, located in this scene."""
         for sensor in self._sensors.values():
             locate(sensor, self.system)
         return list(self._sensors.items())
 
     def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
                progress: bool | None = None) -> History:
-        """Go on with a motion from its checkpoint, to the end that it was given.
+        """Continue a motion from its checkpoint to its end.
 
-        On the same machine its numbers are those of a run that was not interrupted, bit for bit if
-        both are compiled or both are not; instants of ``t_eval`` within a step are to the tolerance
-        of the iteration.
+        On the same machine the results are bitwise those of an uninterrupted run if both are
+        compiled or both are not, except instants of ``t_eval`` within a step, which agree to the
+        tolerance.
 
         Parameters
         ----------
         path
-            The file of ``integrate(..., checkpoint=path)``, which goes on to be written.
+            The file of ``integrate(..., checkpoint=path)``; writing continues.
         scheme
-            The scheme, if it is a custom one; the file knows those of the package.
+            The scheme, if it is user-defined.
         progress
             Show a progress bar: True, False, or None for "if it takes long".
 
         Raises
         ------
         CheckpointError
-            If the file cannot be read, is damaged, or of another scene. Functions of time are
-            compared at 33 times only.
+            If the file cannot be read, is damaged, or belongs to another scene. Functions of time
+            are compared at 33 times only.
 
         Examples
         --------
@@ -763,15 +750,16 @@ class Scene(Model):
         Parameters
         ----------
         k
-            How many.
+            Number of modes.
         state
-            The state about which the beams vibrate, prestress included; stress-free by default.
+            The state to linearise about, prestress included; the reference configuration by
+            default.
 
         Returns
         -------
         Modes
             With ``frequencies`` in rad/s, ``shapes`` and ``mode(i, amplitude)``; ``flutter`` and
-            complex ``eigenvalues`` where loads follow the body.
+            complex ``eigenvalues`` for loads without a potential.
 
         Examples
         --------
@@ -789,14 +777,14 @@ class Scene(Model):
             return eigen.modes(self.system, configuration(self.system, state), k)
 
     def buckling(self, k: int = 1) -> Buckling:
-        """The k lowest load factors at which the structure buckles, and their shapes.
+        """The k lowest buckling load factors and their shapes.
 
         Raises
         ------
         InputError
-            If there is no positive factor, or loads that follow the body make it flutter first.
+            If there is no positive factor, or loads without a potential cause flutter first.
         SupportError
-            If a rigid motion is free.
+            If a rigid motion is not constrained.
         """
         with self._lock:
             return eigen.buckling(self.system, k)

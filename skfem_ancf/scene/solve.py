@@ -1,4 +1,4 @@
-"""From a description to equations, and from what solvers find to states."""
+"""From the description of a scene to equations, and from solutions to states."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ from ..results.state import State
 from ..solvers import eigen
 from ..solvers.outcome import StaticResult
 
-#: How often a linear system is solved at most, with one factorisation; the degrees of freedom up to
-#: which it is more than once; and the correction relative to the displacement at which it is
-#: enough.
+#: Iterative refinement of linear solutions: largest number of solves with one factorisation,
+#: largest number of degrees of freedom, and relative size of a correction to stop at.
 LINEAR_SOLVES, SOLVED_AGAIN, CLOSE = 4, 50000, 1e-13
 
 
@@ -45,7 +44,7 @@ def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
 
 
 def _weights(layout, loads, elements):
-    """Loads by which gravity acts on point masses."""
+    """Weights of point masses."""
     masses = [one for one in elements if isinstance(one, PointMass) and one.mass]
     return [bind_load(PointForce(one.mass * load.g, one.at, None, load.amplitude), load.beam)
             for load in loads if getattr(load, "g", None) is not None
@@ -76,7 +75,7 @@ def solve_linear(system: System) -> State:
     u, multipliers = np.zeros(system.N), none
     u[system.constraints.fixed] = system.constraints.values(1.0)
     gap, J = system.constraints.constraint(zero, 1.0), system.constraints.full_jacobian(zero, 1.0)
-    # solved again with what sums of strains leave: an assembled stiffness rounds off bending
+    # refine with residuals from strains: the assembled stiffness has round-off in bending
     for _ in range(LINEAR_SOLVES if system.N <= SOLVED_AGAIN else 1):
         rest = (linear_external_force(system, zero, u) - linear_force(system, zero, u)
                 - multipliers @ J)
@@ -91,7 +90,7 @@ def solve_linear(system: System) -> State:
 
 def solve_static(system: System, u: Array | None, memory: Array | None,
                  find: Callable[..., StaticResult]) -> State:
-    """The equilibrium under the full load, without warnings, see :func:`warn_about`.
+    """The equilibrium under full load, without the warnings of :func:`warn_about`.
 
     ``find`` is :func:`skfem_ancf.solvers.solve_static` with its options.
     """
@@ -119,14 +118,14 @@ def _state(system, result):
 
 
 def warn_about(state: State) -> None:
-    """Say what makes a static solution doubtful."""
+    """Warn of a doubtful static solution."""
     if state.doubt:
         warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
     warn_of(state)
 
 
 def critical_of(point: CriticalPoint, system: System) -> Any:
-    """What a CriticalPoint of a path of a system was made from."""
+    """The solver's data of a CriticalPoint of this system."""
     if not isinstance(point, CriticalPoint) or point.kind != "bifurcation":
         raise InputError("branch must be a point of path.critical_points of kind 'bifurcation', "
                          f"got {shown(point)}")

@@ -17,7 +17,7 @@ from .scenery import INK, MUTED, Scenery
 
 SUFFIXES = (".gif", ".mp4")
 
-#: Frames per second, and width and height of a picture, least and largest.
+#: Least and largest frames per second, width and height of a picture.
 FPS, PIXELS = (0.01, 1000), (100, 10000)
 
 #: Frames of a film where their number is not given, at most; dots per inch.
@@ -31,23 +31,23 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
             recover: bool = True, size: tuple[int, int] = (800, 600)) -> Path:
     """Write a film of a motion, coloured by a field; returns its file.
 
-    The colours have one range and the section one factor of thickness in all frames.
+    All frames have the same range of colours and the same thickness factor.
 
     Parameters
     ----------
     history
         A :class:`~skfem_ancf.dynamics.history.History`.
     filename
-        Ends with .gif, or .mp4 (which needs imageio and imageio-ffmpeg); missing folders are made
-        before anything is drawn.
+        Ends with .gif, or .mp4 (which needs imageio and imageio-ffmpeg); missing folders are
+        created.
     frames
-        How many instants, evenly chosen; all by default, up to 100.
+        Number of instants, evenly chosen; all by default, up to 100.
     fps
-        Frames per second; by default as fast as the motion, between 5 and 50.
+        Frames per second; by default in real time, between 5 and 50.
     backend
-        Deprecated: matplotlib draws the frames.
+        Deprecated and ignored.
     field, thickness, undeformed, cmap, limits, unit, subdivide, recover
-        Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+        As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     size
         Width and height of the film in pixels, shape (2,).
     """
@@ -71,7 +71,7 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
 
 
 def pixels(name: str, size: Any) -> tuple[int, int]:
-    """Width and height of a picture in pixels; ``name`` is that of the argument."""
+    """Check width and height of a picture in pixels; ``name`` is that of the argument."""
     try:
         width, height = (require_integer(name, k, *PIXELS) for k in size)
     except (TypeError, ValueError):
@@ -114,7 +114,7 @@ def _fps(history, chosen, fps):
 
 
 def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) -> Iterator[Any]:
-    """The pictures, shape (height, width, 3), one after the other."""
+    """Pictures, shape (height, width, 3), one at a time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure = figure_class()(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, layout="constrained")

@@ -25,7 +25,7 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *,
     state
         A :class:`~skfem_ancf.results.State`.
     beam
-        The beam, its name or its number; all beams of the scene by default.
+        Beam, name or number; all beams by default.
     axes
         Three matplotlib Axes to draw on; a new figure by default, which needs no display.
     title, filename, dpi, recover
@@ -68,7 +68,7 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *,
 
 
 def _clear_of_noise(ax):
-    """Round-off about zero is not drawn as if it were a force."""
+    """Set limits such that round-off about zero is not visible."""
     low, high = ax.get_ylim()
     size = max(abs(low), abs(high))
     others = [max(map(abs, other.get_ylim())) for other in ax.figure.axes if other is not ax]

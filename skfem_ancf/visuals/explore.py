@@ -1,4 +1,4 @@
-"""A view in which the body follows a slider, or a force whose arrow is dragged."""
+"""An interactive view: the body follows a slider, or a force whose arrow is dragged."""
 
 from __future__ import annotations
 
@@ -25,31 +25,30 @@ LOAD = "#a50026"
 
 
 class Explorer:
-    """A plotter of pyvista whose body follows a number or a force; :meth:`Scene.explore
-    <skfem_ancf.Scene.explore>` makes it.
+    """A pyvista plotter whose body follows a number or a force, see :meth:`Scene.explore
+    <skfem_ancf.Scene.explore>`.
 
     Parameters
     ----------
     solve
         A function of a value, and of a State to start from or None, that returns a State.
     values
-        The states at these set the colours and the section of the picture, which the solutions
-        after them keep; the last is shown.
+        Their states determine the fixed range of colours and of the picture; the last is shown.
     field, limits, thickness, off_screen, window_size
         As for :func:`skfem_ancf.visuals.pyvista.view`.
 
     Attributes
     ----------
     plotter : pyvista.Plotter
-        What is seen: its ``show()`` opens a window or a notebook cell, ``screenshot()`` writes.
+        Its ``show()`` opens a window or a notebook cell, ``screenshot()`` writes a file.
     mesh : pyvista.PolyData
         The body; its points and colours change in place.
     value
-        The number or the force (2,) at which the body is.
+        The current number or force (2,).
     state : State
-        The solution there.
+        The current solution.
     widget
-        The slider or the handle of the arrow, a widget of VTK.
+        The slider or the handle of the arrow, a VTK widget.
     """
 
     def __init__(self, solve: Callable[[Any, Any], Any], values: Any, *, field: Any = "eps_yy",
@@ -75,7 +74,7 @@ class Explorer:
         return f"<Explorer at {shown(self.value)}: {self.state!r}>"
 
     def _look(self, margin):
-        """Turn the camera to the body, with a margin for what is dragged, and for the bars."""
+        """Point the camera at the body, with margins for dragging and for the bars."""
         low, high = self._low - margin * self._size, self._high + margin * self._size
         width, height = self.plotter.window_size
         self.plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
@@ -83,9 +82,9 @@ class Explorer:
             (high[1] - low[1]) / (1.0 - 2.0 * BAR), (high[0] - low[0]) * height / width)
 
     def set(self, value: Any) -> Any:
-        """Solve at a number or a force, and put the body there; returns the State.
+        """Solve for a number or a force, and update the body; returns the State.
 
-        Where no equilibrium is found the body stays, and the picture says so.
+        Without an equilibrium the body does not move, and the picture shows a message.
         """
         try:
             state = self._solve(value, self.state)
@@ -108,12 +107,12 @@ class Explorer:
         return state
 
     def slider(self, low: float, high: float, title: str = "") -> None:
-        """Add the slider that :meth:`set` follows.
+        """Add the slider for :meth:`set`.
 
         Parameters
         ----------
         low, high, title
-            Its ends, and what it says.
+            Its ends and title.
         """
         self.widget = self.plotter.add_slider_widget(
             lambda x: None if x == self.value else self.set(x), (low, high), value=self.value,
@@ -123,19 +122,18 @@ class Explorer:
         self._follow = lambda: self.widget.GetRepresentation().SetValue(self.value)
 
     def arrow(self, place: Callable[[Any], Array]) -> None:
-        """Add the arrow of the force, with a handle at its tip that is dragged.
+        """Add the arrow of the force, with a handle at its tip.
 
         Parameters
         ----------
         place
-            A function of the State that returns the position at which the force acts, shape (2,).
+            A function of the State that returns the position of the force, shape (2,).
         """
         import pyvista
 
         size = float(np.hypot(*self.value))
         if size == 0.0:
-            raise InputError("the force must not be zero: the length of its arrow is for others "
-                             "the scale")
+            raise InputError("the force must not be zero: it determines the scale of the arrow")
         scale, drawn = ARROW * self._size / size, pyvista.PolyData()
 
         def dragged(tip: ArrayLike, widget: Any) -> None:
@@ -160,14 +158,14 @@ class Explorer:
 
 def explorer(solve: Callable[[Any, Any], Any], interval: Any, value: Any, title: str,
              place: Callable[[Any], Array] | None, picture: dict[str, Any]) -> Explorer:
-    """An Explorer with its slider, or with its arrow where a place is given.
+    """An Explorer with its slider, or with its arrow if a place is given.
 
     Parameters
     ----------
     solve, place, picture
         As for :class:`Explorer`, its :meth:`~Explorer.arrow`, and its options.
     interval, value, title
-        Ends and start of the slider; or the force at the start, shape (2,).
+        Ends and start of the slider; or the initial force, shape (2,).
     """
     if place is not None:
         made = Explorer(solve, [require_finite("the force", value, (2,))], **picture)

@@ -1,4 +1,4 @@
-"""What notebooks show of states, scenes, paths and motions: words, and a picture if they can."""
+"""HTML of states, scenes, paths and motions in notebooks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DPI = 80
 
 
 def _picture(draw):
-    """An img element of the figure of the Axes that ``draw()`` returns; empty if it cannot."""
+    """An img element of the figure of ``draw()``; empty if that fails."""
     try:
         figure, data = draw().figure, io.BytesIO()
         figure.savefig(data, format="png", dpi=DPI, bbox_inches="tight")
@@ -30,13 +30,13 @@ def _words(text):
 
 
 def state_html(state: Any) -> str:
-    """The words of a State, and its strain across the section."""
+    """The text of a State, and its strain across the section."""
     field = "eps_yy" if any(np.any(state.u_of(b)) for b in state.beams) else "displacement"
     return _words(str(state)) + _picture(lambda: state.plot(field))
 
 
 def scene_html(scene: Any) -> str:
-    """A table of what is in a Scene, and its reference configuration."""
+    """A table of the items of a Scene, and its reference configuration."""
     rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
     rows += [("rigid body", b) for b in scene.bodies]
     rows += [("domain", d) for d in scene.domains]
@@ -54,7 +54,7 @@ def _short(thing: Any) -> str:
 
 
 def path_html(path: Any) -> str:
-    """The words of a Path, and its load against the displacement of the node that moves most."""
+    """The text of a Path, and its load against the largest nodal displacement."""
     def draw():
         state = path.state(len(path) - 1)
         beam = max(state.beams, key=lambda b: np.max(np.abs(state.u_of(b))))
@@ -66,7 +66,7 @@ def path_html(path: Any) -> str:
 
 
 def history_html(history: Any) -> str:
-    """The words of a History, and its energies over time."""
+    """The text of a History, and its energies over time."""
     from .matplotlib import dress, figure_class
 
     def draw():

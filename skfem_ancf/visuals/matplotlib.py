@@ -1,4 +1,4 @@
-"""Pictures of the deformed body, coloured by a field."""
+"""Plots of the deformed body, coloured by a field."""
 
 from __future__ import annotations
 
@@ -31,23 +31,22 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
                subdivide: tuple[int, int] = (16, 8), filename: StrPath | None = None,
                dpi: float = 200, recover: bool = True, scale: float | str = 1.0,
                loads: bool = False, supports: bool = False) -> Any:
-    """Draw the deformed body of a state, coloured by a field.
+    """Draw the deformed body of a state, coloured by a field; returns the Axes.
 
     Parameters
     ----------
     state
-        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``; or a list
-        of them, drawn over each other with one range of colours.
+        A :class:`~skfem_ancf.results.State`, or an object with ``beams`` and ``u_of``; or a list of
+        them, drawn over each other with one range of colours.
     field
-        A name of :data:`skfem_ancf.recovery.fields.FIELDS` with one component, as "S_xx",
-        "von_mises" or "eps_1"; "displacement" for its magnitude; or your function or
-        Field, see :mod:`skfem_ancf.recovery.fields`.
+        The name of a scalar field in :data:`skfem_ancf.recovery.fields.FIELDS`, as "S_xx",
+        "von_mises" or "eps_1"; "displacement" for its magnitude; or a function or Field, see
+        :mod:`skfem_ancf.recovery.fields`.
     ax
         matplotlib Axes to draw in; a new figure by default, which needs no display.
     thickness
-        Factor by which the section is drawn thicker than it is, for slender beams; the picture
-        says so. "auto": the whole number that makes the section about 1/25 of the picture, less
-        where bends would fold, at least 1.
+        Magnification of the section, for slender beams, noted in the picture. "auto": the integer
+        that makes the section about 1/25 of the picture, less where bends would fold, at least 1.
     undeformed
         Draw the reference configuration of the first state in grey behind.
     colorbar
@@ -66,20 +65,15 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     subdivide
         Patches along and across each element.
     filename, dpi
-        Write the picture here too (.png, .pdf, .svg), with this resolution; missing folders are
-        made.
+        Write the picture (.png, .pdf, .svg) with this resolution; missing folders are created.
     recover
-        Recovered strain and stress where the state has them; False for those of the elements.
+        Recovered strain and stress if available; False for those of the elements.
     scale
-        Factor by which displacements are drawn larger than they are; the picture says so. "auto":
-        the largest is about 1/10 of the body, or as it is if that is more.
+        Magnification of displacements, noted in the picture. "auto": the largest is about 1/10 of
+        the body, or true to scale if it is larger.
     loads, supports
-        Draw the symbols of :func:`plot_scene`, of several states those of the last; loads with
-        their values at this load factor or time.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
+        Draw the symbols of :func:`plot_scene`, for several states those of the last, with loads at
+        its load factor or time.
 
     Examples
     --------
@@ -118,7 +112,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
 def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool = True,
                nodes: bool = False, names: bool = False, thickness: float | str = "auto",
                title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
-    """Draw the bodies of a scene as they are at the start, and what acts on them.
+    """Draw the reference configuration of a scene with its items; returns the Axes.
 
     Where there are several materials, each has a colour and an entry of the legend.
 
@@ -132,17 +126,13 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
     supports
         Draw supports, joints, motors, springs, foundations, masses, drag and controllers. A clamp
         is a line with hatching, a pin a triangle, a support of one direction a triangle on a line,
-        or two lines if the section cannot turn, a hinge a circle, a weld a square.
+        or two lines if the section cannot rotate, a hinge a circle, a weld a square.
     nodes
         Draw the nodes of the meshes.
     names
         Write the names of beams, bodies and domains, or their numbers.
     ax, thickness, title, filename, dpi
         As for :func:`plot_state`.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
     """
     Figure = figure_class()
     loads, supports, nodes, names = (require_flag(name, value) for name, value in (
@@ -202,12 +192,12 @@ def _materials(ax, scenery, beams, subdivide, inside):
 
 
 def sketch(ax: Any, scenery: Scenery, state: Any) -> Sketch:
-    """What draws symbols at a state as it is drawn, the last of a scenery."""
+    """A Sketch of symbols at the drawn state, the last of a scenery."""
     return Sketch(ax, scenery.scale * state.u, scenery.points(-1)[:, :2])
 
 
 def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
-    """Limits of a picture: wide ones have room for symbols, and show obstacles beside the body."""
+    """Set the limits; wide ones have room for symbols, and show obstacles near the body."""
     if wide:
         box = around(scenery.every[:, :2].T)
         room = 0.1 * np.max(np.ptp(box, axis=1)) * np.array([[-1.0], [1.0]])
@@ -255,7 +245,6 @@ def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any,
 
 
 def _states(state):
-    """What is drawn, as a list."""
     states = state if isinstance(state, (list, tuple)) else [state]
     if not states:
         raise InputError("there is no state to draw: got an empty list")
@@ -265,7 +254,7 @@ def _states(state):
 
 
 def colour_bar(ax: Any, image: Any, extend: str, label: str) -> None:
-    """A bar as high as the picture, or below a flat one."""
+    """A colour bar as high as the picture, or below a flat one."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     flat = (y1 - y0) < 0.35 * (x1 - x0)
     place: dict[str, Any] = (dict(ax=ax, location="bottom", shrink=0.6, aspect=45, pad=0.06)
@@ -280,7 +269,7 @@ def colour_bar(ax: Any, image: Any, extend: str, label: str) -> None:
 
 
 def _figsize(points, colorbar):
-    """A figure about as wide and high as what is in it."""
+    """Figure size with the aspect ratio of its content."""
     width, height = np.maximum(np.ptp(points, axis=0), 1e-300)
     aspect = np.clip(height / width, 0.15, 1.6)
     area = 5.2 * 5.2 if aspect > 0.5 else 36.0
@@ -291,23 +280,19 @@ def _figsize(points, colorbar):
 def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
               ax: Any = None, *, title: str | None = None, filename: StrPath | None = None,
               dpi: float = 200) -> Any:
-    """Draw the load factor of an equilibrium path against a displacement.
+    """Draw the load factor of an equilibrium path against a displacement; returns the Axes.
 
-    Unstable parts, where they are known, are dashed; turning points of the load are marked.
+    Unstable parts are dashed, if known; limit points are marked.
 
     Parameters
     ----------
     path
         A :class:`~skfem_ancf.results.path.Path`.
     point, component, beam
-        The material point, its place (x, y), shape (2,); the component (0 or 1) of its
-        displacement, and the beam it belongs to.
+        The material point (x, y), shape (2,); the component (0 or 1) of its displacement, and its
+        beam.
     ax, title, filename, dpi
         As for :func:`plot_state`.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
     """
     Figure = figure_class()
     component = require_integer("component", component, 0, 1)
@@ -331,7 +316,7 @@ def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam =
 def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", ylabel: str = "",
                title: str | None = None, filename: StrPath | None = None, dpi: float = 200,
                **options: Any) -> Any:
-    """Draw a curve of numbers.
+    """Draw a curve; returns the Axes.
 
     Parameters
     ----------
@@ -343,10 +328,6 @@ def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", 
         Labels of the axes.
     **options
         Of matplotlib's ``Axes.plot``.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
     """
     Figure = figure_class()
     x, y = np.asarray(x), np.asarray(y)
@@ -366,7 +347,7 @@ def plot_curve(x: ArrayLike, y: ArrayLike, ax: Any = None, *, xlabel: str = "", 
 
 
 def figure_class() -> Any:
-    """matplotlib's Figure, which needs no window."""
+    """matplotlib's Figure, which needs no display."""
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -385,7 +366,7 @@ def colormap(cmap: Any) -> Any:
 
 
 def page(ax: Any, title: str | None, filename: Any, dpi: float) -> tuple[Any, float]:
-    """The file, or None, and its resolution; what is wrong is said before anything is drawn."""
+    """Check the file, or None, and its resolution, before anything is drawn."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     if ax is not None:
@@ -417,7 +398,7 @@ def plain(ax: Any) -> None:
 
 
 def dress(ax: Any, title: str | None, note: str = "") -> None:
-    """Title, or None, axes and labels of a picture, and a small note above it."""
+    """Title, or None, labels of the axes, and a small note above the picture."""
     if title:
         ax.set_title(title, loc="left", fontsize=10, color=INK, pad=18 if note else 6)
     plain(ax)

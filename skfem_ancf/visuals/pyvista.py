@@ -1,4 +1,4 @@
-"""States and motions for pyvista: grids with all fields, and views of them."""
+"""States and motions as pyvista grids with all fields, and views of them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _pyvista():
 
 
 class Series:
-    """A motion for pyvista: one mesh whose points and fields are those of any instant.
+    """A motion as one pyvista mesh, updated to any instant.
 
     Parameters
     ----------
@@ -45,11 +45,11 @@ class Series:
     Attributes
     ----------
     mesh
-        The UnstructuredGrid, or the MultiBlock of several beams, now at instant :attr:`k`.
+        The UnstructuredGrid, or the MultiBlock of several beams, at instant :attr:`k`.
     t
         Times, shape (nt,).
     k : int
-        The instant that the mesh shows.
+        The current instant.
     """
 
     def __init__(self, history: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
@@ -67,7 +67,7 @@ class Series:
         return f"<Series of {len(self)} instants, mesh at t = {self.t[self.k]:g}>"
 
     def update(self, k: int) -> Any:
-        """Put the mesh at instant ``k``, in the arrays that it has; returns the mesh."""
+        """Update the mesh in place to instant ``k``; returns it."""
         k = require_index("k", k, len(self))
         to_pyvista(self._history.state(k), *self._options, out=self.mesh)
         self.k = k
@@ -77,7 +77,7 @@ class Series:
 def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                lagrange: bool = False, undeformed: bool = False, recover: bool = True,
                out: Any = None) -> Any:
-    """The body of a state as a grid of pyvista.
+    """The body of a state as a pyvista grid.
 
     Parameters
     ----------
@@ -87,10 +87,10 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
         Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; all of the table by
         default. Arrays have the names and components of files.
     subdivide, lagrange, undeformed, recover
-        Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+        As for :func:`skfem_ancf.io.vtu.save_vtu`.
     out
-        What this function has returned for a state of the same scene: it is changed in place, and
-        returned. What shows it needs no more than to be rendered again.
+        The result of this function for a state of the same scene, which is updated in place and
+        returned.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
 
 
 def _blocks_of(mesh, names):
-    """The blocks of a mesh that was made of members with these names."""
+    """The blocks of a mesh of members with these names."""
     pv = _pyvista()
     several = isinstance(mesh, pv.MultiBlock)
     if not several and not isinstance(mesh, pv.UnstructuredGrid):
@@ -133,7 +133,7 @@ def _blocks_of(mesh, names):
 
 
 def _fill(block, grid, body, facts):
-    """A block with what a body is now; a new one for None, or in place."""
+    """Update a block for a body, or make a new one for None."""
     if block is None or len(block.points) != len(body.points) or not np.array_equal(
             block.cell_connectivity, body.cells.ravel()):
         cells = np.insert(body.cells, 0, body.cells.shape[1], axis=1).ravel()
@@ -160,7 +160,7 @@ def _fill(block, grid, body, facts):
 
 
 def has_display() -> bool:
-    """True in a notebook, and where windows can be opened."""
+    """True in a notebook, and if windows can be opened."""
     if "ipykernel" in sys.modules or sys.platform in ("win32", "darwin"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
@@ -172,20 +172,20 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
          subdivide: tuple[int, int] = (16, 8), recover: bool = True,
          off_screen: bool | None = None, window_size: tuple[int, int] = (1000, 700),
          filename: StrPath | None = None) -> Any:
-    """Put a state into a plotter of pyvista, coloured by a field; nothing is shown yet.
+    """Add a state to a pyvista plotter, coloured by a field, without showing it.
 
     Parameters
     ----------
     state, field, thickness, undeformed, cmap, limits, unit, subdivide, recover
-        Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+        As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     plotter
         A ``pyvista.Plotter`` to draw in; a new one by default.
     off_screen
-        Without a window; by default where there is neither a display nor a notebook.
+        Without a window; by default if there is neither a display nor a notebook.
     window_size
         Width and height in pixels.
     filename
-        Write a picture (.png, .jpg, ...); missing folders are made.
+        Write a picture (.png, .jpg, ...); missing folders are created.
 
     Returns
     -------
@@ -231,20 +231,20 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
 
 
 def _lines(walls):
-    """Straight pieces (n, 2, 2) as a mesh of pyvista."""
+    """Straight segments (n, 2, 2) as a pyvista mesh."""
     ends = in_space(walls.reshape(-1, 2).T)
     return _pyvista().PolyData(ends, lines=np.insert(
         np.arange(len(ends)).reshape(-1, 2), 0, 2, axis=1).ravel())
 
 
 def _new_plotter(off_screen, window_size):
-    """A plotter, with a window where there is a display."""
+    """A plotter, with a window if there is a display."""
     from vtkmodules.vtkCommonCore import vtkLogger
 
     hidden = not has_display()
     off_screen = hidden if off_screen is None else require_flag("off_screen", off_screen)
     size, said = pixels("window_size", window_size), vtkLogger.GetCurrentVerbosityCutoff()
-    if hidden and off_screen:  # that there is no display, which VTK looks for all the same
+    if hidden and off_screen:  # VTK warns of a missing display
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     try:
         return _pyvista().Plotter(off_screen=off_screen, window_size=size)

@@ -1,4 +1,4 @@
-"""What pictures show: bodies of one or more instants on a grid, and their colours."""
+"""Geometry and colours of pictures: bodies of one or more instants on a grid."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VISIBLE = 0.12
 #: Obstacles are seen that are at most this part of the picture of a scene away from it.
 WIDE = 0.6
 
-#: Colours of signed fields; a body without any is seen on white.
+#: Colours of signed fields, visible on white at zero.
 SIGNED = "#313695", "#5a91c4", "#ecd27a", "#ee6a41", "#a50026"
 
 #: Colours of lines, of what is less important, of the reference configuration, of bodies and
@@ -36,7 +36,7 @@ BODIES = "#cfdbe6", "#e8d3a8", "#bcd9b4", "#e3bfc3", "#c9bfe0", "#b5dcd8", "#dcc
 
 
 class _Body:
-    """One beam: reference and deformed place of the points and the axis, and the field."""
+    """One beam: reference and deformed positions of grid points and axis, and the field."""
 
     def __init__(self, grid, state, beam, m, field, scale):
         self.cells, self.height = grid.cells, beam.mesh.height
@@ -50,12 +50,12 @@ class _Body:
         self.values = _values(field, grid)
 
     def points(self, body, factor):
-        """Positions (2, nelements, m + 1, rows) with the section drawn ``factor`` thicker."""
+        """Positions (2, nelements, m + 1, rows) with the section magnified by ``factor``."""
         x, axis = body
         return axis[..., None] + factor * (x - axis[..., None])
 
     def outline(self, body, factor):
-        """Closed lines around each unbroken run of elements, shape (points, 2)."""
+        """Closed lines around each chain of elements, shape (points, 2)."""
         x = self.points(body, factor)
         cuts = np.nonzero(np.hypot(*(x[:, 1:, 0] - x[:, :-1, -1])).max(axis=-1)
                           > 1e-6 * self.height)[0] + 1
@@ -80,7 +80,7 @@ def layers_of(beam: Any, subdivide: tuple[int, int]) -> Array:
 
 
 class _Solid:
-    """One domain, with what a :class:`_Body` has: quads, those of triangles with a corner twice."""
+    """One domain as a :class:`_Body`: quads; triangles repeat a corner."""
 
     def __init__(self, grid, field):
         self.cells = grid.cells[:, [0, 1, 2, -1]]
@@ -92,7 +92,7 @@ class _Solid:
         return body
 
     def outline(self, body, factor):
-        """Edges of the boundary, of the reference configuration all cells; shapes (points, 2)."""
+        """Edges of the boundary, or of all cells of the reference configuration, (points, 2)."""
         if body is self.reference:
             return list(body.T[self.cells])
         size = 1e-6 * np.max(np.ptp(self.reference, axis=1))
@@ -110,7 +110,7 @@ def _values(field, grid):
 
 
 def _coloured(grid, field):
-    """What is drawn of a domain, or None where the field is not known."""
+    """The drawn quads of a domain, or None where the field is not defined."""
     try:
         return None if grid.values is None else _Solid(grid, field)
     except AncfError:
@@ -135,7 +135,7 @@ def _thickness(thickness, bodies):
 
 
 def _scale(scale, found):
-    """By what displacements are drawn larger: 1, 2 or 5 times a power of ten for "auto"."""
+    """Magnification of displacements; 1, 2 or 5 times a power of ten for "auto"."""
     if not (isinstance(scale, str) and scale == "auto"):
         return require_positive("scale", scale)
     size = np.max(np.ptp(np.concatenate([grid.x for grid in found], axis=1), axis=1))
@@ -164,11 +164,11 @@ def _limits(limits, values, field):
 
 
 class Scenery:
-    """States of the same beams with one factor of thickness and one range of colours.
+    """States of the same beams with one thickness factor and one range of colours.
 
     Arguments are those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`. ``frames`` and
-    ``rigid`` are for each state its beams and domains, and the grids of its rigid bodies, and of
-    domains on which the field is not known; ``found`` (n,) values of all that is coloured.
+    ``rigid`` are for each state its beams and domains, and the grids of its rigid bodies and of
+    domains without the field; ``found`` (n,) the values of all coloured points.
     """
 
     #: How far around the bodies obstacles are drawn.
@@ -198,8 +198,7 @@ class Scenery:
 
     @property
     def names(self) -> list[tuple[str, Array]]:
-        """Names of the members of the first frame, and a place (2,) of each, of beams on the axis.
-        """
+        """Names and positions (2,) of the members of the first frame; beams on the axis."""
         def place(grid):
             if grid.rows == 1:
                 return grid.x
@@ -210,13 +209,13 @@ class Scenery:
 
     @cached_property
     def every(self) -> Array:
-        """All points that are drawn, shape (n, 3)."""
+        """All drawn points, shape (n, 3)."""
         return np.concatenate([self.points(k) for k in range(len(self.frames))]
                               + [self.points(0, True)] * self.undeformed)
 
     @cached_property
     def walls(self) -> list[Any]:
-        """The outlines of obstacles in each frame, shapes (n, 2, 2)."""
+        """Outlines of obstacles in each frame, shapes (n, 2, 2)."""
         box = around(self.every[:, :2].T, self.margin)
         return [np.concatenate([np.zeros((0, 2, 2)), *outlines(state, box)])
                 for state in self._states]
@@ -240,7 +239,7 @@ class Scenery:
             for k in frames for b in self.frames[k])], axis=1)
 
     def points(self, k: int, undeformed: bool = False) -> Array:
-        """Points of frame ``k``, those of rigid bodies too, shape (n, 3), deformed or not."""
+        """Points of frame ``k`` with rigid bodies, shape (n, 3), deformed or not."""
         return np.concatenate([in_space(self.beam_points([k], undeformed)),
                                *(g.points(undeformed) for g in self.rigid[k])])
 
@@ -259,7 +258,7 @@ class Scenery:
         return [cell for g in self.rigid[k] for cell in (g.x + g.u).T[g.cells]]
 
     def cells(self, frames: Iterable[int] = (0,)) -> Array:
-        """Quads of the beams of frames, one behind the other, as rows of points, (nc, 4)."""
+        """Quads of the beams of frames, as rows of points, (nc, 4)."""
         bodies = [b for k in frames for b in self.frames[k]]
         first = np.cumsum([0] + [b.values.size for b in bodies])
         return np.concatenate([np.zeros((0, 4), dtype=int), *(
@@ -267,7 +266,7 @@ class Scenery:
 
     @property
     def faces(self) -> Array:
-        """Quads, and outlines of rigid bodies: the number of corners and the points of each."""
+        """Quads and outlines of rigid bodies: number of corners and points of each."""
         cells, at = self.cells(), sum(b.values.size for b in self.frames[0])
         parts = [np.hstack([np.full((len(cells), 1), 4), cells]).ravel()]
         for grid in self.rigid[0]:
@@ -278,18 +277,18 @@ class Scenery:
 
     @property
     def note(self) -> str:
-        """What the picture says of the thickness and of displacements."""
+        """Text with the magnification of thickness and displacements."""
         said = [] if self.factor == 1.0 else [f"section drawn {self.factor:g} times as thick"]
         return ", ".join(said + [f"displacements {self.scale:g} times as large"] * (
             self.scale != 1.0))
 
     def label(self, text: str, unit: str | None) -> str:
-        """A text with the unit: if None is given that of the field in the scene; "" for none."""
+        """A text with the unit; by default that of the field in the scene; "" for none."""
         unit = unit_of(self.field, units_of(self._states[0])) if unit is None else unit
         return text if unit in ("", "1") else f"{text} ({unit})"
 
     def colours(self, cmap: Any) -> Any:
-        """The colour map that is given, or for None one that fits the field."""
+        """The given colour map, or by default one that fits the field."""
         from matplotlib.colors import LinearSegmentedColormap
 
         return cmap or (LinearSegmentedColormap.from_list("signed", SIGNED)

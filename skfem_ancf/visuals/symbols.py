@@ -1,4 +1,4 @@
-"""Symbols of loads, supports, joints and springs in a picture of matplotlib."""
+"""Symbols of loads, supports, joints and springs in matplotlib pictures."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ NOTES = "eigenstrain", "drag"
 
 
 def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> list[Symbol]:
-    """The loads, and the supports, joints, springs and masses, of the scene of a state.
+    """Symbols of the loads, and of all other items, of the scene of a state.
 
-    With ``start`` the loads are the whole ones, before anything is solved.
+    With ``start`` loads have their full values, as before the solution.
     """
     if not (loads or supports):
         return []
@@ -39,16 +39,16 @@ def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> 
 
 
 class Sketch:
-    """Draws symbols on matplotlib Axes; each artist has the kind of its symbol as its gid.
+    """Draws symbols on matplotlib Axes; the gid of each artist is the kind of its symbol.
 
     Parameters
     ----------
     ax
         The Axes.
     u
-        Displacement of the degrees of freedom as it is drawn, shape (N,).
+        Drawn displacement of the degrees of freedom, shape (N,).
     points
-        Points of the bodies as they are drawn, shape (n, 2).
+        Drawn points of the bodies, shape (n, 2).
     """
 
     def __init__(self, ax: Any, u: Array, points: Array) -> None:
@@ -58,7 +58,7 @@ class Sketch:
         self.taken = np.full((1, 2), np.inf)
 
     def draw(self, symbols: Iterable[Symbol]) -> None:
-        """Draw symbols: one for all that holds a place, and for all weights of one gravity."""
+        """Draw symbols: one for all supports of a place, one for all weights of a gravity."""
         one: dict[Any, Symbol] = {}
         for number, s in enumerate(symbols):
             key: Any = number
@@ -82,7 +82,7 @@ class Sketch:
                     s, np.array([place(self.u) for place in s.at]), largest)
 
     def names(self, places: Iterable[tuple[str, Array]]) -> None:
-        """Write names beside places (2,)."""
+        """Write names at positions (2,)."""
         for name, at in places:
             self._text(name, at, (1, -1), INK, "name", 10, style="italic")
 
@@ -114,7 +114,7 @@ class Sketch:
             self._text(f"{s.text}{abs(s.value):.6g}", free, free - other, LOAD, s.kind)
 
     def _weight(self, s, at, largest):
-        """One arrow to the right of the picture, for all members of one gravity."""
+        """One arrow to the right of the picture for all members of one gravity."""
         foot = np.max(self.points, axis=0) + [0.2 * self.size, 0.0]
         tip = foot + ARROW * self.size * np.array(s.direction[0]) * np.sign(s.value)
         self._arrow(foot, tip, kind=s.kind, color=MUTED)
@@ -130,7 +130,7 @@ class Sketch:
         self._beside(s.text, at[0], LOAD, s.kind)
 
     def _beside(self, text, at, color, kind):
-        """Write in a corner about a place that is far from bodies and other texts."""
+        """Write in a corner about a position, far from bodies and other texts."""
         r = 1.1 * SIZE * self.size
 
         def room(one):
@@ -144,13 +144,13 @@ class Sketch:
         self._text(text, at + far * r * np.array(away), away, color, kind)
 
     def _box(self, text, at, away):
-        """Points along a text that is written beside a place, about, shape (3, 2)."""
+        """Points along a text beside a position, estimated, shape (3, 2)."""
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
         width = (0.5 + 0.4 * len(text)) * (np.sign(x) if abs(x) > 0.4 else 0.0)
         return at + self.size * SIZE * np.outer([0.0, 0.5, 1.0], [width, y])
 
     def _room(self, point, others):
-        """How far a point is from others (n, 2)."""
+        """Distance of a point from others (n, 2)."""
         return float(np.min(np.hypot(*(others - point).T)))
 
     # what holds
@@ -180,7 +180,7 @@ class Sketch:
             self._line([at, at + 0.45 * r * (d - across)], kind, HOLD, 0.8)
 
     def _half(self, p, across):
-        """Half of the height of the section that is drawn at a point."""
+        """Half the drawn height of the section at a point."""
         off = self.points - p
         near = np.abs(off @ [-across[1], across[0]]) < 0.002 * self.size
         far = np.abs(off[near] @ across)
@@ -272,7 +272,7 @@ class Sketch:
 
 
 def _ends(s):
-    """Of two supports that which knows where the body is."""
+    """Of two supports the one with a known outward direction."""
     return tuple(s.direction[0]) != (0.0, -1.0)
 
 

@@ -1,7 +1,6 @@
-"""Which points touch an obstacle: a search by elements, then the projection of their points.
+"""Active set: a broad search by elements, then closest point projection of their points.
 
-Of the middle of each element the gap is asked, and whether its points may be as far as that from
-it.
+The search compares the gap of the middle of each element with the radius of its points.
 """
 
 import numpy as np
@@ -10,13 +9,13 @@ from ...core.source import indices, source
 from .gap import distances, middles, places, surface
 from .tables import (ELEMENTS, FRICTION, GAP, LARGEST, MULTIPLIER, RADIUS, RATE, SETTLE, hardening)
 
-#: How far from the surface anchors follow points in a motion, in radii of an element.
+#: Largest distance at which anchors follow points in a motion, in radii of an element.
 BEYOND = 4.0
 
 
 @source
 def search(pair, which, u):
-    """How far the points of each element are from the obstacle at least, shape (elements,)."""
+    """Lower bound of the gap of each element, shape (elements,)."""
     rows = np.empty((9, pair.header[ELEMENTS]))
     x, gap, radius = rows[:2], rows[2], rows[8]
     middles(pair, u, 1.0, x, radius)
@@ -28,7 +27,7 @@ def search(pair, which, u):
 
 @source
 def near_points(pair, what, begin, end):
-    """Numbers of the points of elements that may touch, by their distances at both ends."""
+    """Numbers of the points of elements that may touch, from the bounds at both ends."""
     n, reach = begin.size, pair.common[LARGEST + pair.k]
     if what == SETTLE and pair.numbers[FRICTION] > 0.0:  # also what may touch next
         reach = BEYOND * pair.numbers[RADIUS] if pair.common[RATE] > 0.0 else 1e300
@@ -42,7 +41,7 @@ def near_points(pair, what, begin, end):
 
 @source
 def project(pair, which, u, at):
-    """Place and slope (4, n) of some points, the point of the surface (2, n), and its gap."""
+    """Position and slope (4, n) of points, their surface points (2, n), and their gaps."""
     rows = np.empty((12, at.size))
     places(pair, u, 1.0, at, rows[:4])
     surface(pair, at, rows[:4], rows[4:6])
@@ -52,7 +51,7 @@ def project(pair, which, u, at):
 
 @source
 def touching(pair, a, b, at):
-    """The active set: which of some points, projected at both ends, touch at one of them."""
+    """Active set: the points that touch at one of two states."""
     part, flags, multiplier = 1.0 / hardening(pair), np.empty(at.size), pair.memory[MULTIPLIER]
     for i in indices(at.size):
         flags[i] = 1.0 * (np.minimum(a[GAP, i], b[GAP, i]) < part * multiplier[at[i]])
@@ -61,7 +60,7 @@ def touching(pair, a, b, at):
 
 @source
 def stride(pair, u):
-    """The largest way of the middle of an element, relative to how far its points are from it."""
+    """Largest displacement of an element's middle, relative to the radius of its points."""
     n, way = pair.header[ELEMENTS], 0.0
     rows = np.empty((3, n))
     middles(pair, u, 0.0, rows[:2], rows[2])

@@ -1,4 +1,4 @@
-"""The obstacles of a scene in its equations: their tables, and what steps leave behind."""
+"""The obstacles of a scene: tables for kernels, and history data of steps."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, L
                      ContactTables, Pair, Question, pair_of)
 
 
-#: Penetration, relative to the height, from which on an obstacle is too soft, and that which a
-#: stiffness is said for.
+#: Penetration relative to the height that causes hardening, and the one for which a stiffness is
+#: suggested.
 SUNK, FIRM = 0.5, 0.1
-#: Part of the stiffness with which an equilibrium is found where the whole does not lead to it.
+#: Factor on the stiffness for difficult equilibria.
 EASED = 1e-2
 #: Why steps of several points do not hold a body on a wall: at each of them it would be held, and
 #: be thrown off by what is beyond.
@@ -40,14 +40,14 @@ NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), 
 
 
 class Group(NamedTuple):
-    """The points of one beam that may touch one obstacle, those of an element side by side.
+    """The surface points of one beam for one obstacle, element by element.
 
-    ``first`` is the first DOF of the element of each point, (n,); ``weights`` and ``slopes`` those
-    of pairs of DOFs in its place and in the slope of the axis, (pairs, n), none with sections;
-    ``areas`` and ``offsets`` from the axis (n,); ``starts`` place and slope without displacement,
-    (4, n). A way from one state to the next may cut the obstacle by ``depth``; ``height`` is that
-    of the beam; ``numbers`` are those of :mod:`skfem_ancf.actions.contact.tables`, (9,); the
-    obstacle is made ``firmest`` times as stiff at most where it is too soft.
+    ``first`` is the first DOF of the element of each point, (n,); ``weights`` and ``slopes`` are
+    the weights of pairs of DOFs in its position and in the slope of the axis, (pairs, n), none with
+    sections; ``areas`` and ``offsets`` from the axis (n,); ``starts`` reference position and slope,
+    (4, n). Steps may cut the obstacle by ``depth``; ``height`` is that of the beam; ``numbers`` are
+    those of :mod:`skfem_ancf.actions.contact.tables`, (9,); ``firmest`` is the largest factor of
+    hardening.
     """
 
     first: Any
@@ -65,18 +65,18 @@ class Group(NamedTuple):
 
 
 class Contacts:
-    """The obstacles of a scene: those force elements that have ``groups``.
+    """The obstacles of a scene: its force elements with ``groups``.
 
-    Places are seen from ``origin``, the middle of the bodies, in tables and memory: far from the
-    origin of the coordinates friction would feel their round-off. Arguments are displacements and
-    velocities ``u, v``, shape (N,), and the time ``t``, in statics the load factor.
+    Positions are relative to ``origin``, the middle of the bodies, to reduce round-off in friction.
+    Arguments are displacements and velocities ``u, v``, shape (N,), and the time ``t``, in statics
+    the load factor.
 
     Attributes
     ----------
     obstacles, groups
-        The obstacles, and pairs of the number of one and a :class:`Group`.
+        The obstacles, and pairs of an obstacle's number and a :class:`Group`.
     moving, custom, anchored, augmented
-        True if an obstacle moves, has a shape of the caller's, friction, or takes the augmented
+        True if an obstacle moves, has a user-defined shape, has friction, or uses the augmented
         Lagrangian.
     """
 
@@ -116,17 +116,17 @@ class Contacts:
             ANCHORS * self.anchored + PRESSURES * self.augmented)
 
     def pair(self, k: int) -> Pair:
-        """Views of the tables for group k."""
+        """Views of the tables of group k."""
         return pair_of(self.tables, k)
 
     def numbers(self, k: int) -> Array:
-        """Those of the shape of obstacle k, its corners seen from the origin."""
+        """Parameters of the shape of obstacle k, with corners relative to the origin."""
         numbers = self.obstacles[k].shape.numbers.copy()
         numbers[3:].reshape(-1, 5)[:, :2] -= self.origin
         return numbers
 
     def pose(self, k: int, t: float, rates: bool = True) -> Array:
-        """Where obstacle k is, its pivot seen from the origin; shape (10,)."""
+        """Pose of obstacle k, with its pivot relative to the origin; shape (10,)."""
         pose = self.obstacles[k].pose(t, rates)
         pose[4:6] -= self.origin
         return pose
@@ -142,22 +142,21 @@ class Contacts:
                 rows[1:] = self.pose(k, t - 0.5 * span), self.pose(k, t + 0.5 * span)
 
     def ask(self, obstacle: int, t: float, x: Array, out: Array) -> None:
-        """Distance, gradient and second derivatives of a shape of the caller's, (6, n)."""
+        """Distance, gradient and second derivatives of a user-defined shape, (6, n)."""
         out[:] = self.obstacles[obstacle].shape.derivatives(x + self.origin[:, None], t)
 
     # memory
 
     @property
     def lasting(self) -> int:
-        """What is kept from step to step; 0 for nothing."""
+        """Flags of history data; 0 for none."""
         return self.tables.lasting
 
     @contextmanager
     def lent(self, memory: Array | None = None) -> Iterator[None]:
-        """For the time of an evaluation points have the memory of a state, or none of one.
+        """Context in which the tables have the history data of a state, or none.
 
-        States own their memories; tables have one only while a state, or a way of steps, asks
-        something. So the order in which states are asked does not matter.
+        States own their history data, so that results do not depend on the order of evaluation.
         """
         before = self.tables.memory.copy()
         try:
@@ -168,9 +167,9 @@ class Contacts:
 
     @contextmanager
     def eased(self, soft: bool = False) -> Iterator[None]:
-        """For the time of an evaluation there is no friction, and if ``soft`` less stiffness.
+        """Context without friction, and if ``soft`` with reduced stiffness.
 
-        Iterations converge there that do not with the whole, to a place that is close to theirs.
+        Iterations converge there more easily, to a nearby state.
         """
         memory, numbers = self.tables.memory, [
             self.pair(k).numbers for k in range(len(self.groups))]
@@ -186,17 +185,17 @@ class Contacts:
                 x[STIFFNESS] = k
 
     def put_back(self, memory: Array | None) -> None:
-        """Go on with what :meth:`remember` gave, or with nothing: no anchors, no multipliers."""
+        """Restore data of :meth:`remember`; without it anchors and multipliers are cleared."""
         if self.obstacles:
             self.tables.memory[:] = 0.0 if memory is None else memory
 
     def remember(self) -> Array | None:
-        """What steps have left behind, shape (n,); None where there is nothing of it."""
+        """History data of steps, shape (n,); None if there are none."""
         memory = self.tables.memory
         return memory.copy() if np.any(memory) else None
 
     def of_state(self, state: Any) -> Array | None:
-        """What points of a State of this scene remember; None if its obstacles are others."""
+        """History data of a State of this scene; None for other obstacles."""
         if state is None:
             return None
         ours, theirs = self.tables, state.system.forces.contacts.tables
@@ -204,9 +203,9 @@ class Contacts:
         return state.memory if same else None
 
     def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
-        """Points stick from here on, without multipliers, or go on with a memory (n,).
+        """Start from anchors at u and zero multipliers, or from given history data (n,).
 
-        Returns the memory that steps begin with, or None.
+        Returns the initial history data, or None.
         """
         if not self.obstacles:
             return None
@@ -219,13 +218,12 @@ class Contacts:
 
     @property
     def firmness(self) -> Array:
-        """How much stiffer than by default obstacles are, shape (groups,), a view; 0: not."""
+        """Factors of hardening relative to the default stiffness, (groups,), a view; 0 for none."""
         first = LARGEST + len(self.groups)
         return self.tables.memory[first:first + len(self.groups)]
 
     def harden(self, firmness: Array, u: Array, t: float) -> None:
-        """Make obstacles stiffer than by default; what sticks to anchors left at u pulls as before.
-        """
+        """Set factors of hardening; the tractions of sticking points at u do not change."""
         for k, ((which, _), x, _) in enumerate(self.look(u, t)):
             part, memory = (1.0 + self.firmness[k]) / (1.0 + firmness[k]), self.pair(k).memory
             points = taken_back(self.pose(which, t, False), x)
@@ -234,12 +232,11 @@ class Contacts:
         self.firmness[:] = firmness
 
     def settle(self, u: Array, t: float) -> float:
-        """Anchors go after points that have slipped; the work of friction since they did so last.
-        """
+        """Update anchors of slipped points; returns the work of friction."""
         return float(self._ask(SETTLE, u, t)) if self.anchored else 0.0
 
     def augment(self, u: Array, t: float) -> int:
-        """Update multipliers; how many points are too deep, or too far off with a pressure."""
+        """Update multipliers; returns the number of points with large penetration or gap."""
         return int(self._ask(AUGMENT, u, t))
 
     def _ask(self, what, u, t):
@@ -251,17 +248,17 @@ class Contacts:
     # what some solvers do not take
 
     def require_path(self) -> None:
-        """Raise InputError where there is no path by arc length."""
+        """Raise InputError if the obstacles do not allow arc-length continuation."""
         for one in self.obstacles:
             if one.friction > 0.0 or one.moves or one.method != "penalty":
                 raise InputError(f"continuation knows obstacles that rest, without friction and by "
                                  f"penalty, not {one!r}: use solve_static")
 
     def require_penalty(self, scheme: Any, kick: float) -> None:
-        """Raise InputError if the augmented Lagrangian would drive what it holds.
+        """Raise InputError if the augmented Lagrangian is unstable with a scheme.
 
-        A force that stops a body at the end of a step acts on in those that follow: from the speed
-        1 it makes up to ``kick - 1`` with ``(1 - alpha_m) / ((1 - alpha_f) beta)``.
+        A force that stops a body at the end of a step continues to act: a speed 1 becomes up to
+        ``kick - 1`` with ``(1 - alpha_m) / ((1 - alpha_f) beta)``.
         """
         reason = BY_POINTS if kick == np.inf else (
             f"a body that is stopped in a step would leave up to {kick - 1.0:.2g} times as fast as "
@@ -274,7 +271,7 @@ class Contacts:
                     "GeneralizedAlpha(0), or method='penalty'")
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
-        """Raise InputError if a linear solution enters an obstacle."""
+        """Raise InputError if a linear solution penetrates an obstacle."""
         if any(gap.min() < 0.0 for _, _, gap in self.look(u, 1.0)):
             raise InputError(f"{what} knows no contact, and its solution enters an obstacle: use "
                              f"{instead}")
@@ -286,9 +283,9 @@ class Contacts:
             self.put(t, 0.0, self.tables.poses)
 
     def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
-        """Of each group its number of obstacle and :class:`Group`, points and gaps.
+        """For each group its obstacle's number, the :class:`Group`, points (2, n) and gaps (n,).
 
-        Points (2, n) are seen from the origin; gaps are (n,).
+        Points are relative to the origin.
         """
         self._place(t)
         out = []
@@ -299,10 +296,9 @@ class Contacts:
         return out
 
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
-        """What obstacles do to points; without velocities in statics.
+        """Contact forces; in statics without velocities.
 
-        Of each group its number of obstacle, points (2, n), forces on them (2, n), pressures and
-        gaps, (n,).
+        For each group its obstacle's number, points (2, n), forces (2, n), pressures and gaps (n,).
         """
         self._place(t)
         out = []
@@ -323,8 +319,7 @@ class Contacts:
         return out
 
     def potential(self, u: Array, t: float) -> float:
-        """The potential of the penetration; the augmented Lagrangian, which leaves none, has none.
-        """
+        """Penalty energy; zero for the augmented Lagrangian."""
         total = 0.0
         for firmness, ((which, group), _, gap) in zip(self.firmness, self.look(u, t)):
             if self.obstacles[which].method == "augmented":
@@ -335,7 +330,7 @@ class Contacts:
         return total
 
     def entries(self, t: float, u: Array, bandwidth: int) -> tuple[Array, Array, Array]:
-        """The derivative of the force by the degrees of freedom: rows, columns and values."""
+        """Derivative of the force by the degrees of freedom: rows, columns and values."""
         if not self.groups:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
         ld = 2 * bandwidth + 1
@@ -347,27 +342,27 @@ class Contacts:
         j, i = np.divmod(at, ld)
         return i + j - bandwidth, j, A.flat[at]
 
-    # what bodies pass through, and what they are pressed into
+    # tunnelling and deep penetration
 
     @cached_property
     def sweeps(self) -> bool:
-        """True if there is an obstacle that bodies may pass through between two instants."""
+        """True if bodies could pass through an obstacle within a step."""
         return any(group.depth < np.inf for _, group in self.groups)
 
     @cached_property
     def sweep(self) -> CrossingGuard:
-        """What looks for obstacles that a body has passed through from one instant to the next."""
+        """A detector of obstacles that a body has passed through."""
         return CrossingGuard(self)
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
-        """Which obstacle a body has passed through between displacements and times, in words."""
+        """Text about the obstacle that a body has passed through between two states, or ""."""
         if not self.obstacles:
             return None
         done, text = self.sweep.first(np.array([a[0], b[0]]), None, np.array([a[1], b[1]]))
         return None if done else f"a body has passed through {text}"
 
     def sunk(self, u: Array, t: float) -> list[str]:
-        """Which bodies are deep in obstacles of the default stiffness, in words."""
+        """Text about bodies deep inside obstacles of default stiffness, or ""."""
         out: list[str] = []
         seen = self.look(np.array(u), t) if self.groups else []
         for firmness, ((which, group), _, gap) in zip(self.firmness, seen):

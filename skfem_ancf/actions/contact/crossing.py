@@ -1,9 +1,9 @@
-"""A guard against steps in which bodies jump over an obstacle.
+"""Detection of steps in which bodies pass through an obstacle (tunnelling).
 
-The gap changes by no more than the way. So a point that goes the way w and has the gaps g_0 and g_1
-at its ends has been no deeper than ``(w - g_0 - g_1) / 2`` in between, which tells most points of
-most steps without looking at their way. Of the others those have crossed the obstacle that are
-deeper on the way than at both of its ends, and on another side at its end.
+The gap changes by no more than the path length. A point with path length w and gaps g_0 and g_1 at
+the ends has been no deeper than ``(w - g_0 - g_1) / 2``, which excludes most points. The others
+have crossed the obstacle if they are deeper on the path than at both ends, and on another side at
+its end.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from .gap import outline
 from .poses import taken_back
 from .tables import CUSTOM, STIFFNESS
 
-#: Parts of a way at which points are looked at, at most; points that are looked at together.
+#: Largest number of samples of a path; number of points per batch.
 MOST_PARTS, TOGETHER = 400, 50_000
-#: How much longer a cubic way is, by how much rates at both ends differ from the displacement.
+#: Bound on the additional length of a cubic path, relative to the deviation of its end rates.
 BENT = 0.3
-#: The depth that is said, in what is half of the thickness of an obstacle.
+#: Depth that causes a message, relative to half the thickness of an obstacle.
 DEEP = 0.5
-#: Cosine of the angle between the normals at both ends up to which a point is on another side: a
-#: chord that cuts a circle by a tenth of its radius has 0.62.
+#: Largest cosine of the angle between the normals at both ends of a crossing; a chord that cuts a
+#: circle by a tenth of its radius has 0.62.
 ASIDE = 0.62
 
 
 class CrossingGuard:
-    """Looks for points that have crossed an obstacle between two instants."""
+    """Finds points that have crossed an obstacle between two instants."""
 
     def __init__(self, contacts: Any) -> None:
         self._paths = [_Path(contacts, k) for k, (_, group) in enumerate(contacts.groups)
                        if group.depth < np.inf]
 
     def first(self, u: Array, v: Array | None, t: Array) -> tuple[int, str]:
-        """How many steps cross nothing, and which obstacle the next one does, in words.
+        """Number of steps without a crossing, and text about the obstacle of the next one.
 
-        Of displacements and velocities at all instants, (n + 1, N), none for straight ways, and
-        times or load factors, (n + 1,).
+        Arguments are displacements and velocities at all instants, (n + 1, N), None for straight
+        paths, and times or load factors, (n + 1,).
         """
         done, text = len(t) - 1, ""
         for path in self._paths:
@@ -51,7 +51,7 @@ class CrossingGuard:
         return done, text
 
     def deep(self) -> str:
-        """Which obstacle points were so deep in that they may leave it on its other side, or ""."""
+        """Text about an obstacle that points may leave on its other side, or ""."""
         for path in self._paths:
             inner = path.obstacle.shape.inner
             if path.deepest > DEEP * inner:
@@ -61,13 +61,13 @@ class CrossingGuard:
         return ""
 
     def begin(self) -> None:
-        """As if nothing had been looked at."""
+        """Forget earlier results."""
         for path in self._paths:
             path.deepest = 0.0
 
 
 class _Path:
-    """The ways of the points of a group."""
+    """The paths of the points of a group."""
 
     def __init__(self, contacts, k):
         self._contacts, (self._which, self._group) = contacts, contacts.groups[k]
@@ -79,7 +79,7 @@ class _Path:
         self.deepest = 0.0
 
     def first(self, u, v, t):
-        """The first step on which a point crosses the obstacle, or how many there are."""
+        """The first step in which a point crosses the obstacle, or the number of steps."""
         size = max(1, TOGETHER // len(self._group.first))
         for k in range(0, len(t) - 1, size):
             part = slice(k, k + size + 1)
@@ -89,7 +89,7 @@ class _Path:
         return len(t) - 1
 
     def _first_of(self, u, v, t):
-        """The first of some steps on which a point crosses the obstacle, or None."""
+        """The first of some steps in which a point crosses the obstacle, or None."""
         z, depth = self._vectors(u), self._group.depth
         x = self._seen(z, t)
         gap = self._gap(x, t)
@@ -129,7 +129,7 @@ class _Path:
         return False
 
     def _vectors(self, u):
-        """What u (k, N) adds to places of points and, of cables, slopes; (k, 2 or 4, points)."""
+        """Displacements (k, 2 or 4, points) of positions and, for cables, slopes."""
         e, n = self._dofs.shape
         of_elements = u[:, self._dofs].reshape(len(u), e, n // 2, 2).transpose(1, 0, 3, 2)
         found = [of_elements.reshape(e, -1, n // 2) @ w for w in self._weights]
@@ -137,14 +137,14 @@ class _Path:
             len(u), 2, -1) for x in found], axis=1)
 
     def _sizes(self, z):
-        """How far points go by changes of their vectors at most, shape (k, points)."""
+        """Upper bounds of displacements, shape (k, points)."""
         out = np.hypot(z[:, 0], z[:, 1])
         if z.shape[1] > 2:
             out += 2.0 * np.abs(self._group.offsets) * np.hypot(z[:, 2], z[:, 3])
         return out
 
     def _seen(self, z, t):
-        """Points of the surface as the obstacle sees them that has not moved, (k, 2, points)."""
+        """Surface points in the frame of the obstacle, (k, 2, points)."""
         group, z = self._group, z + self._group.starts[:z.shape[1]]
         x = z[:, :2]
         if z.shape[1] > 2:
@@ -156,7 +156,7 @@ class _Path:
         return x
 
     def _gap(self, x, t):
-        """The gaps of points (k, 2, points), seen from the obstacle, at times (k,)."""
+        """Gaps of points (k, 2, points) in the frame of the obstacle at times (k,)."""
         if self.obstacle.shape.kind == CUSTOM:
             return np.array([self._asked(y, s)[0] for y, s in zip(x, t)])
         return self._asked(np.moveaxis(x, 1, 0).reshape(2, -1), 0.0)[0].reshape(len(x), -1)
@@ -174,7 +174,7 @@ class _Path:
 
 
 def _between(u, v, t, s):
-    """The displacement at a part of a step: cubic, or straight without velocities."""
+    """Displacement within a step: cubic, or linear without velocities."""
     change, h = u[1] - u[0], t[1] - t[0]
     straight = u[0] + s * change
     if v is None:
@@ -183,7 +183,7 @@ def _between(u, v, t, s):
 
 
 def middle_of(group: Any) -> Array:
-    """Place of the middle of each element; then weights, and how much they differ from these."""
+    """Position and weights of each element's middle, and the spread of its points' weights."""
     n, m = group.elements, group.points
     each = group.weights.reshape(-1, n, m)
     mean, half = each.mean(axis=2), len(group.weights) // 2

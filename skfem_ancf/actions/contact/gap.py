@@ -1,8 +1,8 @@
-"""Points of the surface of beams, and their gap: the signed distance from an obstacle.
+"""Surface points of beams and their gap, the signed distance from an obstacle.
 
-A point of the surface is ``X = x + c n(s)``: a place x of the body, and for cables, whose surface
-is no coordinate, the normal n of the slope s of the axis at a distance c. The gap is negative in
-the obstacle; its gradient is the normal at the closest point of the outline.
+A surface point is ``X = x + c n(s)``: a point x of the body, and for cables the normal n of the
+slope s of the axis at a distance c. The gap is negative inside the obstacle; its gradient is the
+normal at the closest point.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ SHORT = 1e-30
 
 @source
 def _interpolate(weights, first, u, at, p, q):
-    """Add both components of what u adds to vectors at some points."""
+    """Add displacements of both components at points."""
     for k in range(weights.shape[0]):
         row = weights[k]
         for i in indices(at.size):
@@ -29,7 +29,7 @@ def _interpolate(weights, first, u, at, p, q):
 
 @source
 def places(pair, u, factor, at, z):
-    """Places and slopes (4, n) of points, those without displacement times a factor."""
+    """Positions and slopes (4, n) of points: factor times the reference ones plus displacements."""
     for c in range(4):
         row = pair.points[START + c]
         for i in indices(at.size):
@@ -40,9 +40,9 @@ def places(pair, u, factor, at, z):
 
 @source
 def middles(pair, u, factor, x, radius):
-    """The middle of each element's points (2, n), and how far from it they may be.
+    """Positions of element middles (2, n), and bounds of the distance of their points.
 
-    Of the places without displacement, times the factor, and what u adds to them.
+    Reference positions are multiplied by ``factor``.
     """
     n, half, largest = x.shape[1], pair.header[PAIRS] // 2, pair.numbers[RADIUS]
     m = pair.first.size // n
@@ -62,7 +62,7 @@ def middles(pair, u, factor, x, radius):
 
 @source
 def surface(pair, at, z, x):
-    """The points of the surface (2, n), of places and slopes."""
+    """Surface points (2, n) from positions and slopes."""
     offset = pair.points[OFFSET]
     for i in indices(at.size):
         s, t = z[2, i], z[3, i]
@@ -72,7 +72,7 @@ def surface(pair, at, z, x):
 
 @source
 def levers(pair, at, z, lever):
-    """The derivative of the surface by the slope: xs, xt, ys, yt."""
+    """Derivative of the surface point by the slope: xs, xt, ys, yt."""
     offset = pair.points[OFFSET]
     for i in indices(at.size):
         s, t = z[2, i], z[3, i]
@@ -84,7 +84,7 @@ def levers(pair, at, z, lever):
 
 @source
 def carried(q, p, x, y):
-    """Points that go with an obstacle from the pose p to the pose q."""
+    """Points that move with an obstacle from pose p to pose q."""
     cos, sin = q[2] * p[2] + q[3] * p[3], q[3] * p[2] - q[2] * p[3]
     a, b = x - p[0] - p[4], y - p[1] - p[5]
     return q[0] + q[4] + cos * a - sin * b, q[1] + q[5] + sin * a + cos * b
@@ -92,10 +92,7 @@ def carried(q, p, x, y):
 
 @source
 def distances(pair, which, whole, x, out):
-    """Gap, its gradient and second derivatives xx, xy, yy at points x, shape (6, n).
-
-    Derivatives where ``whole`` is true.
-    """
+    """Gap, its gradient and, if ``whole``, second derivatives xx, xy, yy at points x, (6, n)."""
     pose, y, side = pair.poses[which], np.empty(x.shape), pair.numbers[SIDE]
     cos, sin = pose[2], pose[3]
     for i in indices(x.shape[1]):
@@ -123,9 +120,9 @@ def distances(pair, which, whole, x, out):
 def outline(shape, whole, y, out):
     """Closest point projection on a polygon with rounded corners.
 
-    Its numbers: radius of the corners, where edges begin and end in parts of their lengths, then of
-    each corner: place, edge to the next, 1 or -1 if it is convex or not. Next to an edge it is a
-    line, next to a corner a circle.
+    Parameters of the shape: radius of the corners, relative ends of the edges, then for each
+    corner: position, vector to the next one, 1 or -1 for convex or not. The surface is a line near
+    an edge, a circle near a corner.
     """
     radius, low, high = shape[0], shape[1], shape[2]
     n, best = (shape.size - 3) // 5, np.empty(y.shape[1])

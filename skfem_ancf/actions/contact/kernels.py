@@ -1,13 +1,13 @@
-"""What contact adds to the equations: forces, tangents, friction, multipliers.
+"""Kernels of contact: forces, tangents, friction, multipliers.
 
-Each active point has a force on its place and slope, (4,), and the derivative of that, (4, 4); both
-go to the degrees of freedom by the weights of the point. Where a motion keeps the energy, the
-force is a mean between two states whose work is the change of the potential: the discrete gradient
-of Gonzalez (1996) of the gap, times the slope of S between them. In a mean the spring of friction
-is that of the end, so that what vibrates on it comes to rest.
+Each active point has a force on its position and slope, (4,), with the derivative (4, 4),
+distributed to the degrees of freedom by the weights of the point. Energy-conserving schemes take
+means between two states whose work is the change of the potential: the discrete gradient of the
+gap (Gonzalez 1996) times the slope of S between the states. The spring of friction is that of the
+end, which damps its vibrations.
 
-A motion takes few corrections of multipliers if the stiffness is not small beside that of the mass
-in a step: it is grown by ``INERTIA`` over the square of the step.
+In a motion the stiffness is at least ``INERTIA`` times the mass over the squared step, so that few
+updates of multipliers are needed.
 """
 
 import numpy as np
@@ -37,20 +37,20 @@ NX, NY = FOUND + 1, FOUND + 2
 
 @source
 def of_contacts(tables, asked, u, v, out):
-    """Add what is asked of all pairs, a :class:`~skfem_ancf.actions.contact.tables.Question`."""
+    """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     for k in range(tables.number):
         _of_pair(pair_of(tables, k), asked, u, v, out)
 
 
 @primitive("skfem_ancf.equations.loops")
 def run_contacts(tables, asked, u, v, out):
-    """As :func:`of_contacts`; compiled once, and not again in each function that calls it."""
+    """As :func:`of_contacts`; compiled once for all kernels that call it."""
     of_contacts(tables, asked, u, v, out)
 
 
 @source
 def _of_pair(pair, asked, u, v, out):
-    """Add what is asked, of the points that touch."""
+    """Add the answer of the active points of a pair."""
     what, same = asked.what, asked.span == 0.0
     if what == ALONG:
         out[1] = max(out[1], stride(pair, v))
@@ -99,7 +99,7 @@ def _of_pair(pair, asked, u, v, out):
 
 @source
 def states(pair, same, a, b, at, w):
-    """Fill the rows of points up to the derivative by the slope, by their projections."""
+    """Fill the rows of points up to the derivative by the slope."""
     part, multiplier = 1.0 / hardening(pair), pair.memory[MULTIPLIER]
     for c in range(4):
         for i in indices(at.size):
@@ -123,7 +123,7 @@ def states(pair, same, a, b, at, w):
 
 @source
 def _carry(pair, a, w):
-    """Move points with the obstacle, from where it was or will be to where it is."""
+    """Move points with the obstacle to its middle pose."""
     for i in indices(w.shape[1]):
         x, y = carried(pair.poses[NOW], pair.poses[BEGIN], a[4, i], a[5, i])
         p, q = x - a[4, i], y - a[5, i]
@@ -137,7 +137,7 @@ def _carry(pair, a, w):
 
 @source
 def way(w):
-    """How points of the surface move, of the rates of their places and slopes."""
+    """Velocities of surface points from those of positions and slopes."""
     for k in range(2):
         for i in indices(w.shape[1]):
             w[WAY + k, i] = (w[RATES + k, i] + w[LEVER + 2 * k, i] * w[RATES + 2, i]
@@ -149,7 +149,7 @@ def way(w):
 
 @source
 def push(pair, at, w):
-    """The force of the pressure, and its derivative."""
+    """Force of the pressure, and its derivative."""
     area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], pair.numbers[WIDTH]
     part = hardening(pair)
     stiffness, holds = pair.numbers[STIFFNESS] * part, pair.common[BILATERAL] / part
@@ -168,7 +168,7 @@ def push(pair, at, w):
 
 @source
 def _keep_work(pair, w):
-    """By how much of their way forces miss that their work is what the potential changes by."""
+    """Correct forces such that their work is the change of the potential."""
     close = (CLOSE * pair.numbers[RADIUS]) ** 2
     for i in indices(w.shape[1]):
         square = (w[RATES, i] * w[RATES, i] + w[RATES + 1, i] * w[RATES + 1, i]
@@ -180,7 +180,7 @@ def _keep_work(pair, w):
 
 @source
 def _tangential(pair):
-    """The coefficient of friction, zero where nothing sticks, and the stiffness per area."""
+    """Coefficient of friction, zero without anchors, and the stiffness per area."""
     firmness = pair.common[LARGEST + pair.number + pair.k]
     return (pair.numbers[FRICTION] * pair.common[ANCHORED],
             pair.numbers[STICKING] * (1.0 + firmness))
@@ -188,7 +188,7 @@ def _tangential(pair):
 
 @source
 def rub(pair, same, at, w):
-    """Add friction by Coulomb's law, and its derivative."""
+    """Add Coulomb friction and its derivative."""
     friction, sticking = _tangential(pair)
     if friction == 0.0:
         return
@@ -214,7 +214,7 @@ def rub(pair, same, at, w):
 
 @source
 def resist(pair, factor, at, w):
-    """The force of damping in proportion to the pressure, and its derivative."""
+    """Damping force proportional to the pressure, and its derivative."""
     area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
     stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), pair.numbers[WIDTH]
     for i in indices(at.size):
@@ -233,7 +233,7 @@ def resist(pair, factor, at, w):
 
 @source
 def _settle(pair, same, at, w, out):
-    """Anchors follow points that slip, to where these just do not; ``out[0]`` grows by the work."""
+    """Move anchors of slipping points to the limit of sticking; add the work to ``out[0]``."""
     friction, sticking = _tangential(pair)
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     augmented, lost, where = pair.numbers[TOLERANCE] > 0.0, np.empty(at.size), 0 * at
@@ -259,7 +259,7 @@ def _settle(pair, same, at, w, out):
 
 @source
 def _augment(pair, at, w, out):
-    """Multipliers grow by the penetration, and shrink by the gap, where these are too large."""
+    """Increase multipliers by penetrations, decrease them by gaps, beyond the tolerance."""
     tolerance, multiplier = pair.numbers[TOLERANCE], pair.memory[MULTIPLIER]
     if tolerance == 0.0:
         return
@@ -284,7 +284,7 @@ def _augment(pair, at, w, out):
 
 @source
 def _add_force(pair, at, w, out):
-    """Add the forces on points of the surface to those on degrees of freedom."""
+    """Add forces on surface points to those on degrees of freedom."""
     value, turn, where = np.empty(at.size), np.empty(at.size), pair.first[at]
     for c in range(2):
         for i in indices(at.size):
@@ -303,7 +303,7 @@ def _add_force(pair, at, w, out):
 
 @source
 def _stiffness(pair, at, w, S):
-    """The derivative of the force on place and slope by these; entry (c, d) in row 4 c + d."""
+    """Derivative of the force on position and slope; entry (c, d) in row 4 c + d."""
     offset = pair.points[OFFSET]
     for c in range(2):
         for d in range(2):
@@ -338,7 +338,7 @@ def _stiffness(pair, at, w, S):
 
 @source
 def _add_along(w, S, out):
-    """Add the derivative of the work along the rates to ``out[0]``."""
+    """Add the derivative of the work along the velocities to ``out[0]``."""
     value, where = np.empty(w.shape[1]), np.zeros(w.shape[1], np.int64)
     for a in range(4):
         for b in range(4):
@@ -349,7 +349,7 @@ def _add_along(w, S, out):
 
 @source
 def _add_stiffness(pair, asked, at, S, flat):
-    """Add the derivatives to a band: the lower half alone where that is all there is."""
+    """Add the derivatives to a band matrix, or its lower half if only that is stored."""
     value, where = np.empty(at.size), asked.ld * pair.first[at]
     n = 2 * pair.weights.shape[0]
     for a in range(n):

@@ -1,17 +1,15 @@
-"""Laws of contact, of numbers and arrays alike.
+"""Laws of contact, for numbers and arrays.
 
-Of the penetration ``a`` each point has the potential ``k A S(a)`` with its area A in the
-reference configuration and::
+For the penetration ``a`` a point with reference area A has the potential ``k A S(a)`` with::
 
     S(a) = (<a>^3 - <a - w>^3) / (6 w),   <a> = max(a, 0)
 
-which is ``a^2 / 2`` but for a transition of the width w that makes it twice continuously
-differentiable. A mean between two states takes the slope of S between them: its work is the change
-of the potential. Of the augmented Lagrangian ``a = m - g`` with the gap g and the multiplier m over
-the stiffness, which grows by the penetration that is left until the surface holds the point.
+which is ``a^2 / 2`` except for a transition of width w, and twice continuously differentiable. A
+mean between two states takes the divided difference of S: its work is the change of the potential.
+In the augmented Lagrangian ``a = m - g`` with the gap g and the multiplier m over the stiffness,
+which is increased by the remaining penetration.
 
-Friction is a spring along the surface from an anchor to the point, which gives way at Coulomb's
-limit.
+Friction is a spring along the surface from an anchor to the point, limited by Coulomb's law.
 """
 
 import numpy as np
@@ -28,7 +26,7 @@ def pressure_slope(a, width):
 
 @source
 def mean_pressure(a, b, width):
-    """(S(b) - S(a)) / (b - a), and S'(a) where they are the same: without differences of S."""
+    """(S(b) - S(a)) / (b - a), and S'(a) for a = b, without cancellation."""
     return (_mean_cube(a, b) - _mean_cube(a - width, b - width)) / (6.0 * width)
 
 
@@ -43,7 +41,7 @@ def _mean_cube(a, b):
 
 @source
 def mean_pressure_slope(a, b, width, pressure):
-    """Twice its derivative by b, where the mean with what holds on both sides is ``pressure``."""
+    """Twice the derivative of the mean by b; ``pressure`` is the mean of bilateral points."""
     jump = b - a
     apart = 1.0 * (np.abs(jump) > 1e-3 * (width + np.abs(a) + np.abs(b)))
     return (pressure_slope(0.5 * (a + b), width) * (1.0 - apart)
@@ -52,13 +50,13 @@ def mean_pressure_slope(a, b, width, pressure):
 
 @source
 def return_mapping(trial, limit):
-    """The traction of friction by a trial traction, and 1 where it sticks, 0 where it slips."""
+    """Friction traction from a trial traction, and 1 for sticking, 0 for slipping."""
     return np.minimum(np.maximum(trial, -limit), limit), 1.0 * (np.abs(trial) < limit)
 
 
 @source
 def slip_of(pose, nx, ny, x, y, anchor_x, anchor_y):
-    """How far a point is from its anchor, along the surface of an obstacle."""
+    """Distance of a point from its anchor along the surface."""
     p, q = x - pose[0] - pose[4], y - pose[1] - pose[5]
     a, b = anchor_x - pose[4], anchor_y - pose[5]
     return (q - pose[3] * a - pose[2] * b) * nx - (p - pose[2] * a + pose[3] * b) * ny
@@ -66,7 +64,7 @@ def slip_of(pose, nx, ny, x, y, anchor_x, anchor_y):
 
 @source
 def damping_loss(pose, damping, nx, ny, x, y, vx, vy):
-    """The part of the pressure that the velocity away takes (Hunt and Crossley), at most all."""
+    """Fraction of the pressure lost by separation velocity (Hunt and Crossley), at most 1."""
     p = vx + pose[8] * (y - pose[1] - pose[5]) - pose[6]
     q = vy - pose[8] * (x - pose[0] - pose[4]) - pose[7]
     return np.minimum(damping * (p * nx + q * ny), 1.0)

@@ -1,4 +1,4 @@
-"""Where obstacles are, and points seen from there."""
+"""Poses of obstacles."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ...core.types import Array
 
 
 def carried(pose: Array, x: Array) -> Array:
-    """Where points of an obstacle are that were at x, shape (2, n), when it was given."""
+    """Points x, shape (2, n), moved with an obstacle."""
     turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
     return turn @ (x - pose[4:6, None]) + pose[4:6, None] + pose[:2, None]
 

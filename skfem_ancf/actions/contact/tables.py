@@ -1,7 +1,7 @@
-"""What the kernels of contact take: points of beams, obstacles, and what steps leave behind.
+"""Tables of the contact kernels: surface points, obstacles, and history data.
 
-A contact pair is the surface of one beam with one obstacle. Its arrays lie one behind the other in
-those of :class:`ContactTables`; :func:`pair_of` gives them their names.
+A contact pair is the surface of one beam with one obstacle. Its arrays are consecutive parts of
+those in :class:`ContactTables`; :func:`pair_of` returns views with names.
 """
 
 from typing import Any, NamedTuple
@@ -38,22 +38,22 @@ NOW, BEGIN, END = map(np.int64, range(3))
 #: with multipliers are held on both sides; for each pair the largest multiplier, then by how much
 #: it is stiffer than by default; then the points' memories.
 ANCHORED, RATE, BILATERAL, LARGEST = range(4)
-#: What is kept from step to step: anchors, multipliers.
+#: Flags of history data: anchors, multipliers.
 ANCHORS, PRESSURES = 1, 2
 #: The row of projections of points that is the gap, behind place and slope and the surface.
 GAP = 6
 
 
 class Question(NamedTuple):
-    """What is asked of all pairs, at a time ``t`` or over a ``span`` of time about it.
+    """A request to all pairs at time ``t``, or over a ``span`` of time about it.
 
-    ``what`` is FORCE: the mean force from u to v. RESISTING: that of friction and damping at u by
-    the velocity v. TANGENT: the derivative of FORCE by the end of the mean, twice unless there is
-    no span, to a band of the layout ``ld, top``. DAMPED_TANGENT: that of RESISTING by velocities
-    times ``factor``, and by places. ALONG: the derivative of the work of FORCE at u along v to
-    ``out[0]``, and the largest way of an element, in lengths of elements, into ``out[1]``. SETTLE:
-    anchors follow after a step from u to v; the work of friction and of augmented pressures is
-    added to ``out[0]``. AUGMENT: multipliers at u are updated; how many change is added there.
+    ``what`` is FORCE: the mean force from u to v. RESISTING: friction and damping at u for velocity
+    v. TANGENT: the derivative of FORCE by the end state, twice unless the span is zero, into a band
+    of layout ``ld, top``. DAMPED_TANGENT: that of RESISTING by velocities times ``factor``, plus by
+    positions. ALONG: the derivative of the work of FORCE at u along v, added to ``out[0]``, and the
+    largest displacement relative to element lengths, into ``out[1]``. SETTLE: update anchors after
+    a step from u to v, and add the work of friction and augmented pressures to ``out[0]``. AUGMENT:
+    update multipliers at u, and add the number of changes.
     """
 
     what: int
@@ -67,11 +67,11 @@ class Question(NamedTuple):
 class ContactTables(NamedTuple):
     """The obstacles of a scene, as ``number`` pairs.
 
-    ``ints`` and ``floats`` are headers of the pairs and DOFs, and numbers of points and shapes;
-    ``poses`` those of obstacles at the time asked last; ``memory`` what steps leave behind.
-    ``moving`` says whether poses depend on time, ``custom`` is the handle of what knows them, and
-    shapes of the caller's. ``lasting`` is the sum of what is kept from step to step: ANCHORS,
-    PRESSURES. ``address`` is that of the compiled function, 0 in NumPy.
+    ``ints`` and ``floats`` are headers of pairs, DOFs, and parameters of points and shapes;
+    ``poses`` those of obstacles at the last time; ``memory`` history data. ``moving`` tells whether
+    poses depend on time, ``custom`` is the handle for poses and user-defined shapes, ``lasting``
+    the sum of flags of history data: ANCHORS, PRESSURES. ``address`` is that of the compiled
+    function, 0 in NumPy.
     """
 
     number: int
@@ -86,12 +86,12 @@ class ContactTables(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """The surface of one beam with one obstacle: views of the arrays of :class:`ContactTables`.
+    """The surface of one beam with one obstacle: views of :class:`ContactTables`.
 
     ``first`` is the first degree of freedom of each point's element, (n,); ``weights`` and
-    ``slopes`` those of pairs of degrees of freedom in its place and slope, (pairs, n); ``middles``
-    places and weights of the elements' middles; behind its numbers are those of the shape.
-    ``common`` is the memory of all pairs.
+    ``slopes`` those of pairs of degrees of freedom in its position and slope, (pairs, n);
+    ``middles`` positions and weights of element middles; the parameters end with those of the
+    shape. ``common`` is the history data shared by all pairs.
     """
 
     k: Any
@@ -134,6 +134,6 @@ def pair_of(tables, k):
 
 @source
 def hardening(pair):
-    """How many times the stiffness is as large as given, by what a load has found or in a step."""
+    """Factor on the given stiffness, from loads or time steps."""
     return (1.0 + pair.common[LARGEST + pair.number + pair.k]
             + pair.numbers[INERTIA] * pair.common[RATE] / pair.numbers[STIFFNESS])

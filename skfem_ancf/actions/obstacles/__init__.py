@@ -1,4 +1,4 @@
-"""Obstacles: shapes, and contact of the surface of beams with them."""
+"""Obstacles: rigid shapes in contact with the surface of beams."""
 
 from .contact import Contact
 from .obstacle import Obstacle

@@ -1,4 +1,4 @@
-"""Where a body touches obstacles, and how hard."""
+"""Contact points, forces and pressures of a state."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from ...core.types import Array
 
 @dataclass(frozen=True)
 class Contact:
-    """The points of bodies that press on obstacles.
+    """Contact of bodies with obstacles.
 
     Attributes
     ----------
     points
-        Where they are, shape (2, n).
+        Positions of contact points, shape (2, n).
     force
-        What obstacles do to each of them, shape (2, n); their sum is ``total``.
+        Contact force on each of them, shape (2, n); their sum is ``total``.
     pressure
-        The force normal to the obstacle by the area of the stress-free surface that touches, shape
-        (n,). It is balanced at the nodes and linear between them: the forces of single points
-        ripple along an element, which the equilibrium of its degrees of freedom does not see.
+        Normal force per reference area, shape (n,). Nodal values are in equilibrium with the
+        forces, linear in between: forces of single points oscillate along an element.
     gap
-        Distance from the obstacle, negative by the penetration, shape (n,).
+        Distance from the obstacle, negative for penetration, shape (n,).
     nearest
-        The smallest distance of all points, of those too that do not touch.
+        The smallest distance of all surface points, in contact or not.
     """
 
     points: Array
@@ -40,12 +39,12 @@ class Contact:
 
     @property
     def total(self) -> Array:
-        """The sum of the forces, shape (2,)."""
+        """Sum of the forces, shape (2,)."""
         return self.force.sum(axis=1)
 
     @property
     def penetration(self) -> float:
-        """The largest penetration; zero without contact."""
+        """Largest penetration; zero without contact."""
         return max(0.0, -self.nearest)
 
     def __len__(self) -> int:
@@ -57,7 +56,6 @@ class Contact:
 
 
 def contact_of(state: Any, obstacle: Any = None) -> Contact:
-    """The Contact of a state."""
     contacts = state.system.forces.contacts
     if not contacts.obstacles:
         raise InputError("the scene has no obstacle: scene.obstacle(Circle((0, -1), 0.5)) adds one")
@@ -77,11 +75,11 @@ def contact_of(state: Any, obstacle: Any = None) -> Contact:
 
 
 def _balanced(group, pressure):
-    """The pressure (n,) whose nodal forces are those of the points; zero where they are free.
+    """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points.
 
-    The force on a node by the area of its shape function, as of a lumped mass, where the surface
-    touches: free points between two that touch count, if these are less than an element apart. The
-    places of both nodes have the functions number 0 and half; each side of the beam is by itself.
+    The nodal force over the area of its shape function (lumped) on the contact surface; free points
+    between two in contact count if these are less than an element apart. The positions of both
+    nodes have the functions number 0 and half; each side of the beam is separate.
     """
     n, m, half = group.elements, group.points, len(group.weights) // 2
     side = np.tile(np.arange(m) // (m // 2), n)

@@ -1,4 +1,4 @@
-"""What a scene may touch: a shape, where it is, and how it resists."""
+"""Obstacles: a shape, its motion and its contact law."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SPREAD = 1.0 / 200.0
 #: Width of the transition from no pressure to one in proportion to the penetration, relative to
 #: the height.
 WIDTH = 1e-3
-#: How deep a body may be cut at the start, relative to its height: meshes of curves are not exact.
+#: Initial penetration allowed, relative to the height, as meshes of curves are approximate.
 CUT = 1e-2
 #: Penetration that is left by the augmented Lagrangian, relative to the height.
 TOLERANCE = 1e-5
@@ -47,12 +47,11 @@ SINK, MOST = 1e-2, 200
 
 
 class Obstacle(ForceElement):
-    """An obstacle for the surface of beams: bottom, top and both ends.
+    """A rigid obstacle in contact with the surface of beams: bottom, top and both ends.
 
-    Each point of a rule on the surface is pressed out of the shape with ``stiffness`` times the
-    depth to which it is in it, per area of the stress-free surface; see
-    :mod:`skfem_ancf.actions.contact.laws`. Of a cable the surface is its axis, moved by
-    half of the height along the normal.
+    Each quadrature point on the surface has the pressure ``stiffness`` times penetration per
+    reference area; see :mod:`skfem_ancf.actions.contact.laws`. The surface of a cable is its axis
+    plus or minus half the height along the normal.
 
     Parameters
     ----------
@@ -62,34 +61,33 @@ class Obstacle(ForceElement):
     friction
         Coulomb's coefficient, zero or positive.
     stiffness
-        Pressure per penetration, positive; by default ``E / height`` of each beam, that of half of
-        its own thickness or so, but of strips thinner than a hundredth of their extent L no more
-        than ``E height^3 / (12 (L / 200)^4)``, so that they bend over lengths that meshes resolve.
-        A static solution hardens that, up to ``E / height``, where bodies are pressed deep.
+        Pressure per penetration, positive; by default ``E / height`` of each beam, but for strips
+        thinner than a hundredth of their extent L at most ``E height^3 / (12 (L / 200)^4)``, so
+        that meshes resolve the indentation. A static solution increases it, up to ``E / height``,
+        under deep penetration.
     beam
-        The beam, its name or its number; all of the scene by default.
+        Beam, name or number; all by default.
     method
-        "penalty", or "augmented": each load step, or step in time, is solved again with the
-        pressures that it has found, until the penetration at its end is less than ``tolerance``.
+        "penalty", or "augmented": each load or time step is repeated with updated multipliers until
+        the penetration is less than ``tolerance``.
     position
-        A function of time that returns the displacement (x, y) of the shape from where it was
-        given; in statics time is the load factor.
+        A function of time that returns the displacement (x, y) of the shape from its given place;
+        in statics time is the load factor.
     angle
-        A function of time that returns the angle by which it has turned, counterclockwise, about
-        its ``pivot``: center, point or mean of the corners.
+        A function of time that returns its rotation, counterclockwise, about its ``pivot``: center,
+        point or mean of the corners.
     damping
-        In a motion the pressure grows by so much of itself per velocity of approach, zero or
-        positive (time per length), as of Hunt and Crossley; it never pulls.
+        Relative increase of the pressure per approach velocity in a motion (Hunt and Crossley),
+        time per length, zero or positive; the pressure stays positive.
     points
-        Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule. By
-        default two more than the degree of the element's axis, and so many such rules one after
-        the other that a shape of a small radius cannot sink in between two points by more than a
-        hundredth of the height.
+        Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule. By default
+        two more than the degree of the axis, in as many intervals as needed for a shape of small
+        radius to sink in between points by at most a hundredth of the height.
     width
-        Of the transition from no pressure to one in proportion to the penetration, a length; by
-        default a thousandth of the height.
+        Length of the transition from no pressure to proportional pressure; by default a thousandth
+        of the height.
     tolerance
-        The penetration that "augmented" leaves, a length; by default 1e-5 of the height.
+        Penetration tolerated by "augmented", a length; by default 1e-5 of the height.
     slip_speed
         Deprecated, without effect.
 
@@ -130,16 +128,16 @@ class Obstacle(ForceElement):
 
     @property
     def moves(self) -> bool:
-        """True if its place depends on time."""
+        """True if its pose depends on time."""
         return self.position is not None or self.angle is not None
 
     def pose(self, t: float, rates: bool = True) -> Array:
-        """Where it is: displacement, cosine and sine, pivot, velocities, time; shape (10,).
+        """Displacement, cosine and sine, pivot, velocities, time; shape (10,).
 
         Parameters
         ----------
         t, rates
-            The time, and whether its velocities are wanted, else zero.
+            The time; False for zero velocities.
         """
         out = np.array([0.0, 0.0, 1.0, 0.0, *self.shape.pivot, 0.0, 0.0, 0.0, t])
         if self.moves:
@@ -156,12 +154,12 @@ class Obstacle(ForceElement):
         return np.append(place, turn)
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        """Its surface as straight pieces: points (2, n), and both ends of each, (m, 2).
+        """Its surface as straight segments: points (2, n), and both ends of each, (m, 2).
 
         Parameters
         ----------
         box
-            Lower left and upper right of what is to be seen, one a column, shape (2, 2).
+            Lower left and upper right corner of the view, one a column, shape (2, 2).
         t
             Time; in statics the load factor.
         """
@@ -198,7 +196,7 @@ class Obstacle(ForceElement):
         return [Vector(np.zeros(2))]
 
     def _require_outside(self, beams):
-        """Raise InputError if the surface of a shape is inside of a beam."""
+        """Raise InputError if the surface of the shape is inside a beam."""
         landmarks = carried(self.pose(0.0), self.shape.landmarks()).T
         for beam in beams:
             for at in landmarks:
@@ -216,7 +214,7 @@ class Obstacle(ForceElement):
     # points of the surface
 
     def _group(self, beam, first):
-        """The points of bottom, top and both ends, which count as an element each."""
+        """Points of bottom, top and both ends; an end counts as an element."""
         mesh, (xi, along) = beam.mesh, self._along(beam)
         m, h = 2 * len(xi), mesh.height
         eta, across = _lobatto(ACROSS)  # as many points as an element has: some are shared
@@ -257,7 +255,7 @@ class Obstacle(ForceElement):
         return rule
 
     def _points(self, beam, first, X, w, tind):
-        """Of points of both sides of all elements, or of an end, what a Group has of each."""
+        """Data of a Group for points of both sides of all elements, or of an end."""
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         elements = np.arange(mesh.nelements) if tind is None else tind
         n, m = len(elements), X.shape[1]
@@ -287,13 +285,13 @@ class Obstacle(ForceElement):
 
 
 def _default(E, mesh):
-    """The stiffness of a strip's own thickness, or less: that over which it bends far enough."""
+    """Default stiffness of a beam."""
     h, extent = mesh.height, float(np.hypot(*np.ptp(mesh.p, axis=1)))
     return E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
 
 
 def _stiffest(across, elements):
-    """The largest modulus and the largest density of the layers, in the middles of elements."""
+    """Largest modulus and largest density of the layers at mid-element."""
     E, density = [], []
     for layer in across.layers:
         X = np.array([[0.5], layer.measure.gauss(1)[0]])
@@ -303,7 +301,7 @@ def _stiffest(across, elements):
 
 
 def _face(across, side, X, elements):
-    """The width of bottom or top; of a section without any, as a circle, the largest."""
+    """Width of bottom or top; the largest width of a section without faces, as a circle."""
     layer = across.layers[-side]
     if layer.face is not None and layer.face[side] == 0.0:
         return across.outline(X, elements)
@@ -311,14 +309,14 @@ def _face(across, side, X, elements):
 
 
 def _lobatto(n):
-    """Points and weights on [0, 1]."""
+    """Gauss-Lobatto points and weights on [0, 1]."""
     x = gauss_lobatto(n)
     P = np.polynomial.legendre.Legendre.basis(n - 1)(x)
     return 0.5 * (x + 1.0), 1.0 / (n * (n - 1) * P**2)
 
 
 def _repeated(x, w, pieces):
-    """A rule with points at both ends on each of equal pieces of [0, 1]."""
+    """A rule with end points, repeated on equal intervals of [0, 1]."""
     points = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
     weights = np.tile(w[:-1], pieces) / pieces
     weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet

@@ -1,4 +1,4 @@
-"""Outlines of shapes and obstacles as straight pieces, for pictures and files."""
+"""Outlines of shapes and obstacles as straight segments, for pictures and files."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 
 from ...core.types import Array
 
-#: Cells of a grid along each side, in which a surface is looked for.
+#: Cells along each side of the contour grid.
 CELLS = 160
-#: By how much what is drawn is larger than the body, relative to its size.
+#: Margin of the box relative to the size of the body.
 AROUND = 0.15
 
 
 def circle(center: Array, radius: float, n: int) -> tuple[Array, Array]:
-    """Points of a circle and its pieces."""
+    """Points of a circle and its segments."""
     angle, k = 2.0 * np.pi * np.arange(n) / n, np.arange(n)
     points = center[:, None] + radius * np.array([np.cos(angle), np.sin(angle)])
     return points, np.column_stack([k, np.roll(k, -1)])
 
 
 def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
-    """A line as one piece, as long as it is beside a box."""
+    """A line as one segment near a box."""
     along = np.array([normal[1], -normal[0]])
     middle, half = box.mean(axis=1), 0.5 * np.hypot(*(box[:, 1] - box[:, 0]))
     foot = point + ((middle - point) @ along) * along
@@ -31,7 +31,7 @@ def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
 
 
 def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Array]:
-    """Where a distance is zero, by marching triangles on a grid."""
+    """Zero contour of a distance function, by marching triangles on a grid."""
     x, y = (np.linspace(low, high, CELLS + 1) for low, high in box)
     points = np.array(np.meshgrid(x, y)).reshape(2, -1)
     values = distance(points)
@@ -41,7 +41,7 @@ def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Arra
     triangles = np.concatenate([below, above])
     inside = values[triangles] < 0.0
     cut = triangles[np.any(inside, axis=1) & ~np.all(inside, axis=1)]
-    # the corner that is alone on its side, and the two others
+    # the corner alone on its side, and the two others
     inside = values[cut] < 0.0
     alone = np.argmax(inside == (inside.sum(axis=1) == 1)[:, None], axis=1)
     rows = np.arange(len(cut))
@@ -55,20 +55,20 @@ def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Arra
 
 
 def around(points: Array, part: float = AROUND) -> Array:
-    """A box about points, with a margin that is a part of their size."""
+    """A bounding box with a margin relative to its size."""
     low, high = points.min(axis=1), points.max(axis=1)
     margin = part * float(np.max(high - low))
     return np.array([low - margin, high + margin]).T
 
 
 def obstacles_of(state: Any) -> list[Any]:
-    """The obstacles of a state's scene; none of what has no system."""
+    """Obstacles of a state's scene; none without a system."""
     system = getattr(state, "system", None)
     return [] if system is None else list(system.forces.contacts.obstacles)
 
 
 def outlines(state: Any, box: Array) -> list[Array]:
-    """The surface of each obstacle at a state, as straight pieces."""
+    """Outlines of the obstacles at a state, as straight segments."""
     out = []
     for one in obstacles_of(state):
         points, pieces = one.outline(box, state.load if state.t is None else state.t)

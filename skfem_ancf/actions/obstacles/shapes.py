@@ -1,4 +1,4 @@
-"""Shapes of obstacles: what is solid, by its signed distance."""
+"""Shapes of obstacles, defined by signed distances."""
 
 from __future__ import annotations
 
@@ -21,43 +21,42 @@ from .outlines import circle, clipped, contour
 
 #: Relative step of differences of a distance function, and of its gradient.
 STEP, COARSE = 1e-6, 1e-4
-#: By how much a distance may grow more than what it is the distance of.
+#: Tolerance of a slope above 1 of a distance function.
 STEEP = 0.05
-#: An edge without end, in its lengths.
+#: Length of an unbounded edge, relative to its vector.
 FAR = 1e300
-#: A thickness that is not known.
+#: Stands for an unknown thickness.
 UNKNOWN = 1e300
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class Shape(Immutable):
-    """What is solid. Its surface has no thickness, and its inside no end.
+    """A solid region of the plane.
 
     Attributes
     ----------
     kind
         Its number in :mod:`skfem_ancf.actions.contact.tables`.
     numbers
-        What the kernels take, shape (n,).
+        Parameters for kernels, shape (n,).
     pivot
-        The point about which it turns, where its angle depends on time; shape (2,).
+        Centre of rotation for a time-dependent angle, shape (2,).
     hollow
-        It is solid outside and not inside.
+        The outside is solid instead of the inside.
     bend
-        The smallest radius of its surface; infinite where it is straight or that is not known, zero
-        for sharp corners.
+        Smallest radius of its surface; infinite if straight or not known, zero for sharp corners.
     inner
-        How deep a point may be in it before it is closer to another side: half of its least
-        thickness; infinite if there is no other side, large if that is not known.
+        Largest depth at which the closest surface is the near side: half the least thickness;
+        infinite for a half plane, large if not known.
 
     Other Parameters
     ----------------
     x, t
-        Points, shape (2, ...), and time, for a shape of functions of it.
+        Points, shape (2, ...), and time, for a shape given by functions of it.
     box
-        Lower left and upper right of what is to be seen, one a column, shape (2, 2).
+        Lower left and upper right corner of the view, one a column, shape (2, 2).
     scale
-        A length of the body whose points are x.
+        A length of the body with points x.
     """
 
     kind = CUSTOM
@@ -67,19 +66,19 @@ class Shape(Immutable):
     hollow = False
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        """The distance (...) of points from the surface, negative in what is solid."""
+        """Signed distance (...) of points from the surface, negative in the solid."""
         raise NotImplementedError
 
     def landmarks(self) -> Array:
-        """Points of its surface, no beam may be about them at the start; shape (2, n)."""
+        """Points of its surface that no beam may contain at the start; shape (2, n)."""
         return np.zeros((2, 0))
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        """Its surface as straight pieces: points (2, n), and both ends of each, (m, 2)."""
+        """Its surface as straight segments: points (2, n), and both ends of each, (m, 2)."""
         raise NotImplementedError
 
     def fitted(self, x: Array, scale: float) -> Shape:
-        """The shape for a body; CallbackError if a function is not what a shape needs."""
+        """The shape for a body; CallbackError if its functions are not valid."""
         return self
 
     def __repr__(self) -> str:
@@ -87,7 +86,7 @@ class Shape(Immutable):
 
 
 class Outline(Shape):
-    """A shape by a polygon with rounded corners; circles and lines are such."""
+    """A polygon with rounded corners; circles and lines are special cases."""
 
     kind = OUTLINE
 
@@ -100,14 +99,14 @@ class Outline(Shape):
 
 
 class Line(Outline):
-    """A straight wall without end.
+    """A half plane: an infinite straight wall.
 
     Parameters
     ----------
     point
         A point of its surface, shape (2,).
     normal
-        The direction out of what is solid, of any length, shape (2,).
+        Outward normal of the solid, of any length, shape (2,).
 
     Examples
     --------
@@ -144,7 +143,7 @@ class Circle(Outline):
     radius
         Positive.
     hollow
-        It is solid outside and not inside.
+        The outside is solid instead of the inside.
 
     Examples
     --------
@@ -174,18 +173,18 @@ class Circle(Outline):
 
 
 class Polygon(Outline):
-    """What is inside of a closed polygon, or outside of it.
+    """The inside of a closed polygon, or its outside.
 
     Parameters
     ----------
     points
-        Its corners in order, either way round: at least three, as a list of pairs or an array of
-        shape (n, 2). No two sides may meet but at a corner.
+        Its corners in order, in either direction: at least three, as a list of pairs or an array of
+        shape (n, 2). Sides must not intersect.
     radius
-        The polygon is grown by so much, and its corners rounded. A beam that slides over a corner
-        wants one: where the corner is sharp the direction of its pressure jumps.
+        Offset of the outline with rounded corners. Use it where beams slide over a corner: the
+        normal of a sharp corner jumps.
     hollow
-        It is solid outside and not inside; the radius then makes the hole larger.
+        The outside is solid instead of the inside; the radius then enlarges the hole.
 
     Examples
     --------
@@ -223,7 +222,7 @@ class Polygon(Outline):
         return self.points.T
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        if self.radius > 0.0:  # with arcs at its corners
+        if self.radius > 0.0:  # arcs at its corners
             grown = self.radius + 0.02 * float(np.ptp(self.points, axis=0).max())
             own = np.array([self.points.min(axis=0) - grown, self.points.max(axis=0) + grown]).T
             return contour(self.distance, own)
@@ -239,7 +238,7 @@ def _pair(x):
 
 
 def _thin(corners, edges, side):
-    """Half of the least way from the middle of an edge through what is solid to another edge."""
+    """Half the least distance through the solid from the middle of an edge to another edge."""
     middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
     apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
     det = _cross(normal[:, None], edges[None])
@@ -254,7 +253,7 @@ def _cross(a, b):
 
 
 def _require_simple(points):
-    """Raise InputError for corners that repeat, and sides that cross."""
+    """Raise InputError for repeated corners or intersecting sides."""
     n = len(points)
     sides = np.roll(points, -1, axis=0) - points
     short, = np.nonzero(np.hypot(*sides.T) <= 1e-12 * np.abs(points).max())
@@ -279,23 +278,22 @@ def _require_simple(points):
 
 
 class SignedDistance(Shape):
-    """A shape by the signed distance of points from its surface.
+    """A shape defined by the signed distance from its surface.
 
     Parameters
     ----------
     f
-        ``f(x, y)`` or ``f(x, y, t)`` of arrays x and y: the distances, negative in what is solid,
-        of their shape. It has to be a distance where bodies are, no other function with the same
-        zeros: one that grows by more than the way may be missed by the search, and penalties are
-        of its values.
+        ``f(x, y)`` or ``f(x, y, t)`` of arrays x and y: distances of the same shape, negative in
+        the solid. It must be a true distance near bodies: with a slope above 1 the contact search
+        may fail, and the penetration is measured by its values.
     gradient
-        ``gradient(x, y)`` or with t: its derivatives, shape (2, ...). By default complex steps,
-        where f takes complex numbers, else differences.
+        ``gradient(x, y)`` or with t: its derivatives, shape (2, ...). By default complex steps, if
+        f accepts complex numbers, else differences.
     hessian
         ``hessian(x, y)`` or with t: its second derivatives xx, xy and yy, shape (3, ...). By
         default differences of the gradient.
     pivot
-        The point about which it turns, where its angle depends on time; shape (2,).
+        Centre of rotation for a time-dependent angle, shape (2,).
 
     Examples
     --------
@@ -324,7 +322,7 @@ class SignedDistance(Shape):
         self._by_steps, self._scale = False, 1.0
 
     def _asked(self, name, x, t, rows=()):
-        """What one of the functions returns, in the shape that it has to have."""
+        """Values of one of the functions, with a check of the shape."""
         more = (t,) if self._timed[name] else ()
         value = ask(f"{name} of a SignedDistance", getattr(self, name), x[0], x[1], *more)
         value = np.asarray(value)
@@ -344,7 +342,7 @@ class SignedDistance(Shape):
         return np.asarray(self._asked("f", np.asarray(x, dtype=float), t), dtype=float)
 
     def _slope(self, x, t):
-        """Its gradient at points, shape (2, n)."""
+        """Gradient at points, shape (2, n)."""
         if self.gradient is not None:
             return self._asked("gradient", x, t, (2,))
         return self._complex_steps(x, t) if self._by_steps else self._differences(x, t)
