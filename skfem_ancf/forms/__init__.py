@@ -28,7 +28,7 @@ The strain is the Green-Lagrange strain ``(F^T F - 1) / 2`` in the beam's frame 
 ``F = grad r``, and S is the second Piola-Kirchhoff stress.
 """
 
-from .own import BeamForms, Position, of, position
+from .of_beam import BeamForms, Position, of, position
 from .strain import StrainEnergy, strain_energy
 from .weak import (BeamBilinearForm, BeamLinearForm, EnergyForm, ModuliForm, StressForm,
                    deformation_gradient, energy, gravity, green_lagrange, internal_force, mass,

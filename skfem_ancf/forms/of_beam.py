@@ -27,7 +27,7 @@ def of(beam: Any) -> BeamForms:
     :class:`~skfem_ancf.Scene` uses, stabilisation included, for ``asm(form, basis, r=q)``. The
     formulation has its own quadrature; that of the basis does not matter.
 
-    They can be called inside another form: ``own.internal_force(v, w)`` and ``own.tangent(u, v,
+    They can be called inside another form: ``weak.internal_force(v, w)`` and ``weak.tangent(u, v,
     w)`` are densities, constant in each element, with the same integral. Then ``r`` must be
     :func:`position` of the basis.
 
@@ -49,17 +49,17 @@ def of(beam: Any) -> BeamForms:
     >>> from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
     ...                         reference_coordinates)
     >>> mesh, element = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1), ElementBeamANCF(2)
-    >>> own = forms.of(Beam(mesh, element, StVenantKirchhoff(E=2.1e11, nu=0.3), width=0.1))
+    >>> weak = forms.of(Beam(mesh, element, StVenantKirchhoff(E=2.1e11, nu=0.3), width=0.1))
     >>> basis = Basis(mesh, ElementVector(element))
     >>> q = reference_coordinates(basis)
-    >>> asm(own.tangent, basis, r=q).shape
+    >>> asm(weak.tangent, basis, r=q).shape
     (24, 24)
-    >>> residual = LinearForm(lambda v, w: own.internal_force(v, w) + 100 * v[1])
+    >>> residual = LinearForm(lambda v, w: weak.internal_force(v, w) + 100 * v[1])
     >>> asm(residual, basis, r=forms.position(basis, q)).shape
     (24,)
     """
     require_like("beam", beam, "Beam", "facet_basis")
-    return BeamForms(_OwnEnergy(beam), _OwnForce(beam), _OwnTangent(beam))
+    return BeamForms(_BeamEnergy(beam), _BeamForce(beam), _BeamTangent(beam))
 
 
 class Position(DiscreteField):
@@ -86,7 +86,7 @@ def position(basis: CellBasis, q: ArrayLike) -> Position:
     return field
 
 
-class _Own:
+class _BeamForm:
     """A form with element contributions from the kernel of a beam."""
 
     def __init__(self, beam):
@@ -136,7 +136,7 @@ class _Own:
         return found if basis.tind is None else found[basis.tind]
 
 
-class _OwnEnergy(_Own, Functional):
+class _BeamEnergy(_BeamForm, Functional):
     def _found(self, u):
         return self.beam.kernel.energies(u)
 
@@ -144,7 +144,7 @@ class _OwnEnergy(_Own, Functional):
         return self._contributions(v, **kwargs)
 
 
-class _OwnForce(_Own, LinearForm):
+class _BeamForce(_BeamForm, LinearForm):
     def _found(self, u):
         forces = self.beam.kernel.forces(u)
         return forces.reshape(len(forces), -1)
@@ -154,7 +154,7 @@ class _OwnForce(_Own, LinearForm):
         return np.array([dofs.ravel()]), data.ravel(), (ubasis.N,), (ubasis.Nbfun,)
 
 
-class _OwnTangent(_Own, BilinearForm):
+class _BeamTangent(_BeamForm, BilinearForm):
     def _found(self, u):
         return self.beam.kernel.tangents(u)
 
