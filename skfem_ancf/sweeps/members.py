@@ -71,7 +71,7 @@ class Sweep:
                  found: Sequence[dict[str, Array] | str | None]) -> None:
         self.parameters = parameters
         self.status = np.full(len(found), "open", dtype="<U6")
-        found = _alike(found)
+        found = _consistent(found)
         self._errors = {k: one for k, one in enumerate(found) if isinstance(one, str)}
         done = [k for k, one in enumerate(found) if isinstance(one, dict)]
         self.status[list(self._errors)], self.status[done] = "failed", "done"
@@ -205,7 +205,7 @@ def require_plain(columns: dict[str, Array]) -> None:
                              "what they mean")
 
 
-def _alike(found):
+def _consistent(found):
     """Replace members whose names or shapes differ from the first one by errors."""
     def listed(values):
         return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())

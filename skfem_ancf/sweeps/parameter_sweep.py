@@ -129,7 +129,7 @@ def sweep(build: Callable[..., Any],
     except BaseException:
         record.written()
         raise
-    return _judged(record.written())
+    return _warned(record.written())
 
 
 class _Record:
@@ -243,7 +243,7 @@ def _same(a, b):
     return np.array_equal(a, b, equal_nan=floats)
 
 
-def _judged(result):
+def _warned(result):
     """The result, after a warning of failures."""
     failures = result.failures
     if failures:

@@ -105,7 +105,7 @@ def in_processes(task: Task, members: list[dict[str, Any]], places: Iterable[int
     for what, function in (("build", task.build), ("measure", task.measure)):
         _require_sendable(what, function)
     with _Pool(workers) as pool:
-        yield from _spread(pool.submit, workers, task, members, places)
+        yield from _distribute(pool.submit, workers, task, members, places)
 
 
 def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int], client: Any
@@ -115,7 +115,7 @@ def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int],
     workers = sum(client.nthreads().values())
     if workers < 1:
         raise InputError("client has no workers: start some, or client.wait_for_workers(n)")
-    yield from _spread(partial(client.submit, pure=False), workers, task, members, places)
+    yield from _distribute(partial(client.submit, pure=False), workers, task, members, places)
 
 
 def _require_sendable(what, function):
@@ -190,7 +190,7 @@ def _single_threads():
             del os.environ[name]
 
 
-def _spread(submit, workers, task, members, places):
+def _distribute(submit, workers, task, members, places):
     """Submit two members for each worker at a time; yields results as they arrive.
 
     Members in flight when a worker dies are computed again one at a time, to find the cause.
