@@ -19,7 +19,7 @@ from ..elements.base import ElementBeam
 from ..materials import Material
 from ..mesh.mesh_beam import MeshBeam
 from .jumps import BEND, KINK, jumps
-from .section import Layer, Rectangle, Section, asked
+from .section import Layer, Rectangle, Section, evaluated
 from .shear import shear_factor
 
 #: Points across a layer for areas and moments.
@@ -54,9 +54,9 @@ class LayerPoints:
         """Height of the section at the points, shape (nelements, npoints)."""
         return self.across.heights(self.X[0], self.tind)
 
-    def asked(self, name: str) -> Array:
+    def evaluated(self, name: str) -> Array:
         """Values of a function of the layer named in :data:`NAMES`, (nelements, npoints)."""
-        return asked(NAMES[name], getattr(self.layer, name),
+        return evaluated(NAMES[name], getattr(self.layer, name),
                      *self.across.coordinates(self.X, self.tind))
 
     def factor(self, name: str, whole: bool = False) -> Any:
@@ -134,7 +134,7 @@ class Across(Immutable):
             inside = self.at(layer, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
             for name in NAMES:
                 if callable(getattr(layer, name)):
-                    inside.asked(name)
+                    inside.evaluated(name)
 
     @cached_property
     def jumps(self) -> Array:

@@ -69,11 +69,11 @@ class Measure(Immutable):
     def values(self, at: Any, name: str, whole: bool = False) -> Array:
         """A function of the layer at points, or with ``whole`` its means over the sections."""
         if not whole:
-            return at.asked(name)
+            return at.evaluated(name)
         X, (eta, w) = at.X, self.gauss(MEAN)
         points = np.array([np.repeat(X[0][..., None], len(eta), -1),
                            np.broadcast_to(eta, X[0].shape + eta.shape)])
-        values = at.moved(points.reshape(X.shape[:-1] + (-1,))).asked(name)
+        values = at.moved(points.reshape(X.shape[:-1] + (-1,))).evaluated(name)
         return values.reshape(values.shape[0], -1, len(eta)) @ w
 
     def breadth(self, at: Any, whole: bool = False, times: str = "") -> Any:

@@ -60,7 +60,7 @@ class Moving(Measure):
                                   np.clip(at.X[1], low, high)]))
 
     def values(self, at: Any, name: str, whole: bool = False) -> Array:
-        return self._inside(at).asked(name)
+        return self._inside(at).evaluated(name)
 
     def width(self, at: Any) -> Array:
         eta, h = (x[..., None] for x in np.broadcast_arrays(at.X[1], at.heights))
@@ -90,7 +90,7 @@ class Moving(Measure):
         def product(eta):
             X = np.array([np.broadcast_to(xi[..., None], eta.shape), eta])
             there = at.moved(X.reshape(2, len(eta), -1))
-            return np.prod([there.asked(name) for name in functions], axis=0).reshape(eta.shape)
+            return np.prod([there.evaluated(name) for name in functions], axis=0).reshape(eta.shape)
 
         c = c * self.moments(at.across.heights(xi, at.tind), product if functions else None)
         return c[0][:, back] if whole else self.series(c[:, :, back], at.X[1])
@@ -98,7 +98,7 @@ class Moving(Measure):
     def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
         eta, w = self.points(at.heights[:, 0], n)
         there = at.moved(np.array([at.X[0] + 0.0 * eta, eta]))
-        return eta, w * (there.asked("width") if callable(at.layer.width) else at.layer.width)
+        return eta, w * (there.evaluated("width") if callable(at.layer.width) else at.layer.width)
 
     def points(self, h: Array, n: int) -> tuple[Array, Array]:
         """n points in each interval of smooth width, and weights that include it, (..., q)."""

@@ -241,7 +241,7 @@ def layer_of(material: Material, width: Any, measure: Any = None, **more: Any) -
     return Layer(reference, width, measure, grade=grade, density=material.density, **more)
 
 
-def asked(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
+def evaluated(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
     """Values of a function of material coordinates, checked to be positive; ``what`` names it."""
     x, y = (np.ascontiguousarray(a) for a in np.broadcast_arrays(x, y))
     out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
