@@ -26,7 +26,7 @@ from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes_time
 from .loads import Amplitude, Load
-from .nonlinear_eigenstrain import energy_lost, pushed_at, sampled, unmatched
+from .nonlinear_eigenstrain import energy_difference, kernel_argument, sampled, unmatched
 
 #: Largest number of products.
 MOST = 8
@@ -86,7 +86,7 @@ class EigenStrain(Load):
     def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
         """(eps_xx, eps_yy, 2 eps_xy) of a layer at coordinates x, y (...), shape (3, ...)."""
         factors = 1.0, 1.0, 2.0
-        return np.array([c * _asked(f"eps_{name}", f, x, y) for c, name, f in zip(
+        return np.array([c * _evaluated(f"eps_{name}", f, x, y) for c, name, f in zip(
             factors, COMPONENTS, (self.xx, self.yy, self.xy))])
 
     def expand(self, layout: Layout) -> Sequence[Item]:
@@ -118,7 +118,8 @@ class EigenStrain(Load):
             return bound
         bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
         bound._stresses = list(map(stresses_of, kernel.tables, bound._strains))
-        bound.eigen_stresses = list(map(pushed_at, kernel.tables, bound._strains, bound._stresses))
+        bound.eigen_stresses = list(map(
+            kernel_argument, kernel.tables, bound._strains, bound._stresses))
         bound.grows = not kernel.linear
         bound._size = bound.at_rest if bound.grows else 1.0
         return bound
@@ -159,7 +160,7 @@ class EigenStrain(Load):
 
     def potential(self, u: Array) -> float:
         if self._strains is not None:
-            return energy_lost(self.beam, 0.0 * u, self._strains, self._size) - energy_lost(
+            return energy_difference(self.beam, 0.0 * u, self._strains, self._size) - energy_difference(
                 self.beam, u, self._strains, self._size)
         strain = self.beam.kernel.strain(u)
         return -float(np.sum(self.eigen_stresses[0].T * strain.reshape(-1, strain.shape[2])))
@@ -229,7 +230,7 @@ class Temperature(EigenStrain):
     def of_layer(self, layer: Layer, x: Array, y: Array) -> Array:
         law = layer.material
         size = law.thermal_expansion * (1.0 + law.nu if law.plane == "strain" else 1.0)
-        T = size * _asked("the temperature", self.change, x, y)
+        T = size * _evaluated("the temperature", self.change, x, y)
         return np.array([T, T, 0.0 * T])
 
 
@@ -245,7 +246,7 @@ def _number_or_function(name, value, optional=True):
                          ) from error
 
 
-def _asked(name, f, x, y):
+def _evaluated(name, f, x, y):
     """Evaluate a number or a function of material coordinates, arrays of one shape."""
     if not callable(f):
         return np.full(np.shape(x), 0.0 if f is None else f)
@@ -299,7 +300,7 @@ def products(name: str, function: Callable[..., Any], beam: Beam
     x, y = (c.ravel() for c in beam.across.coordinates(X))
     times = np.append(np.linspace(0.0, 1.0, 33), np.geomspace(1e-3, 1e3, 40) * 1.0371)
     at = [_AtTime(function, float(t)) for t in times]
-    F = np.array([_asked(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
+    F = np.array([_evaluated(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
     size, left, chosen, places = np.max(np.abs(F)), F.copy(), [], []
     while np.max(np.abs(left)) > CLOSE * size:
         k, p = np.unravel_index(np.argmax(np.abs(left)), left.shape)
@@ -341,5 +342,5 @@ class Coefficient:
     def __call__(self, t):
         if np.ndim(t):
             return np.array([self(s) for s in t])
-        found = _asked(f"{self.name}(t={t:g})", _AtTime(self.function, float(t)), self.x, self.y)
+        found = _evaluated(f"{self.name}(t={t:g})", _AtTime(self.function, float(t)), self.x, self.y)
         return float(found @ self.weights) * (1.0 if self.amplitude is None else self.amplitude(t))

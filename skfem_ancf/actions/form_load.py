@@ -123,7 +123,7 @@ class FormLoad(Density):
                          basis.dx, np.array([f[0] for f in fields]),
                          np.array([f.grad[0] for f in fields]), None)
         bound = self._with(beam=beam, _parts=[part], _basis=basis)
-        P, w = bound._asked(bound._variables(np.zeros(beam.N), part))
+        P, w = bound._evaluated(bound._variables(np.zeros(beam.N), part))
         if not vars(w).get("asked", set()) & {"r", "F", "t"}:
             return DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._spread(P))._with(
                 scaled=self.scaled)
@@ -136,7 +136,7 @@ class FormLoad(Density):
             beside(bound._require_tangent, beam.sizes)
         return bound
 
-    def _asked(self, y):
+    def _evaluated(self, y):
         """The form for each of six test functions, (6, n, np), and its parameters."""
         w = self._fields(y)
         return np.array([self._values(self.form.form, v, w) for v in self._tests]), w
@@ -171,7 +171,7 @@ class FormLoad(Density):
             return found
 
     def _slope(self, y, part):
-        return -self._asked(y)[0]
+        return -self._evaluated(y)[0]
 
     def _curvature(self, y, part):
         if self.tangent is not None:

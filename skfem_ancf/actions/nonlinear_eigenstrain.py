@@ -24,7 +24,7 @@ from ..formulations import COMPONENTS
 SECTION, ROUND_OFF = 6, 1e-12
 
 
-def energy_lost(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> float:
+def energy_difference(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> float:
     """The integral of W(E) - W(E - factor E0)."""
     total = 0.0
     for t, E0 in zip(beam.kernel.tables, eigen):
@@ -37,7 +37,7 @@ def energy_lost(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> 
     return total
 
 
-def pushed_at(t: Any, E0: Array, stresses: Array) -> Array:
+def kernel_argument(t: Any, E0: Array, stresses: Array) -> Array:
     """The kernel's argument for an eigenstrain: strains at the points, or linear stresses."""
     return stresses if t.law.kind == LINEAR else at_points(t, E0)
 
@@ -65,7 +65,7 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
     if degree < 1:  # its Poisson coupling is to the mean over the section
         return np.zeros(x.shape)
     fit: Any = np.zeros((*x.shape, degree + 1, degree + 1))
-    right, pushed, parts = np.zeros(fit.shape[:-1]), np.zeros((2, *x.shape)), []
+    right, integrals, parts = np.zeros(fit.shape[:-1]), np.zeros((2, *x.shape)), []
     for one, (eta, w) in across.rules(2 * SECTION):
         Z = np.stack([np.repeat(X[0], len(eta), -1),
                       np.broadcast_to(eta, (*X[0].shape, len(eta))).reshape(*X.shape[1:-1], -1)])
@@ -77,10 +77,10 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
         E0 = eigen.of_layer(one, s, t).reshape(3, *shape)
         parts.append((size, t.reshape(shape), legvander(2.0 * eta - 1.0, degree), E0,
                       one.material.lateral_ratio))
-        pushed += np.sum(size * E0[0], axis=-1), np.sum(size * E0[0] * parts[-1][1], axis=-1)
+        integrals += np.sum(size * E0[0], axis=-1), np.sum(size * E0[0] * parts[-1][1], axis=-1)
     EA, ES, EI = across.moments(X[0], tind)
     det = EA * EI - ES * ES
-    mean, slope = (EI * pushed[0] - ES * pushed[1]) / det, (EA * pushed[1] - ES * pushed[0]) / det
+    mean, slope = (EI * integrals[0] - ES * integrals[1]) / det, (EA * integrals[1] - ES * integrals[0]) / det
 
     def free(y, mean, slope, E0, ratio):
         return E0[1] - ratio * (mean + slope * y - E0[0])
