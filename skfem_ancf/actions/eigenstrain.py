@@ -160,8 +160,9 @@ class EigenStrain(Load):
 
     def potential(self, u: Array) -> float:
         if self._strains is not None:
-            return energy_difference(self.beam, 0.0 * u, self._strains, self._size) - energy_difference(
-                self.beam, u, self._strains, self._size)
+            start, now = (energy_difference(self.beam, x, self._strains, self._size)
+                          for x in (0.0 * u, u))
+            return start - now
         strain = self.beam.kernel.strain(u)
         return -float(np.sum(self.eigen_stresses[0].T * strain.reshape(-1, strain.shape[2])))
 
@@ -342,5 +343,6 @@ class Coefficient:
     def __call__(self, t):
         if np.ndim(t):
             return np.array([self(s) for s in t])
-        found = _evaluated(f"{self.name}(t={t:g})", _AtTime(self.function, float(t)), self.x, self.y)
+        at = _AtTime(self.function, float(t))
+        found = _evaluated(f"{self.name}(t={t:g})", at, self.x, self.y)
         return float(found @ self.weights) * (1.0 if self.amplitude is None else self.amplitude(t))

@@ -65,7 +65,7 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
     if degree < 1:  # its Poisson coupling is to the mean over the section
         return np.zeros(x.shape)
     fit: Any = np.zeros((*x.shape, degree + 1, degree + 1))
-    right, integrals, parts = np.zeros(fit.shape[:-1]), np.zeros((2, *x.shape)), []
+    right, N, M, parts = np.zeros(fit.shape[:-1]), np.zeros(x.shape), np.zeros(x.shape), []
     for one, (eta, w) in across.rules(2 * SECTION):
         Z = np.stack([np.repeat(X[0], len(eta), -1),
                       np.broadcast_to(eta, (*X[0].shape, len(eta))).reshape(*X.shape[1:-1], -1)])
@@ -77,10 +77,11 @@ def unmatched(beam: Beam, eigen: Any, layer: Any, X: Array, tind: Array | None =
         E0 = eigen.of_layer(one, s, t).reshape(3, *shape)
         parts.append((size, t.reshape(shape), legvander(2.0 * eta - 1.0, degree), E0,
                       one.material.lateral_ratio))
-        integrals += np.sum(size * E0[0], axis=-1), np.sum(size * E0[0] * parts[-1][1], axis=-1)
+        N += np.sum(size * E0[0], axis=-1)
+        M += np.sum(size * E0[0] * parts[-1][1], axis=-1)
     EA, ES, EI = across.moments(X[0], tind)
     det = EA * EI - ES * ES
-    mean, slope = (EI * integrals[0] - ES * integrals[1]) / det, (EA * integrals[1] - ES * integrals[0]) / det
+    mean, slope = (EI * N - ES * M) / det, (EA * M - ES * N) / det
 
     def free(y, mean, slope, E0, ratio):
         return E0[1] - ratio * (mean + slope * y - E0[0])

@@ -148,7 +148,7 @@ class FrameGraph:
         self.tol = require_not_negative("tol", tol, False) if tol is not None else float(min(
             MERGED * self.size, OF_LONGEST * np.max(length)))
         close = max(2.0 * self.tol, min(CLOSE * self.tol, OF_LONGEST * np.max(length)))
-        pairs, apart = self._near_pairs(max(close, NEAR * self.size))
+        pairs, apart = self._close_pairs(max(close, NEAR * self.size))
         one = (apart <= self.tol * (1.0 + 1e-9)) & (self.tol > 0.0)
         for (i, j), d in zip(pairs[~one], apart[~one]):
             if d <= NEAR * self.size:
@@ -172,7 +172,7 @@ class FrameGraph:
         _warn_of(pairs[~one], apart[~one], "are different nodes, as they are farther apart than "
                  f"tol = {self.tol:.3g}: give a larger tol= if they should be one")
 
-    def _near_pairs(self, distance):
+    def _close_pairs(self, distance):
         """Pairs of points (k, 2) within a distance, and their distances, (k,)."""
         tree = scipy.spatial.cKDTree(self.points.T)
         pairs = tree.query_pairs(distance, output_type="ndarray").reshape(-1, 2)
@@ -219,7 +219,7 @@ class FrameGraph:
                 return np.unique(self.given[:, self.groups[place]])
             raise NameUnknown("name of nodes", place, {**self.nodes, **self.groups})
         if is_point(place) and not isinstance(place, list):
-            return self._node_near(place)
+            return self._nearest_node(place)
         if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
             return np.array([require_integer("the number of a node", place, 0, n - 1)])
         if callable(place):
@@ -232,7 +232,7 @@ class FrameGraph:
             return np.unique(np.concatenate([self.points_at(one) for one in place]))
         raise InputError(f"a place of a frame is {PLACES}, got {shown(place)}")
 
-    def _node_near(self, place):
+    def _nearest_node(self, place):
         x = require_finite("the point", place, (2,))
         off = np.hypot(*(self.points - x[:, None]))
         k = int(np.argmin(off))

@@ -156,8 +156,8 @@ class Finder:
         """Among all elements that contain points choose those with the nearest axis, in place."""
         k, some = self._around(x)
         Y = self.inverse(x[:, k, None], some)[..., 0]
-        held = self._outside(Y, noise) == 0.0
-        k, some, Y = k[held], some[held], np.clip(Y[:, held], 0.0, 1.0)
+        inside = self._outside(Y, noise) == 0.0
+        k, some, Y = k[inside], some[inside], np.clip(Y[:, inside], 0.0, 1.0)
         off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
         np.minimum.at(least, k, off)
         near = off <= least[k] + self.equal
@@ -192,7 +192,7 @@ class Finder:
         return out
 
     def _find(self, x, noise):
-        e, X, outside = self._near(x, noise)
+        e, X, outside = self._nearest(x, noise)
         left = np.nonzero((outside > 0) & np.isfinite(outside))[0]
         if len(left):
             e[left], X[:, left], outside[left] = self._best(
@@ -242,7 +242,7 @@ class Finder:
         one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
         return (d, d @ mesh.p) if one else None
 
-    def _near(self, x, noise):
+    def _nearest(self, x, noise):
         """The nearest element, or its neighbour where the point is beyond the common node."""
         if self._line is None:
             distance, near = self._tree.query(x.T)
