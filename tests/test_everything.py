@@ -83,7 +83,7 @@ def test_it_is_in_the_plan():
     plan = everything().plan("dynamic")
     for term, words in {"force elements": ("5 Drag", "1 PointMass", "2 Spring", "1 TorsionalSpring",
                                            "1 Foundation", "0 by functions asked in Python"),
-                        "stress-free strain": ("2",), "rigid bodies": ("2",), "obstacles": ("1",),
+                        "eigenstrain": ("2",), "rigid bodies": ("2",), "obstacles": ("1",),
                         "sections": ("2 laws", "numbers", "profile", "height 0.01 to 0.02"),
                         "sensors": ("1 read",), "multipliers": ("Weld", "PrescribedAngle")}.items():
         assert all(word in plan[term].reason for word in words), plan[term]

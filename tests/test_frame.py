@@ -526,7 +526,7 @@ def test_what_is_not_held_is_said():
      InputError, "pin it"),
     (lambda f: Frame.from_lines(*PORTAL, hinges=[1], material=STEEL, height=H,
                                 width=H).moment(1, 2.0), InputError, "no line takes a moment"),
-    (lambda f: f.solve_static().reactions("left", beam=0), InputError, "asked of nodes, without"),
+    (lambda f: f.solve_static().reactions("left", beam=0), InputError, "give its nodes, without"),
 ])
 def test_calls_that_mean_nothing(call, error, message):
     with pytest.raises(error, match=message):

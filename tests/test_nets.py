@@ -110,7 +110,7 @@ def test_sets_of_abaqus_may_overlap(tmp_path):
     ("*ELEMENT, TYPE=B31\n1, 1,2\n2, 2,3\n3, 3,4\n4, 4,5\n*ELSET, ELSET=a\n1\n*ELSET, ELSET=a\n2",
      "'a' is there twice"),
     ("*ELEMENT, TYPE=B31, ELSET=a\n1, 1,2\n2, 2,3\n*ELEMENT, TYPE=B31, ELSET=c\n3, 3,4\n4, 4,5\n"
-     "*ELSET, ELSET=b\nc,\na", "set 'b' holds names of sets")])
+     "*ELSET, ELSET=b\nc,\na", "set 'b' lists names of sets")])
 def test_sets_of_abaqus_that_meshio_takes_for_others_are_refused(tmp_path, text, message):
     """Sets in which it has other elements than the file."""
     with pytest.raises(MeshError, match=message):

@@ -511,7 +511,7 @@ def test_an_impact_goes_in_as_deep_as_the_guide_says(ratio):
 
 @pytest.mark.parametrize("scheme, why", [
     ("generalized-alpha", "up to 3 times"), (GeneralizedAlpha(0.5), "up to 2.4 times"),
-    ("newmark", "up to 3 times"), ("radau", "do not correct")], ids=repr)
+    ("newmark", "up to 3 times"), ("radau", "do not update")], ids=repr)
 def test_schemes_that_do_not_take_the_augmented_lagrangian_name_one_that_does(scheme, why):
     scene = Scene(beam()).obstacle(Line((0, -0.5)), method="augmented")
     with pytest.raises(InputError, match=f"{why}.*energy-momentum.*GeneralizedAlpha\\(0\\)"):

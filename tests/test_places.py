@@ -79,7 +79,7 @@ def test_a_point_is_where_it_says():
     assert_array_equal(facets_of(arc, (0, 1.03)), [2])
     with pytest.raises(MeshError, match=r"sections of the nodes \[0, 8\] at once"):
         facets_of(arc, (1, 0))
-    with pytest.raises(InputError, match=r"pin holds the axis, at \(0, 1\)"):
+    with pytest.raises(InputError, match=r"pin fixes the axis, at \(0, 1\)"):
         Scene(beam(arc)).pin((0, 1.03))
 
 

@@ -276,7 +276,7 @@ def test_a_star(kind):
     (lambda s: s.slider((0, (0.5, 0.0)), "rail"), "rail"),
     (lambda s: s.joint("slot", at=(0, (0.5, 0.0)), on=2, direction=(1, 0), through=(0, 1)),
      "off the line"),
-    (lambda s: s.slider((2, (0.5, 2.0)), 2, direction=(1, 0)), "its own beam or body"),
+    (lambda s: s.slider((2, (0.5, 2.0)), 2, direction=(1, 0)), "its beam or body"),
     (lambda s: s.slider((9.0, 9.0), 0), "no beam and no rigid body"),
     (lambda s: s.slider((1.0, 0.0), 0), "say which"),
 ])

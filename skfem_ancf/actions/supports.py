@@ -104,9 +104,9 @@ class Pin(Support):
             axis = np.round(beam.mesh.p[:, node_of(beam.mesh, self.boundary)], 12) + 0.0
             if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
                 raise InputError(
-                    f"pin holds the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "
+                    f"pin fixes the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "
                     f"({x[0]:.9g}, {x[1]:.9g}) of its section: give that point of the axis, or "
-                    'hold the other with scene.joint("position", at=..., r=lambda t: point)')
+                    'fix the other with scene.joint("position", at=..., r=lambda t: point)')
         return bound
 
 

@@ -116,7 +116,7 @@ def _require_sets_of_abaqus(path):
             elif keyword == "*ELSET":
                 sets.append(name)
         elif keyword == "*ELSET" and re.match(r"\s*[A-Za-z_]", line):
-            raise MeshError(f"{path}: the element set {sets[-1]!r} holds names of sets, which are "
+            raise MeshError(f"{path}: the element set {sets[-1]!r} lists names of sets, which are "
                             "not read: list the numbers of its elements")
     named = [name for name in blocks if name]
     again = sorted({name for name in named + sets if (named + sets).count(name) > 1})

@@ -270,7 +270,7 @@ class MeshBeam(NumberedMesh):
         p = require_finite("the nodes", self.doflocs, (2, None))
         t = require_finite("t", self.t)
         if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
-            raise MeshError(f"t must hold the numbers of nodes, got {shown(self.t)}")
+            raise MeshError(f"t must contain node numbers, got {shown(self.t)}")
         shape = t.shape
         if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
             raise MeshError(

@@ -192,9 +192,10 @@ class State(Immutable, MaterialPoints):
 
     @property
     def verdict(self) -> Verdict | None:
-        """What the tangent says of an equilibrium: a
-        :class:`~skfem_ancf.equations.stability.Verdict`; None for an instant of a motion, and for a
-        linear solution: ``scene.buckling()`` tells up to which load that is stable.
+        """Stability of an equilibrium, a :class:`~skfem_ancf.equations.stability.Verdict`.
+
+        None for an instant of a motion, and for a linear solution, for which ``scene.buckling()``
+        gives the critical load.
         """
         if self._verdict is None and self.t is None and self.base is None:
             with self._contact_memory():
@@ -210,8 +211,9 @@ class State(Immutable, MaterialPoints):
 
     @property
     def negative_pivots(self) -> int | None:
-        """Number of directions that give way: negative eigenvalues of the tangent at the free
-        degrees of freedom, on the tangent space of the joints. None where :attr:`verdict` is.
+        """Number of unstable directions: negative eigenvalues of the constrained tangent.
+
+        None where :attr:`verdict` is.
         """
         return None if self.verdict is None else self.verdict.negative_pivots
 
@@ -501,8 +503,8 @@ class State(Immutable, MaterialPoints):
         names = {n: float(v) for n, v, held in zip(
             member.dofnames, np.tensordot(one, forces, 1).ravel(), holds) if held}
         if frame is not None and not names:
-            raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: what holds "
-                             "the nodes of a frame is asked of nodes, without beam=")
+            raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: for "
+                             "supports of a frame give its nodes, without beam=")
         return Reaction(one @ forces[:, 0], float(moment), names)
 
     def _support_force(self):

@@ -77,18 +77,18 @@ def _beams(s):
         yield Item("sections", "constant", _listed(map(_section, uneven)))
     eigen = [load for load in s.loads if isinstance(load, EigenStrain)]
     if eigen:
-        yield Item("stress-free strain", "computed", f"{len(eigen)} at the points of integration, "
-                   f"{sum(load.grows for load in eigen)} of them under laws that are not linear")
+        yield Item("eigenstrain", "computed", f"{len(eigen)} at the integration points, "
+                   f"{sum(load.grows for load in eigen)} of them with nonlinear laws")
     yield _item("stabilisation", any(b.kernel.constant is not None for b in beams),
-                "quadratic: one matrix", "the quadrature leaves no mode out", "constant")
+                "quadratic: one matrix", "the quadrature misses no mode", "constant")
 
 
 def _matrices(dynamic, linear):
     yield _item("geometric term", not linear, "the stress is not zero",
                 "no stress in a linear solve")
     yield Item("tangent", "constant", "one assembly, one factorisation") if linear else Item(
-        "tangent", "computed", "its factors are kept while the iteration contracts; where a step's "
-        "own do not, stresses are independent" if dynamic else
+        "tangent", "computed", "its factors are reused while the iteration contracts; else "
+        "stresses are independent" if dynamic else
         "each iteration; the last evaluates the force only")
     yield _item("mass", dynamic, "assembled and factorised once", "no inertia in statics",
                 "constant")
@@ -123,7 +123,7 @@ def _forces(s, dynamic, linear):
                 "no follower load, no amplitude")
     held = s.constraints
     yield _item("multipliers", held.m, f"{held.m} equations of {_kinds(held.joints)}",
-                "the joints only fix coordinates" if held.all_joints else "no joints")
+                "the joints only fix degrees of freedom" if held.all_joints else "no joints")
 
 
 def _solution(s, dynamic, linear):
@@ -166,7 +166,7 @@ def _linear_solver(s, dynamic):
     if s.constraints.m:
         solver += ", with a Schur complement for the multipliers"
         if not dynamic:
-            solver += "; sparse LU with these where joints hold what supports leave free"
+            solver += "; sparse LU with these if joints prevent rigid motions"
     return solver
 
 

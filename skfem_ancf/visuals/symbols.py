@@ -14,7 +14,7 @@ from ..core.errors import InputError
 from ..core.types import Array
 from .scenery import INK, MUTED
 
-#: Colours of loads and of what holds.
+#: Colours of loads and of supports.
 LOAD, HOLD = "#b3261e", "#1f5f8b"
 #: Sizes of symbols relative to the picture: arrows, those of distributed loads, others.
 ARROW, SPREAD, SIZE = 0.13, 0.07, 0.03
@@ -153,7 +153,7 @@ class Sketch:
         """Distance of a point from others (n, 2)."""
         return float(np.min(np.hypot(*(others - point).T)))
 
-    # what holds
+    # supports and joints
 
     def _support(self, s, at, largest):
         held, base, r = set(s.text.split()), at[0], SIZE * self.size

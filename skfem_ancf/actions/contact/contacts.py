@@ -29,12 +29,10 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, L
 SUNK, FIRM = 0.5, 0.1
 #: Factor on the stiffness for difficult equilibria.
 EASED = 1e-2
-#: Why steps of several points do not hold a body on a wall: at each of them it would be held, and
-#: be thrown off by what is beyond.
-BY_POINTS = ("its steps do not correct pressures: held at their points, a body that is stopped "
-             "would leave up to 3, 4.1 or 5.6 times as fast as it came by 1, 2 or 3 points of "
-             "Gauss, 4.3 times by those of Radau")
-#: Of scenes without obstacles.
+#: Collocation cannot correct multipliers within a step: constraints at its points cause rebound.
+BY_POINTS = ("its steps do not update multipliers: a stopped body would rebound up to 3, 4.1 or "
+             "5.6 times as fast with 1, 2 or 3 Gauss points, 4.3 times with Radau points")
+#: For scenes without obstacles.
 NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(LARGEST),
                             0, 0)
 
@@ -261,14 +259,13 @@ class Contacts:
         ``kick - 1`` with ``(1 - alpha_m) / ((1 - alpha_f) beta)``.
         """
         reason = BY_POINTS if kick == np.inf else (
-            f"a body that is stopped in a step would leave up to {kick - 1.0:.2g} times as fast as "
-            "it came")
+            f"a body that is stopped in a step would rebound up to {kick - 1.0:.2g} times as fast")
         for one in self.obstacles:
             if one.method == "augmented" and kick > 2.0 + 1e-9:
                 raise InputError(
-                    f"{scheme!r} does not take method='augmented' of {one!r}: {reason}. Take "
-                    "'energy-momentum', which keeps to its balance of energy, "
-                    "GeneralizedAlpha(0), or method='penalty'")
+                    f"{scheme!r} does not take method='augmented' of {one!r}: {reason}. Use "
+                    "'energy-momentum', which conserves energy, GeneralizedAlpha(0), or "
+                    "method='penalty'")
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
         """Raise InputError if a linear solution penetrates an obstacle."""
@@ -369,9 +366,9 @@ class Contacts:
             one, deep, h = self.obstacles[which], -float(gap.min()), group.height
             if one.penalty is None and deep > SUNK * h:
                 k = (1.0 + firmness) * group.numbers[STIFFNESS]
-                firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both sides of it are in
+                firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both faces may be inside
                 out.append(
-                    f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: it is "
-                    f"pressed harder than its stiffness, {k:.3g}, holds. Give "
-                    f"stiffness={firm:.2g}, with which this pressure leaves a tenth of the height")
+                    f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: its "
+                    f"stiffness, {k:.3g}, is too small for this pressure. Give "
+                    f"stiffness={firm:.2g}, with a penetration of a tenth of the height")
         return out

@@ -12,7 +12,7 @@ from ...core.source import F1, I1, shaped, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
-#: What is asked of all pairs, see :class:`Question`.
+#: Requests to all pairs, see :class:`Question`.
 FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
 #: Of a pair: kind and number of its obstacle, elements, points of each element, pairs of degrees of
 #: freedom of each, whether normals depend on slopes, how many numbers the shape has; where its
@@ -27,16 +27,16 @@ STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, INERTIA, RADIUS, SIDE, TOLERANCE 
 NUMBERS = 9
 #: Rows of the points without displacement: area, distance from the axis, place and slope.
 AREA, OFFSET, START = range(3)
-#: Rows of the points' memory: the multiplier of the augmented Lagrangian over the stiffness, the
-#: anchor of friction in the obstacle's frame, and how far the point was from it.
+#: Rows of the points' history data: the multiplier of the augmented Lagrangian over the stiffness,
+#: the anchor of friction in the obstacle's frame, and the distance of the point from it.
 MULTIPLIER, ANCHOR_X, ANCHOR_Y, SLIP = range(4)
-#: Pose of an obstacle: displacement, cosine and sine of its angle, the point about which it turns,
-#: its velocities, and the time. There are three: at a time, and at the begin and end of a mean.
+#: Pose of an obstacle: displacement, cosine and sine of its angle, its pivot, its velocities, and
+#: the time. There are three: at a time, and at the beginning and end of a mean.
 POSE, POSES = 10, 30
 NOW, BEGIN, END = map(np.int64, range(3))
-#: Memory of all pairs: 1 if points stick to anchors; 1 / dt^2 of the last step in time; 1 if points
-#: with multipliers are held on both sides; for each pair the largest multiplier, then by how much
-#: it is stiffer than by default; then the points' memories.
+#: History data of all pairs: 1 if points stick to anchors; 1 / dt^2 of the last time step; 1 if
+#: points with multipliers are bilateral; for each pair the largest multiplier, then the factor of
+#: hardening; then the data of the points.
 ANCHORED, RATE, BILATERAL, LARGEST = range(4)
 #: Flags of history data: anchors, multipliers.
 ANCHORS, PRESSURES = 1, 2

@@ -60,7 +60,7 @@ class Glue(Joint):
     def bind(self, layout: Layout) -> None:
         domain = layout.beam(self.domain)
         if not isinstance(domain, Domain):
-            raise InputError(f"a Glue holds the boundary of a Domain, got {domain!r}")
+            raise InputError(f"a Glue needs the boundary of a Domain, got {domain!r}")
         basis, first = domain.trace(self.boundary), layout.offset(domain)
         tests = domain.dofs(self.boundary)
         M = BilinearForm(lambda u, v, w: dot(u, v)).assemble(basis).tocoo()

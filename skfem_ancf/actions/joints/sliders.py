@@ -117,7 +117,8 @@ class Sleeve(Joint):
         end = "left" if s < 0 else "right"
         beam = self.axis.beam
         return (f"{self!r} has left the beam {beam.name or ''!r} at its {end} end: "
-                "stop before, with until=, hold it by a spring or a support, or lengthen the beam")
+                "stop before, with until=, restrain it by a spring or a support, or lengthen the "
+                "beam")
 
     @array_cache(KNOWN)
     def _parameter(self, u: Array) -> float:
@@ -271,7 +272,7 @@ class Slot(Joint):
             raise InputError(f"{self!r}: the point and the line are both of the ground")
         if which == self.on or (which != GROUND and self.on != GROUND
                                 and layout.beam(which) is layout.beam(self.on)):
-            raise InputError(f"{self!r}: a point cannot slide along a line of its own beam or body")
+            raise InputError(f"{self!r}: a point cannot slide along a line of its beam or body")
         gap = cross(self.direction, self.w.start)
         size = max(layout.beam(k).size for k in (which, self.on) if k != GROUND)
         if abs(gap) > 1e-6 * size:

@@ -21,28 +21,27 @@ from ..places import Vector
 from .shapes import Shape
 
 METHODS = ("penalty", "augmented")
-#: The least length over which a strip that is pressed in one point sinks in, relative to its
-#: extent: shorter ones no mesh resolves, and Newton's method loses its way among single points.
+#: Least length of indentation of a strip under a point force, relative to its extent: meshes do not
+#: resolve shorter ones, and Newton's method fails.
 SPREAD = 1.0 / 200.0
-#: Width of the transition from no pressure to one in proportion to the penetration, relative to
-#: the height.
+#: Width of the transition from no pressure to proportional pressure, relative to the height.
 WIDTH = 1e-3
 #: Initial penetration allowed, relative to the height, as meshes of curves are approximate.
 CUT = 1e-2
-#: Penetration that is left by the augmented Lagrangian, relative to the height.
+#: Tolerance of the augmented Lagrangian: penetration relative to the height.
 TOLERANCE = 1e-5
-#: What the augmented Lagrangian adds to the stiffness in a step in time, relative to the mass of
-#: the body beside the surface over the square of the step.
+#: Addition to the stiffness in a time step with the augmented Lagrangian, relative to the mass per
+#: area over the squared step.
 HARDER = 100.0
-#: How deep the way of a point from one instant to the next may cut an obstacle unseen, relative to
-#: the height or to half of the obstacle's thickness.
+#: Depth to which the path of a point within a step may cut an obstacle unnoticed, relative to the
+#: height or to half the obstacle's thickness.
 THROUGH = 0.1
 #: Relative step in time for the velocity of an obstacle.
 STEP = 1e-6
 #: Points across an end.
 ACROSS = 3
-#: How deep a circle may sink in between two points of a straight surface, relative to the height;
-#: and points along an element at most.
+#: Depth to which a circle may sink in between two points of a straight surface, relative to the
+#: height; largest number of points along an element.
 SINK, MOST = 1e-2, 200
 
 
@@ -175,7 +174,7 @@ class Obstacle(ForceElement):
     def bind(self, layout: Layout) -> list[Vector]:
         if not layout.beams:
             raise InputError("an obstacle is touched by surfaces of beams, and the scene has "
-                             "none: hold what there is by one-sided springs, or add a beam")
+                             "none: use one-sided springs, or add a beam")
         beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.tolerance or TOLERANCE * height
