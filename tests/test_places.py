@@ -104,7 +104,7 @@ def test_ends_are_material_points():
     for call in (lambda: scene.point_force((0, -1), at="right"),
                  lambda: scene.spring(1.0, between=("right", (9, 9))),
                  lambda: scene.state().displacement("right")):
-        with pytest.raises(InputError, match="say which"):
+        with pytest.raises(InputError, match="choose one with beam="):
             call()
     with pytest.raises(InputError, match="got 'rigth'"):
         Scene(a).clamp("left").spring(1.0, between=("rigth", (9, 9)))
