@@ -99,7 +99,7 @@ WORDS = {
     "test": "function", "cmap": "colour map",
     "k": "number of modes|index", "names": "degree of freedom", "form": "[Ff]orm|load",
     "times_or_ix": "refinements|elements|subdomain|function", "item": "Load or a Joint",
-    "elements": "element|subdomain|points", "place": "place|node", "what": "held",
+    "elements": "element|subdomain|points", "place": "place|node", "what": "component",
     "at": "place|point|boundary|section|facet|beam|node", "tind": "elements|subdomain|function",
     "boundary": "place|point|facet|function|node", "hinges": "hinge|node|line",
     "groups": "group|lines", "curves": "curve", "facets": "place|point|boundary|function",

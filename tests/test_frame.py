@@ -39,7 +39,7 @@ def welded(frame, loads, **options):
     """The same of a beam for each line, with multipliers, and forces on its first end at nodes."""
     element = options.get("element", ElementBeamCable(5))
     n, beams, ends = options.get("elements", 1), [], {}
-    for k, (i, j) in enumerate(frame.net.lines.T):
+    for k, (i, j) in enumerate(frame.graph.lines.T):
         a, d = frame.points[:, i], frame.points[:, j] - frame.points[:, i]
         mesh = MeshBeam.init_line(np.linspace(0, np.hypot(*d), n + 1), H, a,
                                   np.arctan2(d[1], d[0]))
@@ -517,7 +517,7 @@ def test_what_is_not_held_is_said():
     (lambda f: f.clamp(9), InputError, "number of a node"),
     (lambda f: f.clamp(0, beam=0), InputError, "supported and loaded at nodes"),
     (lambda f: f.clamp(0, thickness="fixed"), NameUnknown, "thickness.*known: 'free'"),
-    (lambda f: f.hold(0, "z"), NameUnknown, "what is held"),
+    (lambda f: f.hold(0, "z"), NameUnknown, "fixed component"),
     (lambda f: f.clamp(lambda x: x[0] > 7), MeshError, "selects none of the 4 nodes"),
     (lambda f: f.clamp(lambda x: 1), InputError, "returns n truth values"),
     (lambda f: Frame.from_meshio(meshio.Mesh([[0, 0]], []), material=STEEL), MeshError, "no lines"),

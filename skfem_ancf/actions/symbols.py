@@ -26,7 +26,7 @@ from .joints.guides import OnCircle, OnLine
 from .joints.nodes import Nodes
 from .joints.plane_section import PlaneSection
 from .joints.prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
-from .joints.settlements import HELD
+from .joints.settlements import COMPONENTS
 from .joints.sliders import Sleeve, Slot
 from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
 from .moving import TimedLoad
@@ -311,39 +311,39 @@ def _(support, layout):
         yield _support([point(layout, member, support.boundary)],
                        "x y angle" if len(dofs) == 4 else "x y")
     elif isinstance(member, Domain):
-        held = [name for k, name in enumerate(("x", "y")) if np.any(dofs % 2 == k)]
+        fixed = [name for k, name in enumerate(("x", "y")) if np.any(dofs % 2 == k)]
         at = _boundary(layout, member, support.boundary)
         away = at.start - np.mean(member.basis.mesh.p, axis=1)
-        yield _support([at], " ".join([*held, "angle"]), away / (np.hypot(*away) or 1.0))
+        yield _support([at], " ".join([*fixed, "angle"]), away / (np.hypot(*away) or 1.0))
     else:
         for node in np.unique(dofs // member.nd).tolist():
             own = dofs[dofs // member.nd == node] % member.nd
-            held = " ".join(name for name, found in (
+            fixed = " ".join(name for name, found in (
                 ("x", 0 in own), ("y", 1 in own), ("angle", np.any(own > 1))) if found)
-            yield _support([at_node(layout, member, node)], held, _outward(member, node))
+            yield _support([at_node(layout, member, node)], fixed, _outward(member, node))
 
 
-def _support(at, held, direction=(0.0, -1.0)):
-    return Symbol("support", tuple(at), (tuple(direction),), text=held)
+def _support(at, fixed, direction=(0.0, -1.0)):
+    return Symbol("support", tuple(at), (tuple(direction),), text=fixed)
 
 
-def _held(layout, beam, at, held):
+def _support_of(layout, beam, at, fixed):
     """What holds a point: of a beam at a node, away from it, else from below."""
     member, direction = layout.beam(beam), (0.0, -1.0)
     if isinstance(member, Beam):
         off = np.hypot(*(member.mesh.p - at.start[:, None]))
         if np.min(off) < 1e-9 * member.mesh.height:
             direction = _outward(member, int(np.argmin(off)))
-    return _support([at], held, direction)
+    return _support([at], fixed, direction)
 
 
 @symbols.register(PlaneSection)
 @symbols.register(PrescribedPosition)
 def _(joint, layout):
     if isinstance(joint, PrescribedPosition):
-        yield _held(layout, joint.beam, point(layout, joint.beam, joint.at), "x y")
+        yield _support_of(layout, joint.beam, point(layout, joint.beam, joint.at), "x y")
     else:
-        yield _held(layout, joint.beam, section(layout, joint.beam, joint.at)[0], "angle")
+        yield _support_of(layout, joint.beam, section(layout, joint.beam, joint.at)[0], "angle")
 
 
 @symbols.register(PrescribedAngle)
@@ -354,7 +354,7 @@ def _(joint, layout):
     if any(joint.angle(t) for t in (0.5, 1.0)) or isinstance(joint, PrescribedTurn):
         yield Symbol("motor", (place,), value=float(joint.angle(1.0)) or 1.0)
     else:
-        yield _held(layout, beam, place, "angle")
+        yield _support_of(layout, beam, place, "angle")
 
 
 @symbols.register(Hinge)
@@ -365,7 +365,7 @@ def _(joint, layout):
           for b, a in zip(joint.beams, joint.at) if not is_ground(b)]
     if any(map(is_ground, joint.beams)):
         member = next(b for b in joint.beams if not is_ground(b))
-        yield _held(layout, member, at[0], "x y angle" if weld else "x y")
+        yield _support_of(layout, member, at[0], "x y angle" if weld else "x y")
     else:
         yield Symbol("joint", tuple(at[:1]), text="weld" if weld else "hinge")
 
@@ -403,18 +403,18 @@ def _(joint, layout):
     bound.bind(layout)
 
     def place(end: int) -> Vector:
-        return Vector(joint.net.points[:, bound.nodes[end]], bound.positions[end][:, None],
+        return Vector(joint.graph.points[:, bound.nodes[end]], bound.positions[end][:, None],
                       np.ones(1))
 
-    points = joint.net.points[:, joint.nodes]
+    points = joint.graph.points[:, joint.nodes]
     for end in bound.leaders:
-        held = [name for name, one in zip(HELD, bound.held[bound.nodes[end]]) if one]
-        if held:  # away from the lines that meet
+        fixed = [name for name, one in zip(COMPONENTS, bound.fixed[bound.nodes[end]]) if one]
+        if fixed:  # away from the lines that meet
             meet = np.flatnonzero(bound.nodes == bound.nodes[end])
             away = np.sum(points[:, meet] - points[:, meet ^ 1], axis=1)
             size = np.hypot(*away)
-            yield _support([place(end)], " ".join(held),
-                           away / size if size > 1e-9 * joint.net.size else (0.0, -1.0))
+            yield _support([place(end)], " ".join(fixed),
+                           away / size if size > 1e-9 * joint.graph.size else (0.0, -1.0))
     for end in np.flatnonzero(bound.hinged & several[bound.nodes]):
         yield Symbol("joint", (place(end),), text="hinge")
 

@@ -125,7 +125,7 @@ class Condensed:
 
     def _unknown(self):
         """Whether x, y and the rotation of a node are unknowns, (number, 3)."""
-        out = ~self.nodes.held
+        out = ~self.nodes.fixed
         out[np.setdiff1d(np.arange(len(out)), self.nodes.nodes)] = False  # no line ends there
         rigid = np.zeros(len(out), dtype=bool)
         rigid[self.nodes.nodes[~self.nodes.hinged]] = True
@@ -315,7 +315,7 @@ class CondensedMass:
 
 def _order(nodes):
     """Node numbers in a fill-reducing order."""
-    (i, j), n = nodes.nodes.reshape(-1, 2).T, len(nodes.held)
+    (i, j), n = nodes.nodes.reshape(-1, 2).T, len(nodes.fixed)
     one = np.ones(len(i))
     links = sparse.coo_array((np.append(one, one), (np.append(i, j), np.append(j, i))), (n, n))
     A = (links + 2.0 * len(i) * sparse.eye_array(n)).tocsc()
@@ -331,14 +331,14 @@ class _Moves:
         rows = [3 * ends + k for k, ends in enumerate(follow)]
         self._following = first = sum(map(len, follow))
         columns = [np.arange(first)]
-        for k, held in enumerate((nodes.held_x, nodes.held_y, nodes.held_angle)):
-            number = np.full(len(nodes.held), -1)
-            number[nodes.nodes[held]] = first + np.arange(len(held))
+        for k, fixed in enumerate((nodes.fixed_x, nodes.fixed_y, nodes.fixed_angle)):
+            number = np.full(len(nodes.fixed), -1)
+            number[nodes.nodes[fixed]] = first + np.arange(len(fixed))
             ends = np.flatnonzero((number[nodes.nodes] >= 0) & ~((k == 2) & nodes.hinged))
             rows, columns, first = ([*rows, 3 * ends + k],
-                                    [*columns, number[nodes.nodes[ends]]], first + len(held))
+                                    [*columns, number[nodes.nodes[ends]]], first + len(fixed))
         #: leading ends of those whose rotation is prescribed
-        self._held = nodes.leader[ends]
+        self._prescribed = nodes.leader[ends]
         self._at = np.concatenate(rows), np.concatenate(columns)
         self._shape = 3 * len(nodes.nodes), first
 
@@ -354,7 +354,7 @@ class _Moves:
         values = np.ones(len(self._at[0]))
         values[:self._following] = -1.0
         values[self._following - len(scales):self._following] /= scales
-        values[len(values) - len(self._held):] /= np.abs(turns[self._held])
+        values[len(values) - len(self._prescribed):] /= np.abs(turns[self._prescribed])
         return sparse.csr_array((values, self._at), self._shape)
 
 

@@ -15,7 +15,7 @@ from ..actions.joints.base import Joint
 from ..actions.joints.director import UnitDirector
 from ..actions.joints.nodes import Nodes
 from ..actions.joints.part import Part
-from ..actions.joints.settlements import HELD
+from ..actions.joints.settlements import COMPONENTS
 from ..beam.beam import Beam
 from ..beam.rigid import RigidBody
 from ..core.errors import InputError, ModelWarning, SupportError, shown
@@ -424,13 +424,13 @@ class Constraints:
 
     def require_motion(self) -> None:
         """Raise InputError if a settlement is proportional to the load factor of statics."""
-        if self.frame is not None and np.any(self.frame.settled.numbers):
-            node, k = np.argwhere(self.frame.settled.numbers)[0]
-            value = self.frame.settled.numbers[node, k]
+        if self.frame is not None and np.any(self.frame.settlements.numbers):
+            node, k = np.argwhere(self.frame.settlements.numbers)[0]
+            value, name = self.frame.settlements.numbers[node, k], COMPONENTS[k]
             raise InputError(
-                f"node {node} is displaced by {HELD[k]}={value:g}, in proportion to the load of "
+                f"node {node} is displaced by {name}={value:g}, in proportion to the load of "
                 "a static solution. In a motion it has to be a function of time, such as "
-                f"frame.settle({node}, {HELD[k]}=lambda t: {value:g} * min(t, 1.0)), or lambda t: "
+                f"frame.settle({node}, {name}=lambda t: {value:g} * min(t, 1.0)), or lambda t: "
                 f"{value:g} if the motion starts from the displaced static state")
 
     def _dependent(self):

@@ -80,7 +80,7 @@ def _motions_of_frame(c, joints):
         motions[:, 2] += shift[0] * motions[:, 1] - shift[1] * motions[:, 0]
         values.append(motions / (1.0, 1.0, c.size))
     motions, number = _sparse(np.concatenate(values), of_part), int(parts.max()) + 1
-    held = sparse.vstack([frame.held_motions(parts, origin, c.size, number),
+    held = sparse.vstack([frame.fixed_motions(parts, origin, c.size, number),
                           joints[len(frame.equations):] @ motions])
     return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
 
@@ -95,7 +95,7 @@ def _sparse(values, of_body):
 def advice(constraints: Any) -> str:
     """A support to add, in words."""
     if constraints.frame is not None:
-        points = constraints.frame.net.points
+        points = constraints.frame.graph.points
         x = "({:.6g}, {:.6g})".format(*points[:, np.lexsort(points)[0]])
         return (f"frame.clamp({x}), the name or number of a node in place of its point, or as "
                 f"a roller frame.hold({x}, 'y')")

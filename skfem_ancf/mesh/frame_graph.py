@@ -56,8 +56,8 @@ class FrameGraph:
         Shapes (2, n) and (2, m). Merged points have the same position; lines refer to the first.
     given
         Lines as given, shape (2, m).
-    kept
-        Numbers of the lines that join different nodes, shape (k,).
+    distinct
+        Numbers of the lines between distinct nodes, shape (k,).
     same
         Node of each point, the first of the merged points, shape (n,).
     """
@@ -89,7 +89,7 @@ class FrameGraph:
                                  "beam of its own, so a line is in one at most; of the sets of a "
                                  "mesh groups= names those that are beams")
             taken[some] = 1
-            if not np.any(np.isin(some, self.kept)):
+            if not np.any(np.isin(some, self.distinct)):
                 raise MeshError(f"all lines of the group {name!r} are shorter than tol = "
                                 f"{self.tol:.3g}, within which points are one node")
 
@@ -110,10 +110,10 @@ class FrameGraph:
 
     def _require_lines(self):
         """Check for duplicate lines."""
-        key = np.sort(self.lines[:, self.kept], axis=0)
+        key = np.sort(self.lines[:, self.distinct], axis=0)
         _, first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)
         first = first[np.ravel(which)]
-        for i, j in zip(self.kept[first], self.kept):
+        for i, j in zip(self.distinct[first], self.distinct):
             if i != j and not {int(i), int(j)} & set(self.curves):
                 raise MeshError(f"lines {i} and {j} are the same: both join the points "
                                 f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
@@ -160,9 +160,9 @@ class FrameGraph:
         _, first = np.unique(label, return_index=True)
         self.same = first[label]
         self.points, self.lines = places[:, self.same], self.same[self.given]
-        self.kept = np.flatnonzero(self.lines[0] != self.lines[1])
+        self.distinct = np.flatnonzero(self.lines[0] != self.lines[1])
         self._curves_to_nodes(places)
-        if not len(self.kept):
+        if not len(self.distinct):
             raise MeshError(f"all lines are shorter than tol = {self.tol:.3g}, within which points "
                             "are one node")
         if tol is None:
@@ -182,7 +182,7 @@ class FrameGraph:
     def _curves_to_nodes(self, places):
         """Move the ends of curves to merged nodes."""
         for k, curve in self.curves.items():
-            if k not in self.kept:
+            if k not in self.distinct:
                 raise MeshError(f"the ends of line {k}, which has a curve, are not farther apart "
                                 f"than tol = {self.tol:.3g}, within which points are one node: "
                                 "give a smaller tol=")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..actions.axial import LineLoad
 from ..actions.joints.nodes import Nodes, chain_ends
-from ..actions.joints.settlements import HELD
+from ..actions.joints.settlements import COMPONENTS
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
 from ..actions.symbols import Symbol, at_node, force_symbol, symbols
 from ..beam.beam import Beam
@@ -101,7 +101,7 @@ class Frame(Scene):
 
     Parameters
     ----------
-    net
+    graph
         The graph, a :class:`~skfem_ancf.mesh.frame_graph.FrameGraph`.
     beams
         A Beam with a chain for each line of a group, for all groups, and one for the other lines.
@@ -121,12 +121,13 @@ class Frame(Scene):
     (True, 0.00124)
     """
 
-    def __init__(self, net: FrameGraph, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
+    def __init__(self, graph: FrameGraph, beams: Sequence[Beam], lines: Array,
+                 hinged: Array) -> None:
         super().__init__(*beams)
-        self.net, self._lines, self._hinged = net, lines, hinged
-        ends = net.lines[:, lines].T.ravel()
+        self.graph, self._lines, self._hinged = graph, lines, hinged
+        ends = graph.lines[:, lines].T.ravel()
         self._take(Nodes(ends, hinged[:, lines].T.ravel(),
-                         np.zeros((net.points.shape[1], 3), dtype=bool), net, lines))
+                         np.zeros((graph.points.shape[1], 3), dtype=bool), graph, lines))
 
     def _take(self, nodes):
         """Join the lines at other nodes."""
@@ -256,18 +257,18 @@ class Frame(Scene):
                          beam)
 
     @classmethod
-    def _made(cls, net, hinges, elements, sections, options):
+    def _made(cls, graph, hinges, elements, sections, options):
         for name, value in {**options, "hinges": hinges}.items():
             require_unmasked(name, value)
-        m = net.lines.shape[1]
+        m = graph.lines.shape[1]
         elements = _elements(elements, m)
         sections = mapping_of("sections", sections)
-        require_names("group of lines in sections", list(sections), [*net.beams, REST])
+        require_names("group of lines in sections", list(sections), [*graph.beams, REST])
         for name, given in sections.items():
             require_options(f"the section of {name!r}", mapping_of(f"sections[{name!r}]", given),
                             BEAM)
-        groups = {name: net.groups[name] for name in net.beams}
-        rest = np.setdiff1d(net.kept, np.concatenate([*groups.values(), [-1]]))
+        groups = {name: graph.groups[name] for name in graph.beams}
+        rest = np.setdiff1d(graph.distinct, np.concatenate([*groups.values(), [-1]]))
         if len(rest):
             if REST in groups:
                 raise InputError(f"lines {rest[:5].tolist()} are in no group and would be the beam "
@@ -280,23 +281,24 @@ class Frame(Scene):
                 raise InputError("the lines need a height of their section: give height=, or one "
                                  f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
             numbers = lines if "height" in sections.get(name, {}) else np.arange(m)
-            height, lines = _heights(given.pop("height"), numbers), np.intersect1d(lines, net.kept)
+            height = _heights(given.pop("height"), numbers)
+            lines = np.intersect1d(lines, graph.distinct)
             groups[name] = lines
             if isinstance(height, list):
                 height = [height[k] for k in np.searchsorted(numbers, lines)]
-            mesh = net.mesh(lines, elements, height)
+            mesh = graph.mesh(lines, elements, height)
             beams.append(Beam(mesh, name=name, **given))
-        net.curves = {}  # the meshes have them
-        return cls(net, beams, np.concatenate(list(groups.values())), _hinged(net, hinges))
+        graph.curves = {}  # the meshes have them
+        return cls(graph, beams, np.concatenate(list(groups.values())), _hinged(graph, hinges))
 
     def __repr__(self):
-        n, m = len(np.unique(self.net.same)), len(self._lines)
+        n, m = len(np.unique(self.graph.same)), len(self._lines)
         return f"<Frame of {m} line(s) between {n} nodes, {len(self.loads)} load(s)>"
 
     @property
     def points(self) -> Array:
         """Positions of the nodes, shape (2, n)."""
-        return self.net.points
+        return self.graph.points
 
     def nodes(self, place: Any) -> Array:
         """Numbers of the nodes at a place, shape (k,).
@@ -308,7 +310,7 @@ class Frame(Scene):
             tuple, a function of points x (2, n) that returns n truth values, an array of numbers,
             an array of points (k, 2), or a list of these.
         """
-        return self.net.nodes_at(place)
+        return self.graph.nodes_at(place)
 
     # supports
 
@@ -320,17 +322,17 @@ class Frame(Scene):
         place, *what
             Nodes, see :meth:`nodes`, and some of "x", "y" and "angle".
         """
-        return self._hold(place, require_names("what is held", list(what), HELD))
+        return self._hold(place, require_names("fixed component", list(what), COMPONENTS))
 
-    def _hold(self, place, names, settled=None):
+    def _hold(self, place, names, settlements=None):
         """Fix nodes, with optional displacements."""
-        nodes, held, known = self.nodes(place), self._nodes.held.copy(), self._nodes
+        nodes, fixed, known = self.nodes(place), self._nodes.fixed.copy(), self._nodes
         for name in names:
-            held[nodes, HELD.index(name)] = True
+            fixed[nodes, COMPONENTS.index(name)] = True
         if "angle" in names:
             self._require_rigid(nodes, "it has no rotation to hold, pin it")
-        self._take(Nodes(known.nodes, known.hinged, held, self.net, self._lines,
-                         known.settled if settled is None else settled))
+        self._take(Nodes(known.nodes, known.hinged, fixed, self.graph, self._lines,
+                         known.settlements if settlements is None else settlements))
         return self
 
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
@@ -358,16 +360,16 @@ class Frame(Scene):
         >>> round(float(state.reactions(0).force[1]), 6)
         0.0012
         """
-        given = {name: value for name, value in zip(HELD, (x, y, angle)) if value is not None}
+        given = {name: value for name, value in zip(COMPONENTS, (x, y, angle)) if value is not None}
         if not given:
             raise InputError("settle() needs a displacement: give x=, y= or angle=, a number or a "
                              "function of time")
-        settled, nodes = self._nodes.settled, self.nodes(place)
+        settlements, nodes = self._nodes.settlements, self.nodes(place)
         for name, value in given.items():
-            settled = settled.given(nodes, HELD.index(name), require_function(
+            settlements = settlements.given(nodes, COMPONENTS.index(name), require_function(
                 name, value, "of time that returns a number") if callable(value) else
                 require_finite_scalar(name, value))
-        return self._hold(place, list(given), settled)
+        return self._hold(place, list(given), settlements)
 
     def _require_rigid(self, nodes, advice):
         loose = np.setdiff1d(nodes, self._nodes.nodes[~self._nodes.hinged])
@@ -382,7 +384,7 @@ class Frame(Scene):
         """
         _no_beam(beam)
         require_option("thickness at the nodes of a frame", thickness, ("free",))
-        return self.hold(boundary, *HELD)
+        return self.hold(boundary, *COMPONENTS)
 
     def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
         """Fix the positions of nodes, see :meth:`nodes`; ``beam`` is None for a frame."""
@@ -438,10 +440,10 @@ class Frame(Scene):
         ``beam`` may also be the name of a set of lines of the mesh.
         """
         known = [b.name for b in self.beams]
-        if not isinstance(beam, str) or beam in known or beam not in self.net.groups:
+        if not isinstance(beam, str) or beam in known or beam not in self.graph.groups:
             super().line_load(force, beam, amplitude)
             return self
-        loads, chains = [], np.isin(self._lines, self.net.groups[beam])
+        loads, chains = [], np.isin(self._lines, self.graph.groups[beam])
         for k, b in enumerate(self.beams):
             some, chains = np.split(chains, [len(chain_ends(b))])
             if np.any(some):
@@ -477,15 +479,15 @@ class Frame(Scene):
         else:
             turns, start = joint.turns(u)[rigid], joint.turns(state.base.u)[rigid]
             out[joint.nodes[rigid]] = np.angle(start) + (turns / start).imag
-        return out[self.net.same]
+        return out[self.graph.same]
 
     def _bare(self, beams):
         for old, new in zip(self.beams, beams):
             a, b = (beam.mesh.p[:, chain_ends(beam)] for beam in (old, new))
-            if a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.net.size:
+            if a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.graph.size:
                 raise InputError(f"{new!r} must have a chain for each line of {old!r}, from the "
                                  "same point to the same point: nodes between them may be others")
-        frame = type(self)(self.net, beams, self._lines, self._hinged)
+        frame = type(self)(self.graph, beams, self._lines, self._hinged)
         frame._take(self._entries[0].given)
         return frame
 
@@ -521,9 +523,9 @@ def _heights(height, lines):
             for k, one in zip(lines, height)]
 
 
-def _hinged(net, hinges):
+def _hinged(graph, hinges):
     """Whether the start and the end of each line are hinged, (2, m)."""
-    lines = net.given  # before ends became one node: what is hinged at one of them stays so
+    lines = graph.given  # before ends became one node: what is hinged at one of them stays so
     out = np.zeros(lines.shape, dtype=bool)
     if isinstance(hinges, str) and hinges == "all":
         return ~out
@@ -535,15 +537,15 @@ def _hinged(net, hinges):
                          f"{shown(hinges)}")
     for one in hinges:
         if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
-            line, node = (int(net.lines_of(one[0])[0]), int(net.points_at(one[1])[0]))
+            line, node = (int(graph.lines_of(one[0])[0]), int(graph.points_at(one[1])[0]))
             at = lines[:, line] == node
             if not np.any(at):
                 raise InputError(f"line {line} does not end at node {node}: it joins "
                                  f"{lines[:, line].tolist()}")
-            if line not in net.kept:
+            if line not in graph.distinct:
                 raise InputError(f"line {line} cannot be hinged: its ends are one node, as they "
-                                 f"are not farther apart than tol = {net.tol:.3g}")
+                                 f"are not farther apart than tol = {graph.tol:.3g}")
             out[at, line] = True
         else:
-            out |= np.isin(lines, net.points_at(one))
+            out |= np.isin(lines, graph.points_at(one))
     return out

@@ -121,9 +121,10 @@ def _forces(s, dynamic, linear):
                 "constant")
     yield _item("varying loads", rest, f"{_kinds(rest)}: they depend on displacement or time",
                 "no follower load, no amplitude")
-    held = s.constraints
-    yield _item("multipliers", held.m, f"{held.m} equations of {_kinds(held.joints)}",
-                "the joints only fix degrees of freedom" if held.all_joints else "no joints")
+    constraints = s.constraints
+    yield _item("multipliers", constraints.m,
+                f"{constraints.m} equations of {_kinds(constraints.joints)}",
+                "the joints only fix degrees of freedom" if constraints.all_joints else "no joints")
 
 
 def _solution(s, dynamic, linear):

@@ -15,7 +15,7 @@ from ...beam.layout import Layout
 from ...core.types import Array
 from ...mesh.frame_graph import FrameGraph
 from .base import Joint
-from .settlements import HELD, Settlements
+from .settlements import COMPONENTS, Settlements
 
 FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
 
@@ -34,18 +34,18 @@ class Nodes(Joint):
     ----------
     nodes, hinged
         The node of each end, and whether it is hinged, shape (ends,).
-    held
+    fixed
         Whether position x, y and rotation of each node are fixed, (number, 3).
-    net, lines
+    graph, lines
         The frame graph, and the number of the line of each chain, (ends / 2,).
-    settled
+    settlements
         Prescribed displacements of supports.
 
     Attributes
     ----------
     leader, followers, turned
         The leading end at the node of each end; following ends, and those with equal rotation.
-    held_x, held_y, held_angle
+    fixed_x, fixed_y, fixed_angle
         Leading ends with supports.
     positions, directions, weights
         DOFs of each end's position, (ends, 2), and of its section direction, (2, ends, n), with
@@ -54,13 +54,13 @@ class Nodes(Joint):
 
     constant = False
 
-    def __init__(self, nodes: Array, hinged: Array, held: Array, net: FrameGraph, lines: Array,
-                 settled: Settlements | None = None) -> None:
-        self.nodes, self.hinged, self.held = nodes, hinged, held
-        self.settled = Settlements(np.zeros(held.shape)) if settled is None else settled
+    def __init__(self, nodes: Array, hinged: Array, fixed: Array, graph: FrameGraph, lines: Array,
+                 settlements: Settlements | None = None) -> None:
+        self.nodes, self.hinged, self.fixed = nodes, hinged, fixed
+        self.settlements = settlements or Settlements(np.zeros(fixed.shape))
         #: functions of time of these
-        self.functions = self.settled.functions
-        self.net, self.lines = net, lines
+        self.functions = self.settlements.functions
+        self.graph, self.lines = graph, lines
         # rigid ends come before hinged ones: the first of each node is its leader
         order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
         _, first = np.unique(nodes[order], return_index=True)
@@ -69,27 +69,27 @@ class Nodes(Joint):
         follows = self.leader != np.arange(len(nodes))
         self.followers = np.flatnonzero(follows)
         self.turned = np.flatnonzero(follows & ~hinged)
-        self.held_x, self.held_y, self.held_angle = (
-            self.leaders[held[nodes[self.leaders], k]] for k in range(3))
-        self.held_angle = self.held_angle[~hinged[self.held_angle]]
+        self.fixed_x, self.fixed_y, self.fixed_angle = (
+            self.leaders[fixed[nodes[self.leaders], k]] for k in range(3))
+        self.fixed_angle = self.fixed_angle[~hinged[self.fixed_angle]]
         n, k = len(self.followers), len(self.turned)
         self.equations = ((FORCE_X,) * n + (FORCE_Y,) * n + (MOMENT,) * k
-                          + (FORCE_X,) * len(self.held_x) + (FORCE_Y,) * len(self.held_y)
-                          + (MOMENT,) * len(self.held_angle))
+                          + (FORCE_X,) * len(self.fixed_x) + (FORCE_Y,) * len(self.fixed_y)
+                          + (MOMENT,) * len(self.fixed_angle))
 
     @property
     def moving(self) -> bool:  # type: ignore[override]
         """True if a node has a prescribed displacement."""
-        return any(self.settled.moves(k) for k in range(len(HELD)))
+        return any(self.settlements.moves(k) for k in range(len(COMPONENTS)))
 
     @property
     def turning(self) -> bool:
-        return self.settled.moves(HELD.index("angle"))
+        return self.settlements.moves(COMPONENTS.index("angle"))
 
     def _shifts(self, times: Array) -> list[Array]:
         """Prescribed displacements along x and y, and rotations, shapes (n, k) each."""
-        ends = self.held_x, self.held_y, self.held_angle
-        return [self.settled.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
+        ends = self.fixed_x, self.fixed_y, self.fixed_angle
+        return [self.settlements.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
 
     def leading(self, nodes: Array) -> Array:
         """Leading ends of nodes, shape (k,)."""
@@ -123,9 +123,9 @@ class Nodes(Joint):
         gap = r[self.leader[self.followers]] - r[self.followers]
         angle = np.conj(g[self.turned]) * g[self.leader[self.turned]]
         x, y, turn = (shift[0] for shift in self._shifts(np.array([t])))
-        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.held_x, 0] - x,
-                               r[self.held_y, 1] - y,
-                               (np.exp(-1j * turn) * g[self.held_angle]).imag])
+        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.fixed_x, 0] - x,
+                               r[self.fixed_y, 1] - y,
+                               (np.exp(-1j * turn) * g[self.fixed_angle]).imag])
 
     def offset(self, times: Array, N: int) -> Array:
         moved = self.moved(times, N)
@@ -143,12 +143,12 @@ class Nodes(Joint):
         s, n, k = self.followers, len(self.followers), len(self.turned)
         m, row = self.leader[s], np.arange(len(self.followers))
         x, y = self.positions.T
-        a = 2 * n + k + np.arange(len(self.held_x))
-        b = a.size + 2 * n + k + np.arange(len(self.held_y))
+        a = 2 * n + k + np.arange(len(self.fixed_x))
+        b = a.size + 2 * n + k + np.arange(len(self.fixed_y))
         angles = [(2 * n, self.leader[self.turned]), (2 * n, self.turned),
-                  (len(self.equations) - len(self.held_angle), self.held_angle)]
+                  (len(self.equations) - len(self.fixed_angle), self.fixed_angle)]
         rows, columns = [row, row, n + row, n + row, a, b], [
-            x[m], x[s], y[m], y[s], x[self.held_x], y[self.held_y]]
+            x[m], x[s], y[m], y[s], x[self.fixed_x], y[self.fixed_y]]
         for first, ends in angles:
             at = self.directions[:, ends].transpose(1, 0, 2)
             rows.append(np.broadcast_to(first + np.arange(len(ends))[:, None, None], at.shape))
@@ -174,7 +174,7 @@ class Nodes(Joint):
         m = self.leader[s]
         return np.concatenate([
             self._pattern[2], self._angles(np.conj(g[s]), m), self._angles(-np.conj(g[m]), s),
-            self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.held_angle)])
+            self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.fixed_angle)])
 
     @cached_property
     def _places(self) -> Any:
@@ -193,7 +193,7 @@ class Nodes(Joint):
         out = np.tile(values, (len(times) if self.turning else 1, 1))
         if self.turning:
             for row, turn in zip(out, self._shifts(times)[2]):
-                last = self._angles(np.exp(-1j * turn), self.held_angle)
+                last = self._angles(np.exp(-1j * turn), self.fixed_angle)
                 row[len(row) - len(last):] = last
         return rows, columns, np.broadcast_to(out, (len(times), len(values)))
 
@@ -223,21 +223,21 @@ class Nodes(Joint):
     def split(self, multipliers: Array) -> tuple[Array, ...]:
         """Forces (followers, 2) and moments (turned,) of followers, and support reactions."""
         n = len(self.followers)
-        sizes = [n, n, len(self.turned), len(self.held_x), len(self.held_y)]
+        sizes = [n, n, len(self.turned), len(self.fixed_x), len(self.fixed_y)]
         x, y, *others = np.split(multipliers, np.cumsum(sizes))
         return np.stack([x, y], axis=1), *others
 
     def reaction(self, place: Any, u: Array, multipliers: Array) -> tuple[Array, float, dict]:
         """Reaction of some nodes: force, moment about the first of them, and both by name."""
-        out, nodes = np.zeros(self.held.shape), self.net.nodes_at(place)
-        ends = self.held_x, self.held_y, self.held_angle
+        out, nodes = np.zeros(self.fixed.shape), self.graph.nodes_at(place)
+        ends = self.fixed_x, self.fixed_y, self.fixed_angle
         for k, (at, part) in enumerate(zip(ends, self.split(multipliers)[2:])):
             scale = np.abs(self.turns(u)[at]) if k == 2 else 1.0
             out[self.nodes[at], k] = -part * scale
         x, y, moment = out[nodes].T
-        r = self.net.points[:, nodes] + u[self.positions[self.leading(nodes)]].T
-        (a, b), held = r - r[:, :1], np.any(self.held[nodes], axis=0)
-        total = {name: float(np.sum(out[nodes, k])) for k, name in enumerate(HELD) if held[k]}
+        r = self.graph.points[:, nodes] + u[self.positions[self.leading(nodes)]].T
+        (a, b), fixed = r - r[:, :1], np.flatnonzero(np.any(self.fixed[nodes], axis=0))
+        total = {COMPONENTS[k]: float(np.sum(out[nodes, k])) for k in fixed}
         return np.array([x.sum(), y.sum()]), float(np.sum(moment + a * y - b * x)), total
 
     def parts(self) -> Array:
@@ -247,19 +247,19 @@ class Nodes(Joint):
                                   (self.turned // 2, self.leader[self.turned] // 2)), (n, n))
         return np.asarray(connected_components(links, directed=False)[1])
 
-    def held_motions(self, parts: Array, origin: Array, size: float,
+    def fixed_motions(self, parts: Array, origin: Array, size: float,
                      number: int) -> sparse.csr_array:
         """Constraints of nodes and supports on the rigid motions of groups, one row each."""
         part = np.repeat(parts, 2)
-        x, y = (self.net.points[:, self.nodes] - origin[:, None]) / size
+        x, y = (self.graph.points[:, self.nodes] - origin[:, None]) / size
         one = np.ones(len(x))
         motion = np.array([[one, 0 * one, -y], [0 * one, one, x], [0 * one, 0 * one, one]])
         s = self.followers[part[self.followers] != part[self.leader[self.followers]]]
         rows, at, row = [np.zeros((0, 3))], [s[:0]], [s[:0]]
         count = 0
         for k, ends, others in ((0, self.leader[s], s), (1, self.leader[s], s),
-                                (0, self.held_x, s[:0]), (1, self.held_y, s[:0]),
-                                (2, self.held_angle, s[:0])):
+                                (0, self.fixed_x, s[:0]), (1, self.fixed_y, s[:0]),
+                                (2, self.fixed_angle, s[:0])):
             rows += [motion[k, :, ends], -motion[k, :, others]]
             at += [part[ends], part[others]]
             row += [count + np.arange(len(ends)), count + np.arange(len(others))]

@@ -31,12 +31,12 @@ class PlaneSection(Joint):
         beam = layout.beam(self.beam)
         node = node_of(beam.mesh, self.at)
         t = beam.mesh.p_X[:, node]
-        direction, held = plane(beam, t)
+        direction, fixed = plane(beam, t)
         self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
         first = layout.offset(beam) + node * beam.nd
-        self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
+        self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in fixed)
         self.slopes = [Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0)
-                       for k in held]
+                       for k in fixed]
         self.found = gradients(*([(slope, self.direction)] for slope in self.slopes))
 
     def value(self, u: Array, t: float) -> Array:

@@ -11,21 +11,21 @@ from ...core.sampling import sample
 from ...core.types import Array
 
 #: Components of a node's motion that can be fixed.
-HELD = "x", "y", "angle"
+COMPONENTS = "x", "y", "angle"
 
 
 class Settlements:
     """Prescribed displacements of supports along x and y, and rotations in radians.
 
     ``numbers``, (n, 3), are proportional to the load factor of a static solution. ``functions`` of
-    time, in statics of the load factor, replace those of the node and the component of :data:`HELD`
-    in ``at``.
+    time, in statics of the load factor, replace those of the node and the number in
+    :data:`COMPONENTS` in ``at``.
     """
 
     def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),
                  at: Sequence[tuple[int, int]] = ()) -> None:
         self.numbers, self.functions, self.at = numbers, tuple(functions), tuple(at)
-        self._sampled = [partial(sample, f, name=HELD[k], shape=())
+        self._sampled = [partial(sample, f, name=COMPONENTS[k], shape=())
                          for f, (_, k) in zip(self.functions, self.at)]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
