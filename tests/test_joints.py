@@ -361,7 +361,7 @@ def test_free_mechanism_is_named():
     (lambda s: s.joint("hinge", beams=("arm", "forearm"), at=(5, 5)), InputError, "5"),
     (lambda s: s.joint("hinge", beams=("arm", "forearm"), at=None), InputError, "at="),
     (lambda s: s.joint("weld", beams=("arm", "forearm"), at=("right", "top")), InputError, "top"),
-    (lambda s: s.joint("line", at=(1, 0), direction=(1, 0)), InputError, "choose one with beam="),
+    (lambda s: s.joint("line", at=(1, 0), direction=(1, 0)), InputError, "choose one"),
     (lambda s: s.joint("line", beam="arm", at=(1, 0), direction=(0, 0)), InputError, "direction"),
     (lambda s: s.joint("circle", beam="arm", at=(1, 0), center=(1, 0)), InputError, "positive"),
     (lambda s: s.joint("circle", beam="arm", at=(1, 0), center=(0, 0), radius=-1.0), InputError,

@@ -198,8 +198,8 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
     found = nearest_of(layout, place, found)
     if len(found) > 1:
         names = [layout.members[k].name or k for k in found]
-        raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
-                         f"({names[0]!r}, {shown(place)})")
+        raise InputError(f"the point {shown(place)} is in several beams, {names}: choose one, "
+                         f"as ({names[0]!r}, {shown(place)})")
     if not found and where_none_is is None:
         raise InputError(f"no beam and no rigid body is at the point {shown(place)}: for one of "
                          f"the ground write ('ground', {shown(place)}), for one outside of the "
