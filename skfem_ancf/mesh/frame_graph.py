@@ -123,10 +123,10 @@ class FrameGraph:
     def _warn_of_passing(self):
         """Warn of nodes on a straight line between its ends: lines are joined at their ends only.
         """
-        some = np.setdiff1d(self.kept, list(self.curves))
+        some = np.setdiff1d(self.distinct, list(self.curves))
         a, b = (self.points[:, ends].T for ends in self.lines[:, some])
         half = 0.5 * np.hypot(*(b - a).T)
-        used = np.unique(self.lines[:, self.kept])
+        used = np.unique(self.lines[:, self.distinct])
         found = scipy.spatial.cKDTree(self.points[:, used].T).query_ball_point(
             0.5 * (a + b), half * (1.0 - 1e-6))
         k = np.repeat(np.arange(len(some)), [len(one) for one in found])
