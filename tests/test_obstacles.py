@@ -20,9 +20,9 @@ def beam(element=None, n=8, height=0.01, nu=0.3, E=2e8, length=1.0):
 
 def test_what_an_obstacle_cannot_be_told():
     body = RigidBody(mass=1.0, inertia=1.0, position=(0, 2), name="ball")
-    with pytest.raises(InputError, match="asked of beams, got <RigidBody ball"):
+    with pytest.raises(InputError, match="beam is needed here, got <RigidBody ball"):
         Scene(beam(), body).obstacle(Line((0, -1)), beam=body)
-    with pytest.raises(InputError, match="asked of beams, got <RigidBody ball"):
+    with pytest.raises(InputError, match="beam is needed here, got <RigidBody ball"):
         Scene(beam(), body).drag(1.0, 1.0, beam=body)
     with pytest.raises(TypeError, match="unexpected keyword argument 'body'"):
         Scene(beam(), body).obstacle(Line((0, -1)), body=body)
