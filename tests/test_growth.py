@@ -113,5 +113,5 @@ def test_rubber_expands_with_the_temperature(plane):
 
 def test_two_do_not_add_up_and_are_refused():
     scene = Scene(bar(RUBBER, ELEMENTS[0])).clamp("left").eigenstrain(xx=0.1)
-    with pytest.raises(InputError, match="do not add up"):
+    with pytest.raises(InputError, match="cannot be superposed"):
         scene.eigenstrain(xx=0.1)

@@ -194,7 +194,7 @@ def test_of_a_state_that_turns_modes_say_that_they_know_its_stiffness_alone(plac
         return scene, scene.integrate(0.01, 1e-3).state(-1)
 
     scene, state = instant(Scene(beam).pin("left"), 20.0)
-    with pytest.warns(ModelWarning, match="turns by 20 rad/s.*centrifugal") as found:
+    with pytest.warns(ModelWarning, match="rotates at 20 rad/s.*centrifugal") as found:
         scene.modes(2, state)
     assert found[0].filename == __file__
     for scene, state in (instant(Scene(beam), 1.0, 1e3), instant(Scene(beam).clamp("left"), 1.0)):
