@@ -6,7 +6,8 @@ import pickle
 import numpy as np
 import pytest
 
-from skfem_ancf import Beam, ElementBeamCable, Frame, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf import (Beam, ElementBeamCable, Frame, InputError, MeshBeam, RigidBody, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.core.near_misses import NearMisses
 
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
@@ -73,3 +74,16 @@ def test_a_property_that_fails_says_so_itself():
 
     with pytest.raises(AttributeError, match="numpy"):
         Thing().broken
+
+
+def test_constructors_and_methods_that_add_items_name_their_arguments(things):
+    for call, message in (
+            (lambda: StVenantKirchhoff(E=1.0, nu=0.3, densty=1.0), "did you mean 'density'"),
+            (lambda: RigidBody(1.0, 1.0, center=(0, 0)), "RigidBody has no option 'center'; known: "
+             "'mass', 'inertia', 'position', "),
+            (lambda: things["Scene"].point_force((0, 1), position=(1, 0)), "known: 'force', 'at'"),
+            (lambda: Beam(things["MeshBeam"], ElementBeamCable(3), STEEL, with_=1), "'width'")):
+        with pytest.raises(TypeError, match=message):
+            call()
+    with pytest.raises(InputError, match=r"'y'; known: .* did you mean 'r\^2'\?"):
+        things["Scene"].fix("right", "y")

@@ -188,9 +188,15 @@ def shown(value: object) -> str:
     return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
 
 
+#: What supports call the components of the position.
+AXES = {"x": "r^1", "y": "r^2"}
+
+
 def _suggested(name, known):
     """The most similar known name as the end of a message, or ""."""
     names = {k.lower(): k for k in known if isinstance(k, str)}
+    if isinstance(name, str) and AXES.get(name) in names:
+        return f"; did you mean {AXES[name]!r}?"
     found = difflib.get_close_matches(name.lower() if isinstance(name, str) else "", names, 1, 0.5)
     return f"; did you mean {names[found[0]]!r}?" if found else ""
 

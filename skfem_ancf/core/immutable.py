@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .errors import ImmutableError, InputError, NameUnknown
+from .errors import CallError, ImmutableError, InputError, NameUnknown, require_options
 
 T = TypeVar("T")
 
@@ -27,7 +27,17 @@ class _Freezing(type):
     """Freezes an object after the constructor, also of a user's subclass."""
 
     def __call__(cls, *args, **kwargs):
-        made = super().__call__(*args, **kwargs)
+        try:
+            made = super().__call__(*args, **kwargs)
+        except TypeError:
+            arguments = cls.__signature__.parameters.values()
+            if any(a.kind == a.VAR_KEYWORD for a in arguments):
+                raise
+            try:
+                require_options(cls.__name__, kwargs, [a.name for a in arguments])
+            except CallError as better:  # Python's error does not name the arguments
+                raise better from None
+            raise
         made._freeze()
         return made
 
