@@ -259,7 +259,7 @@ def _axial(law, strain):
 class Recovery:
     """The recovered fields of one beam, a :class:`~.segments.Segment` between consecutive cuts.
 
-    ``why`` says why there are section forces but no fields, or "".
+    ``why`` is the reason for section forces without fields, or "".
     """
 
     def __init__(self, forces: SectionForces, u: Array) -> None:

@@ -87,10 +87,10 @@ class Resultants:
         return np.stack([np.cos(self.angle), np.sin(self.angle)], -2)
 
     def to_dataframe(self) -> Any:
-        """A ``pandas.DataFrame`` with a row for each section, in a motion for each instant too.
+        """A ``pandas.DataFrame`` with a row per section, in a motion per instant and section.
 
         Its columns are the attributes, with ``x``, ``y`` and ``force_x``, ``force_y`` for the
-        components of places and forces.
+        components of positions and forces.
 
         Raises
         ------
@@ -160,9 +160,9 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
         if not beam.has_sections:
             values.update(_strains_of_cable(beam, eigen, e, xi, values["N"], values["M"]))
     elif beam.has_sections:
-        values = _own(beam, u, eigen, e, xi)
+        values = _of_elements(beam, u, eigen, e, xi)
     else:
-        values = _own_of_cable(beam, u, eigen, e, xi)
+        values = _of_cable_elements(beam, u, eigen, e, xi)
     x = beam.mesh.mapping().F(_on_axis(xi), e)[..., 0]
     arc = ArcLength(beam) if recovery is None else recovery.arc
     return Resultants(arc.at(e, xi), x, recovered=recovery is not None, **{
@@ -221,7 +221,7 @@ def _axis(segment):
     return segment.spline(np.array([phi, segment.at_axis(stretch), shear, curvature]), -1)
 
 
-def _own(beam, u, eigen, e, xi):
+def _of_elements(beam, u, eigen, e, xi):
     """Integrate the stress of the elements across the section."""
     X, area = _across(beam, e, xi)
     S = on_grid(stress_at, beam, u, X, e) - sum(
@@ -246,7 +246,7 @@ def _across(beam, e, xi):
     return X, breadth * beam.mesh.mapping().height(X[0], e)[0]
 
 
-def _own_of_cable(beam, u, eigen, e, xi):
+def _of_cable_elements(beam, u, eigen, e, xi):
     """Resultants of a cable from EA and EI; the shear force is the slope of the moment."""
     N, M, strains = _forces_of_cable(beam, u, eigen, e, xi)
     near = np.clip([xi - NEAR, xi + NEAR], 0.0, 1.0)
