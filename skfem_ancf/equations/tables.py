@@ -79,12 +79,6 @@ class Tables:
         for load in loads:
             self._loads[_kind(load)].append(load)
 
-    @property
-    def asks(self) -> bool:
-        """True if kernels call user-defined items in Python."""
-        plain = self.plain
-        return bool(plain.loads.custom or plain.joints.custom or plain.forces.custom)
-
     @cached_property
     def parts(self) -> list[str]:
         """The parts of :data:`skfem_ancf.equations.loops.PARTS` that the scene uses."""
