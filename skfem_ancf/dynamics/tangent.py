@@ -4,7 +4,7 @@ import numpy as np
 
 from ..core.band import add_halves, add_multiple, clear, copy, factorize, fix
 from ..beam.strain_energy import add_unsymmetric, body_linearised, body_stress, body_tangent
-from ..actions.forces.kernels import (add_contact_tangent, add_rubbing_tangent, element_stiffness,
+from ..actions.forces.kernels import (add_contact_tangent, add_friction_tangent, element_stiffness,
                                       put_between)
 from ..core.callbacks import call_solver
 from ..core.source import indices, source
@@ -69,7 +69,7 @@ def _add_obstacles(e, matrices, rule, s, w):
         add_contact_tangent(e.forces, s.acting, 0.0, u, u, matrices.A)
     if matrices.dampers.elements > 0:
         to_damping_velocity(e.free, rule, s, w)
-        add_rubbing_tangent(e.forces, s.acting, s.damping_factor / s.stiffness_factor,
+        add_friction_tangent(e.forces, s.acting, s.damping_factor / s.stiffness_factor,
                             w.x.middle, w.x.damping_velocity, matrices.A)
 
 

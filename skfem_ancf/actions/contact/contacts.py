@@ -16,7 +16,7 @@ from ...core.types import Array
 from .active_set import project
 from .crossing import CrossingGuard, middle_of
 from .gap import places
-from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, of_contacts, push, resist, rub,
+from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, of_contacts, push, resist, add_friction,
                       states, way)
 from .poses import taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, LARGEST, NOW, POSE,
@@ -304,7 +304,7 @@ class Contacts:
             w, found = np.zeros((ROWS, at.size)), project(pair, NOW, u, at)
             states(pair, True, found, found, at, w)
             push(pair, at, w)
-            rub(pair, True, at, w)
+            add_friction(pair, True, at, w)
             force, pressure = -w[PUSH:PUSH + 2], w[PRESSURE] / group.areas
             if v is not None and group.numbers[DAMPING] > 0.0:
                 places(pair, v, 0.0, at, w[RATES:DEPTH])

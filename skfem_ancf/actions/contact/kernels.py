@@ -85,7 +85,7 @@ def _of_pair(pair, asked, u, v, out):
         if what == SETTLE:
             _settle(pair, same, at, w, out)
             return
-        rub(pair, same, at, w)
+        add_friction(pair, same, at, w)
     if what == FORCE or what == RESISTING:
         _add_force(pair, at, w, out)
     else:
@@ -187,7 +187,7 @@ def _tangential(pair):
 
 
 @source
-def rub(pair, same, at, w):
+def add_friction(pair, same, at, w):
     """Add Coulomb friction and its derivative."""
     friction, sticking = _tangential(pair)
     if friction == 0.0:

@@ -173,7 +173,7 @@ def add_contact_tangent(tables, t, span, u0, u1, A):
 
 
 @source
-def add_rubbing_tangent(tables, t, factor, u, v, A):
+def add_friction_tangent(tables, t, factor, u, v, A):
     """Add the derivative of friction and damping to a band; that by velocities times a factor."""
     add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
                 A.flat)
