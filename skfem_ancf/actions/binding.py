@@ -75,7 +75,6 @@ class _Force(ForceElement):
             try_force(self, layout.sizes[self._dofs].reshape(-1, 2))
 
     def _whole(self, x):
-        """A vector of all degrees of freedom, zero where the item does not act."""
         out = np.zeros(self._N, dtype=np.asarray(x).dtype)
         out[self._dofs] = np.ravel(x)
         return out

@@ -248,7 +248,6 @@ def _number_or_function(name, value, optional=True):
 
 
 def _evaluated(name, f, x, y):
-    """Evaluate a number or a function of material coordinates, arrays of one shape."""
     if not callable(f):
         return np.full(np.shape(x), 0.0 if f is None else f)
     return ask_array(f"{name}(x, y)", np.shape(x), f, x, y, number=True)

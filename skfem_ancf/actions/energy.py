@@ -162,7 +162,6 @@ class Energy(Density):
                    y[2:].reshape(2, 2, *y.shape[1:]), X, self._time)
 
     def _density(self, y, part):
-        """psi at the variables (6, ..., n, np)."""
         flat = y.reshape(6, -1, y.shape[-1])
         found = self._ask("psi", flat, part, flat.shape[1] // part.X.shape[1])
         return _shaped("psi", found, flat.shape[1:]).reshape(y.shape[1:])
@@ -353,7 +352,6 @@ def _parts_of(beam, over):
 
 
 def _points(beam, elements, X, weights, of):
-    """Points at reference coordinates X (2, np) of elements (n,)."""
     mapping = beam.mesh.mapping()
     return points_of(element_dofs(beam, elements), np.asarray(mapping.F(X, elements)), weights,
                      *beam.element.functions(mapping, X, elements), of)

@@ -137,7 +137,6 @@ class FormLoad(Density):
         return bound
 
     def _evaluated(self, y):
-        """The form for each of six test functions, (6, n, np), and its parameters."""
         w = self._fields(y)
         return np.array([self._values(self.form.form, v, w) for v in self._tests]), w
 
@@ -218,5 +217,4 @@ class FormLoad(Density):
 
 
 def _field(y):
-    """A field with its gradient from six numbers at each point."""
     return DiscreteField(value=y[:2], grad=y[2:].reshape(2, 2, *y.shape[1:]))

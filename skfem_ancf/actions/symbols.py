@@ -159,7 +159,6 @@ def _tangent(beam: Any, e: int, xi: float) -> Array:
 
 
 def _along(elements: Array, runs: int) -> list[tuple[int, float]]:
-    """Elements and xi of arrows along one of several runs of elements."""
     s = np.linspace(0, len(elements), int(np.clip(MOST // runs, 2, ARROWS)))
     k = np.minimum(s.astype(int), len(elements) - 1)
     return list(zip(elements[k].tolist(), (s - k).tolist()))
@@ -189,7 +188,6 @@ def _faces(layout: Layout, beam: Any, boundary: Any) -> Iterable[tuple[Any, Any,
 
 
 def _values(function, at):
-    """A constant (2,) or a function of points, as (n, 2)."""
     x = np.array([place.start for place in at]).T
     return np.broadcast_to(function(x) if callable(function) else function[:, None], x.shape).T
 
@@ -280,7 +278,6 @@ def _(strain, layout):
 
 
 def _middle(layout, beam):
-    """The middle of the axis of a beam, in that of several chains of elements."""
     beam = layout.beam(beam)
     e = np.flatnonzero(beam.mesh.chains == beam.mesh.chains[beam.mesh.nelements // 2])
     return _inside(layout, beam, *_along(e, 1)[ARROWS // 2])

@@ -161,7 +161,6 @@ def _dead_force(loads, factors, out):
 
 @source
 def _of_moments(loads, factors):
-    """A view of the factors of moments."""
     n = loads.vectors.shape[0]
     return factors[n:n + loads.moments.M.size]
 

@@ -78,6 +78,5 @@ class ElementBeamANCF(ElementBeam):
         super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
-        """Names and functionals of the section's degrees of freedom at a node."""
         return ([f"r_Y{k}" for k in range(len(self.section_points))],
                 [(float(y), 0, 1) for y in self.section_points])

@@ -314,7 +314,6 @@ class ElementBeam(Immutable, Element):
                   for j in range(N) for w in missed(k, n)))
 
     def _of_both(self, rows: Sequence[int], weights: Array) -> Array:
-        """Weights of some degrees of freedom of both nodes; zero for the others."""
         full = np.zeros((2, self.nodal_dofs))
         full[:, rows] = weights.reshape(2, -1)
         return full.ravel()

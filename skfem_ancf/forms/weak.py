@@ -228,7 +228,6 @@ class ModuliForm(BeamBilinearForm):
 
 
 def _gradient_table(basis):
-    """Gradients of all local functions, shape (ne, nq, np, 2, 2)."""
     return np.ascontiguousarray(np.moveaxis(np.array([b[0].grad for b in basis.basis]),
                                             (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
 
@@ -326,7 +325,6 @@ def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
 
 
 def _widths(width):
-    """Check a positive width, or widths at the points of a basis."""
     return require_finite("width", width, (None, None)) if isinstance(
         width, np.ndarray) else require_positive("width", width)
 

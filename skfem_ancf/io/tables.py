@@ -108,13 +108,11 @@ def _of_body(state, wanted, subdivide, recover, lenient):
 
 
 def _rows(field, values):
-    """Values with the points first, (n,) or (n, components)."""
     return np.reshape(values, -1) if field.components == 1 else (
         np.reshape(values, (field.components, -1)).T)
 
 
 def _about(field, units):
-    """Attributes of an array: its description, and its unit if known."""
     name = re.sub(r"\s*\$[^$]*\$", "", field.title) or field.name
     unit = "1" if field.unit == "1" else "" if units is None else unit_of(field, units)
     return {"long_name": name} | ({"units": unit} if unit else {})

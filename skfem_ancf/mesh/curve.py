@@ -26,7 +26,6 @@ KINK = 1e-2
 
 
 def _components(value, s):
-    """Two components at parameters s; a number is broadcast."""
     if isinstance(value, (tuple, list)) and len(value) == 2:
         return [np.broadcast_to(v, s.shape) if np.ndim(v) == 0 else v for v in value]
     return value
@@ -126,7 +125,6 @@ def _complex_step(r, s):
 
 
 def _differences(r, s0, s1, s):
-    """The derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
     at, weights, d = _stencil(s, s0, s1)
     values, = _each(partial(_on_curve, "r(s)", r), at)
     return np.einsum("is,jis->js", weights, values) / d
@@ -149,12 +147,10 @@ def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[
 
 
 def _each(function, *parameters):
-    """Values (2, ...) of a function of parameters (n,) at arrays of parameters (...)."""
     return [np.asarray(function(s.ravel())).reshape(2, *s.shape) for s in parameters]
 
 
 def _angles(a, b):
-    """Angles from vectors a to vectors b, both (2, ...)."""
     return np.arctan2(a[0] * b[1] - a[1] * b[0], np.sum(a * b, axis=0))
 
 
@@ -178,7 +174,6 @@ def _stencil(s, s0, s1):
 
 
 def _gauss_points(a, step):
-    """Parameters (n, 12) of Gauss points in intervals that begin at a, and weights."""
     x, w = gauss(12)
     return a[:, None] + step[:, None] * x, w
 

@@ -352,7 +352,6 @@ def _warn_of(pairs, apart, what):
 
 
 def _moved(curve, shift, s):
-    """A curve with shifted ends; the shift is interpolated linearly."""
     x, y = curve(s)
     (ax, bx), (ay, by) = shift
     return x + (1.0 - s) * ax + s * bx, y + (1.0 - s) * ay + s * by

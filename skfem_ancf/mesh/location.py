@@ -23,7 +23,6 @@ SAMPLES, WALK, CANDIDATES = 4, 3, 6
 
 
 def _taylor(m):
-    """Matrix from Hermite coefficients, with m derivatives per node, to powers of xi."""
     return np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d) for d in range(2 * m)])
 
 
@@ -237,7 +236,6 @@ class Finder:
 
     @cached_property
     def _line(self):
-        """Direction of a straight axis and positions of its nodes along it; None if curved."""
         mesh, d = self.mesh, self.mesh.p_X[:, 0]
         one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
         return (d, d @ mesh.p) if one else None

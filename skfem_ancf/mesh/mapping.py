@@ -61,7 +61,6 @@ class MappingBeam(Mapping):
 
     @property
     def _orders(self):
-        """Number of nodal derivatives of the axis and of the director, the 0th included."""
         n = 1 + SECTIONS.index(self.mesh.sections)
         return max(2, n), n
 
@@ -79,16 +78,13 @@ class MappingBeam(Mapping):
         return start, axis, m.height * directors
 
     def _coefficients(self, tind):
-        """Coefficients of axis and director of elements, (2, n, ne) each."""
         _, axis, director = self._all_coefficients
         return (axis, director) if tind is None else (axis[:, :, tind], director[:, :, tind])
 
     def _axis(self, xi, derivative=0):
-        """Interpolation functions of the axis."""
         return hermite_basis(self._orders[0], xi, derivative)
 
     def _director(self, xi, derivative=0):
-        """Interpolation functions of the section director."""
         return hermite_basis(self._orders[1], xi, derivative)
 
     @staticmethod

@@ -96,7 +96,6 @@ class Axes:
         self.arcs, self.start, self.way = dict(arcs), start, way
 
     def _parts(self, s):
-        """Chains and parameters in [0, 1], and the arcs with the parameters on each."""
         chain = chain_of(s)
         return chain, s - 2 * chain, [(arc, chain == k) for k, arc in self.arcs.items()
                                       if np.any(chain == k)]

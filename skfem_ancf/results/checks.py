@@ -169,7 +169,6 @@ def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
 
 
 def _turns(beam, u, base=None):
-    """Rotations of the nodal tangents; linearised about ``base``."""
     start = tangents(beam, u if base is None else base)
     turns = np.angle(start / tangents(beam, 0.0))
     return turns if base is None else turns + (tangents(beam, u) / start).imag

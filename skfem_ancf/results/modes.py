@@ -148,5 +148,4 @@ class Buckling(NearMisses):
 
 
 def _listed(numbers):
-    """The first of some numbers, as text."""
     return ", ".join(f"{x:.6g}" for x in numbers[:6]) + ", ..." * (len(numbers) > 6)

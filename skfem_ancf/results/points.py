@@ -39,7 +39,6 @@ class MaterialPoints(NearMisses):
 
     @property
     def _places(self) -> Array:
-        """Displacement of the degrees of freedom; for a linear solution a step."""
         return self.u
 
     def _dofs(self, member):

@@ -271,7 +271,6 @@ class State(Immutable, MaterialPoints):
 
     @property
     def _time(self):
-        """The time for joints: in statics the load factor."""
         return self.load if self.t is None else self.t
 
     # at material points
@@ -322,7 +321,6 @@ class State(Immutable, MaterialPoints):
                           for k, part in zip(numbers, at.parts)])
 
     def _find(self, point, beam, recover, line):
-        """Points, and the numbers of their beams."""
         require_flag("recover", recover)
         at = self.system.points.find(point, beam, line, ask=True)
         return at, [part.number for part in at.parts]
@@ -339,7 +337,6 @@ class State(Immutable, MaterialPoints):
                       None, self._eigenstrains(beam))
 
     def _eigenstrains(self, beam):
-        """Factors and loads of eigenstrains on a beam."""
         return [(self._unit * self.load * load.factor(self.t), load) for load in self.system.loads
                 if isinstance(load, EigenStrain) and load.beam is beam]
 

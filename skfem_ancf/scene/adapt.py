@@ -167,7 +167,6 @@ class _Rounds:
 
 
 def _changed(scene, marked, elements):
-    """The scene with other elements, or halved ones."""
     return scene.replace(beams=[
         b.replace(mesh=b.mesh.refined(m)) if e is None else b.replace(element=e)
         for b, m, e in zip(scene.beams, marked, elements)])
@@ -254,7 +253,6 @@ def _collect(old, marked, force):
 
 
 def _halving(beam, marked):
-    """Matrices (n, nb, 2 nb) from DOFs at both ends to those in the middle of elements."""
     nb, slope = beam.element.nodal_dofs, np.array([f[1] for f in beam.element.functionals])
     L = beam.mesh.lengths[marked][:, None, None]
     return (beam.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]

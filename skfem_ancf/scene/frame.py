@@ -130,13 +130,11 @@ class Frame(Scene):
                          np.zeros((graph.points.shape[1], 3), dtype=bool), graph, lines))
 
     def _take(self, nodes):
-        """Join the lines at other nodes."""
         with self._lock:
             self._entries, self._system = (self._bound(nodes), *self._entries[1:]), None
 
     @property
     def _nodes(self) -> Any:
-        """The joint of the nodes, bound."""
         return self._entries[0].bound[0]
 
     @classmethod

@@ -371,7 +371,6 @@ class Model(NearMisses):
     # other beams, other loads
 
     def _bare(self, beams):
-        """A scene of other beams without added items."""
         return type(self)(*beams, *self.bodies, *self.domains)
 
     def _on(self, beams):

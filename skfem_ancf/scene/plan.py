@@ -56,7 +56,6 @@ def make_plan(system: System, kind: str = "static", sensors: int = 0) -> Plan:
 
 
 def _item(term, there, reason, missing, status="computed"):
-    """A term that is computed if ``there`` is true, else skipped."""
     return Item(term, status, reason) if there else Item(term, "skipped", missing)
 
 
@@ -185,12 +184,10 @@ def _section(beam):
 
 
 def _listed(words):
-    """Sorted unique words."""
     return ", ".join(sorted(set(words)))
 
 
 def _kinds(things):
-    """Numbers of things by kind, as text."""
     return ", ".join(f"{n} {name}" for name, n in Counter(
         type(getattr(thing, "item", thing)).__name__.lstrip("_") for thing in things).items())
 

@@ -700,7 +700,6 @@ class Scene(Model):
         return self
 
     def _located(self):
-        """Names and sensors, located in this scene."""
         for sensor in self._sensors.values():
             locate(sensor, self.system)
         return list(self._sensors.items())

@@ -177,7 +177,6 @@ def _read(path):
 
 
 def _plain(x):
-    """A NumPy scalar as a Python number."""
     return x.item() if isinstance(x, np.generic) else x
 
 

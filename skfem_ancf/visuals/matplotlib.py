@@ -159,7 +159,6 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
 
 
 def _laws(beams):
-    """What a legend says of each material of beams, and its colour."""
     every = dict.fromkeys(layer.material for beam in beams for layer in beam.across.layers)
     said = dict.fromkeys(map(_law, every))
     return {text: BODIES[k % len(BODIES)] for k, text in enumerate(said)}

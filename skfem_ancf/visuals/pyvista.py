@@ -231,7 +231,6 @@ def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
 
 
 def _lines(walls):
-    """Straight segments (n, 2, 2) as a pyvista mesh."""
     ends = in_space(walls.reshape(-1, 2).T)
     return _pyvista().PolyData(ends, lines=np.insert(
         np.arange(len(ends)).reshape(-1, 2), 0, 2, axis=1).ravel())

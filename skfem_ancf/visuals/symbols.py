@@ -144,13 +144,11 @@ class Sketch:
         self._text(text, at + far * r * np.array(away), away, color, kind)
 
     def _box(self, text, at, away):
-        """Points along a text beside a position, estimated, shape (3, 2)."""
         x, y = np.array(away) / (np.hypot(*away) or 1.0)
         width = (0.5 + 0.4 * len(text)) * (np.sign(x) if abs(x) > 0.4 else 0.0)
         return at + self.size * SIZE * np.outer([0.0, 0.5, 1.0], [width, y])
 
     def _room(self, point, others):
-        """Distance of a point from others (n, 2)."""
         return float(np.min(np.hypot(*(others - point).T)))
 
     # supports and joints

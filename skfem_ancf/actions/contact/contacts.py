@@ -16,8 +16,8 @@ from ...core.types import Array
 from .active_set import project
 from .crossing import CrossingGuard, middle_of
 from .gap import places
-from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, of_contacts, push, resist, add_friction,
-                      states, way)
+from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts, push,
+                      resist, states, way)
 from .poses import taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, LARGEST, NOW, POSE,
                      POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, WIDTH,

@@ -156,7 +156,6 @@ class _Path:
         return x
 
     def _gap(self, x, t):
-        """Gaps of points (k, 2, points) in the frame of the obstacle at times (k,)."""
         if self.obstacle.shape.kind == CUSTOM:
             return np.array([self._asked(y, s)[0] for y, s in zip(x, t)])
         return self._asked(np.moveaxis(x, 1, 0).reshape(2, -1), 0.0)[0].reshape(len(x), -1)

@@ -80,7 +80,6 @@ class Spring(ForceElement):
                      (self.k, self._length, self.damping, 0.0, 0.0))]
 
     def _along(self, x):
-        """Its length, at least a small positive number, and its direction."""
         length = max(float(np.hypot(*x[0])), TINY)
         return length, x[0] / length
 

@@ -46,7 +46,6 @@ class Axis:
         self._scales = beam.mesh.lengths[:, None] ** self._slope
 
     def _local(self, e: Any) -> Array:
-        """Nodal coordinates of elements, (..., 2, nb)."""
         first = np.asarray(self.beam.mesh.t[0, e] * self.beam.nd)
         return first[..., None, None] + 2 * self._used + np.arange(2)[:, None]
 

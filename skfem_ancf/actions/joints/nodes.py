@@ -87,7 +87,6 @@ class Nodes(Joint):
         return self.settlements.moves(COMPONENTS.index("angle"))
 
     def _shifts(self, times: Array) -> list[Array]:
-        """Prescribed displacements along x and y, and rotations, shapes (n, k) each."""
         ends = self.fixed_x, self.fixed_y, self.fixed_angle
         return [self.settlements.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
 
@@ -159,7 +158,6 @@ class Nodes(Joint):
         return i, j, values
 
     def _angles(self, factors: Array, ends: Array) -> Array:
-        """Values of ``Im(factor dg)`` of some ends."""
         z = (factors * self.frame[ends])[:, None] * self.weights[ends]
         return np.stack([z.imag, z.real], axis=1).ravel()
 
@@ -178,7 +176,6 @@ class Nodes(Joint):
 
     @cached_property
     def _places(self) -> Any:
-        """Positions of the values in :meth:`derivative`."""
         rows, columns, _ = self._pattern
         return sparse.csr_array((np.arange(len(rows)), (rows, columns)))
 

@@ -31,13 +31,11 @@ class Part(Joint):
         pass
 
     def _of(self, rows: Array, *others: Array) -> tuple[Any, ...]:
-        """Entries of the remaining equations; for arrays (n, k) columns."""
         rows = self._number[rows]
         keep = rows >= 0
         return (rows[keep], *(x[..., keep] for x in others))
 
     def _all(self, multipliers: Array) -> Array:
-        """Multipliers of all equations, zero for the omitted ones."""
         out = np.zeros(len(self._number))
         out[self.kept] = multipliers
         return out

@@ -284,7 +284,6 @@ class Obstacle(ForceElement):
 
 
 def _default(E, mesh):
-    """Default stiffness of a beam."""
     h, extent = mesh.height, float(np.hypot(*np.ptp(mesh.p, axis=1)))
     return E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
 
