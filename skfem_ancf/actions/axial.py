@@ -36,10 +36,8 @@ class FollowerForce(Load):
         The force in the reference configuration, shape (2,).
     at
         The material point (x, y), shape (2,).
-    beam
-        Beam, name or number, where several have the point; or a RigidBody.
-    amplitude
-        Factor as a function of time.
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`; the beam may be a RigidBody.
     line
         Number of the chain of elements whose tangent is used, where several meet.
     """
@@ -178,17 +176,7 @@ def _axis_points(beam, chains):
 
 
 class LineLoadInTime(TimedLoad):
-    """A time-dependent force per length, bound.
-
-    Parameters
-    ----------
-    beam, amplitude
-        A :class:`~skfem_ancf.Beam`, and as for :class:`~skfem_ancf.actions.loads.Load`.
-    points
-        Its quadrature points.
-    force
-        Function of points x (2, ...) and the time that returns (2, ...).
-    """
+    """A time-dependent force per length at the quadrature points of a beam, bound."""
 
     def __init__(self, beam: Beam, points: Any, force: Any,
                  amplitude: TimeFunction = None) -> None:

@@ -16,20 +16,10 @@ VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])
 
 
 class Points(NamedTuple):
-    """Quadrature points of elements or facets.
+    """Quadrature points of n elements or facets.
 
-    Attributes
-    ----------
-    dofs
-        Degrees of freedom of each, shape (n, 2 nb).
-    X
-        The material points, shape (2, n, np).
-    weights
-        Quadrature weights, shape (n, np).
-    functions
-        Values and both derivatives of the local functions, shape (n, nb, np, 3).
-    of
-        Additional data.
+    ``dofs`` (n, 2 nb), material points ``X`` (2, n, np), ``weights`` (n, np), values and both
+    derivatives of the local ``functions`` (n, nb, np, 3), and additional data ``of``.
     """
 
     dofs: Array

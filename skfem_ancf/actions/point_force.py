@@ -31,10 +31,8 @@ class PointForce(Load):
         The point (x, y) in the reference configuration, shape (2,), or "right" for the axis at that
         end; None for the centre of mass of a rigid body. For a function of time see
         :class:`~skfem_ancf.actions.moving.MovingForce`.
-    beam
-        Beam, name or number, where several have the point; or a RigidBody.
-    amplitude
-        Factor as a function of time.
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`; the beam may be a RigidBody.
     """
 
     for_bodies = for_domains = True

@@ -80,10 +80,8 @@ class Pin(Support):
 
     Parameters
     ----------
-    boundary
-        A place, as for :class:`Support`; for a rigid body a point, or None for its centre of mass.
-    beam
-        Beam, name or number, in a scene of several; or a RigidBody.
+    boundary, beam
+        As for :class:`Support`; for a RigidBody a point, or None for its centre of mass.
     """
 
     def __init__(self, boundary: Place, beam: Any = None) -> None:
@@ -115,10 +113,8 @@ class Clamp(Item):
 
     Parameters
     ----------
-    boundary
-        A place, as for :class:`Support`.
-    beam
-        Beam, name or number, in a scene of several; or a RigidBody.
+    boundary, beam
+        As for :class:`Support`; the beam may be a RigidBody.
     thickness
         "fixed": every material point of the face is fixed: ``r`` and the section slopes of the
         node. The slope ``r_X`` stays free, as it is a strain measure. "free": ``r`` is fixed and

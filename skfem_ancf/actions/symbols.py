@@ -77,16 +77,10 @@ class Symbol(NamedTuple):
 
 def all_symbols(items: Iterable[Any], layout: Layout, load: float = 1.0,
                 t: float | None = None, start: bool = False) -> list[Symbol]:
-    """Symbols of items, with loads multiplied by their factors.
+    """Symbols of unbound items, with loads multiplied by their factors.
 
-    Parameters
-    ----------
-    items, layout
-        Unbound items, and the Layout of the scene.
-    load, t
-        The load factor, and the time of a motion or None.
-    start
-        Show moving or time-dependent loads at time 0, or at 1 if they vanish there.
+    ``load`` and ``t`` are the load factor, and the time of a motion or None. With ``start`` moving
+    or time-dependent loads are those at time 0, or at 1 if they vanish there.
     """
     out = []
     for item in items:

@@ -215,15 +215,7 @@ class SeriesWriter:
         return self
 
     def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
-        """Write the frames of a motion.
-
-        Parameters
-        ----------
-        states
-            States with a time ``t``.
-        done
-            Called after each of them.
-        """
+        """Write states with a time ``t``, and call ``done`` after each of them."""
         for state in states:
             self.add(state, state.t)  # type: ignore[attr-defined]
             done()

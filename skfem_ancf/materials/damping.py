@@ -48,17 +48,7 @@ class KelvinVoigt(Immutable):
 
 
 class Damping(Immutable):
-    """Damping of a scene, see :meth:`skfem_ancf.Scene.damping`.
-
-    Parameters
-    ----------
-    mass
-        Mass-proportional rate: the force ``mass M v``.
-    stiffness
-        Retardation time, added to that of every beam.
-    modal
-        Damping ratios of the lowest flexible modes, shape (k,).
-    """
+    """Damping of a scene, see :meth:`skfem_ancf.Scene.damping` for its arguments."""
 
     def __init__(self, mass: float = 0.0, stiffness: float = 0.0,
                  modal: ArrayLike = ()) -> None:

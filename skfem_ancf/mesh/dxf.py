@@ -16,14 +16,8 @@ CURVES = ("ARC", "CIRCLE", "ELLIPSE", "SPLINE", "INSERT")
 def mesh_of_dxf(path: Path) -> Any:
     """The lines and points of the model space, as cell sets named after their layers.
 
-    Polylines are split into lines. Text, dimensions and hatches are ignored.
-
-    Raises
-    ------
-    MissingExtra
-        If ezdxf is not installed.
-    FileError, MeshError
-        If the file cannot be read, or has curves or blocks.
+    Polylines are split into lines. Text, dimensions and hatches are ignored; MeshError for curves
+    or blocks, FileError if the file cannot be read.
     """
     import meshio
 

@@ -84,14 +84,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         progress: bool | None = None) -> StepHistory:
     """Equilibria over the time of steps, see :meth:`skfem_ancf.Scene.run`.
 
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    steps, increments, start, tol, max_iterations, min_step, stable, progress
-        As there.
-    sensors
-        Names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
+    ``sensors`` are names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
     """
     ends = steps.ends if isinstance(steps, Steps) else np.unique(
         require_finite("steps", np.atleast_1d(steps), (None,)))

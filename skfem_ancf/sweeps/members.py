@@ -17,14 +17,7 @@ _FORMAT = 2
 class Failure(NamedTuple):
     """A member of a sweep that could not be built, solved or measured.
 
-    Attributes
-    ----------
-    member : int
-        Index of the member.
-    parameters : dict
-        Its parameters by name.
-    error : str
-        Class and message of the error.
+    ``member`` is its index, ``parameters`` are by name, ``error`` is the class and message.
     """
 
     member: int

@@ -160,12 +160,9 @@ def explorer(solve: Callable[[Any, Any], Any], interval: Any, value: Any, title:
              place: Callable[[Any], Array] | None, picture: dict[str, Any]) -> Explorer:
     """An Explorer with its slider, or with its arrow if a place is given.
 
-    Parameters
-    ----------
-    solve, place, picture
-        As for :class:`Explorer`, its :meth:`~Explorer.arrow`, and its options.
-    interval, value, title
-        Ends and start of the slider; or the initial force, shape (2,).
+    ``solve`` and ``picture`` are for :class:`Explorer`, ``place`` for :meth:`Explorer.arrow`;
+    ``interval, value, title`` are ends, start and title of the slider, or ``value`` is the initial
+    force (2,).
     """
     if place is not None:
         made = Explorer(solve, [require_finite("the force", value, (2,))], **picture)

@@ -39,16 +39,9 @@ def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> 
 
 
 class Sketch:
-    """Draws symbols on matplotlib Axes; the gid of each artist is the kind of its symbol.
+    """Draws symbols on Axes ``ax``; the gid of each artist is the kind of its symbol.
 
-    Parameters
-    ----------
-    ax
-        The Axes.
-    u
-        Drawn displacement of the degrees of freedom, shape (N,).
-    points
-        Drawn points of the bodies, shape (n, 2).
+    ``u`` (N,) is the drawn displacement, ``points`` (n, 2) are drawn points of the bodies.
     """
 
     def __init__(self, ax: Any, u: Array, points: Array) -> None:

@@ -25,26 +25,17 @@ ROUND_OFF = 1e-9
 
 
 class MeasuredPoint(NamedTuple):
-    """Measurements at a point.
-
-    Attributes
-    ----------
-    position, velocity
-        Shape (2,) each.
-    """
+    """Measurements at a point: ``position`` and ``velocity``, shape (2,) each."""
 
     position: Array
     velocity: Array
 
 
 class MeasuredSection(NamedTuple):
-    """Measurements of a section.
+    """Rotation of a section and its rate.
 
-    Attributes
-    ----------
-    angle, rate
-        Rotation from the reference configuration in radians, in (-pi, pi], counterclockwise; and
-        its rate.
+    ``angle`` is measured from the reference configuration in radians, in (-pi, pi],
+    counterclockwise.
     """
 
     angle: float

@@ -11,15 +11,7 @@ from .base import ForceElement
 
 
 class DomainForce(ForceElement):
-    """Internal force and tangent of a :class:`~skfem_ancf.Domain`, bound.
-
-    Parameters
-    ----------
-    domain
-        The domain.
-    first
-        The number of its first degree of freedom in the scene.
-    """
+    """Internal force and tangent of a ``domain``, whose first DOF is ``first``, bound."""
 
     internal, resists = True, False
 

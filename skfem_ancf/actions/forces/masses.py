@@ -22,8 +22,8 @@ class PointMass(ForceElement):
     at
         The point (x, y) in the reference configuration, or the name of an end.
     inertia
-        Moment of inertia about the point, zero or positive, rotating with a section: the point must
-        be on the section of a node.
+        Moment of inertia about the point, zero or positive; the point must then be on the section
+        of a node.
     beam
         Beam, name or number, in a scene of several.
     """

@@ -13,15 +13,7 @@ from .base import ForceElement
 
 
 class Unscaled(ForceElement):
-    """A load on the degrees of freedom of its beam.
-
-    Parameters
-    ----------
-    load
-        A :class:`~skfem_ancf.actions.loads.Load`, bound.
-    layout
-        The :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-    """
+    """A bound ``load`` on the degrees of freedom of its beam, in a scene with a ``layout``."""
 
     distributed, resists = True, False
 
