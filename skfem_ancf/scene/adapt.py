@@ -112,7 +112,7 @@ class _Rounds:
     def _raised(self, k):
         """The element of a beam of the next degree; None if its elements are to be halved."""
         element = self.scene.beams[k].element
-        # of a curve elements have cubics, which a higher degree brings no closer to it
+        # the axis on a curve is cubic: a higher degree does not improve the geometry
         may = (k not in self._rough and element.axis_degree + 2 <= self._most
                and self.scene.beams[k].mesh.curve is None)
         return element.raised() if may else None

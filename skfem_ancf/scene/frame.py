@@ -523,7 +523,7 @@ def _heights(height, lines):
 
 def _hinged(graph, hinges):
     """Whether the start and the end of each line are hinged, (2, m)."""
-    lines = graph.given  # before ends became one node: what is hinged at one of them stays so
+    lines = graph.given  # before merging: hinges at a merged end remain
     out = np.zeros(lines.shape, dtype=bool)
     if isinstance(hinges, str) and hinges == "all":
         return ~out

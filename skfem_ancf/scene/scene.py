@@ -401,7 +401,7 @@ class Scene(Model):
             scene = made if isinstance(made, Scene) else copy(self).add(made)
             try:
                 return scene.solve_static(start=start)
-            except (InputError, ConvergenceError):  # the start may be what is wrong
+            except (InputError, ConvergenceError):  # the start may be the cause
                 return scene.solve_static()
 
         dragged = isinstance(load, PointForce)

@@ -118,7 +118,7 @@ class Uniform(Measure):
         return f"<one width from {self.low:.4g} to {self.high:.4g} of the height>"
 
 
-#: That of a full section.
+#: The measure of a full section.
 WHOLE = Uniform()
 
 

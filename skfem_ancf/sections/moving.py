@@ -12,7 +12,7 @@ from ..core.quadrature import gauss
 from ..core.types import Array, Rule
 from .measure import MORE, Measure, Piece, Weighted
 
-#: Least degree of the series of a width, and its points more where that is a square root.
+#: Least degree of the series of a width, and additional points for a square root.
 LEAST, ROUND = 8, 40
 
 

@@ -22,13 +22,13 @@ READABLE = 1 / 25
 #: ``scale="auto"`` draws the largest displacement at most this part of the body.
 VISIBLE = 0.12
 
-#: Obstacles are seen that are at most this part of the picture of a scene away from it.
+#: Largest distance of drawn obstacles, relative to the picture of a scene.
 WIDE = 0.6
 
 #: Colours of signed fields, visible on white at zero.
 SIGNED = "#313695", "#5a91c4", "#ecd27a", "#ee6a41", "#a50026"
 
-#: Colours of lines, of what is less important, of the reference configuration, of bodies and
+#: Colours of lines, of less important ones, of the reference configuration, of bodies and
 #: obstacles.
 INK, MUTED, GHOST, RIGID, WALL = "#222222", "#666666", "#d9d9d9", "#bbbbbb", "#7a5230"
 #: Of bodies in the picture of a scene, one for each material.

@@ -29,7 +29,7 @@ def search(pair, which, u):
 def near_points(pair, what, begin, end):
     """Numbers of the points of elements that may touch, from the bounds at both ends."""
     n, reach = begin.size, pair.common[LARGEST + pair.k]
-    if what == SETTLE and pair.numbers[FRICTION] > 0.0:  # also what may touch next
+    if what == SETTLE and pair.numbers[FRICTION] > 0.0:  # and points that may touch next
         reach = BEYOND * pair.numbers[RADIUS] if pair.common[RATE] > 0.0 else 1e300
     m, flags = pair.first.size // n, np.empty(pair.first.size)
     for p in range(m):

@@ -129,7 +129,7 @@ class Contacts:
         pose[4:6] -= self.origin
         return pose
 
-    # what kernels ask
+    # callbacks of kernels
 
     def put(self, t: float, span: float, poses: Array) -> None:
         """Write the poses of all obstacles at a time, and at both ends of a span about it."""
@@ -243,7 +243,7 @@ class Contacts:
         of_contacts(self.tables, Question(what, t, 0.0, 0.0, 0, 0), u, u, out)
         return out[0]
 
-    # what some solvers do not take
+    # restrictions of solvers
 
     def require_path(self) -> None:
         """Raise InputError if the obstacles do not allow arc-length continuation."""

@@ -23,13 +23,12 @@ from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, 
                      OFFSET, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING, STIFFNESS, TOLERANCE,
                      WIDTH, hardening, pair_of)
 
-#: A change of places, relative to an element, below which a mean is that of the middle.
+#: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
-#: Rows of active points: place and slope in the middle of a mean; their way, or velocity; the
-#: penetration at both ends; the surface at the end; its way, or velocity; the surface in the
-#: middle, its gap with derivatives, and its derivative by the slope; the force on it, and the
-#: derivative of that; the pressure and its derivative; what the force's work misses, by the square
-#: of the way.
+#: Rows of active points: position and slope in the middle of a mean; their displacement, or
+#: velocity; penetration at both ends; surface point at the end; its displacement, or velocity;
+#: surface point in the middle, its gap with derivatives, and its derivative by the slope; force and
+#: its derivative; pressure and its derivative; missing work over the squared displacement.
 (MIDDLE, RATES, DEPTH, LAST, WAY, PLACE, FOUND, LEVER, PUSH, K, PRESSURE, SLOPE, MISSING,
  ROWS) = 0, 4, 8, 10, 12, 14, 16, 22, 26, 28, 32, 33, 34, 35
 NX, NY = FOUND + 1, FOUND + 2
@@ -193,7 +192,7 @@ def add_friction(pair, same, at, w):
     if friction == 0.0:
         return
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
-    # what vibrates on the springs comes to rest: in a mean by itself
+    # damps vibrations on the springs; a mean does so by itself
     calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
     for i in indices(at.size):
         nx, ny = w[NX, i], w[NY, i]
@@ -228,7 +227,7 @@ def resist(pair, factor, at, w):
         w[K + 2, i], w[K + 3, i] = c * ny * nx, c * ny * ny
 
 
-# what steps leave behind
+# history data
 
 
 @source

@@ -14,18 +14,18 @@ from ...core.source import F1, I1, shaped, source
 OUTLINE, CUSTOM = range(2)
 #: Requests to all pairs, see :class:`Question`.
 FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
-#: Of a pair: kind and number of its obstacle, elements, points of each element, pairs of degrees of
-#: freedom of each, whether normals depend on slopes, how many numbers the shape has; where its
-#: integers, numbers and memory begin.
+#: Header of a pair: kind and number of its obstacle, numbers of elements, of points per element, of
+#: pairs of degrees of freedom per point, flag of normals that depend on slopes, number of shape
+#: parameters; offsets of its integers, numbers and history data.
 KIND, OBSTACLE, ELEMENTS, POINTS, PAIRS, SLOPES, SHAPE, INTS, FLOATS, MEMORY = range(10)
 HEADER = 10
-#: Numbers of a pair: penalty stiffness, width of the transition, friction, tangential stiffness,
-#: damping, what a step in time adds to the stiffness, largest distance of a point from the middle
-#: of its element without displacement, 1 or -1 outside or inside of the shape, and the penetration
-#: that the augmented Lagrangian leaves, zero for the penalty.
+#: Parameters of a pair: penalty stiffness, width of the transition, friction, tangential stiffness,
+#: damping, additional stiffness in a time step, largest reference distance of a point from the
+#: middle of its element, 1 or -1 for outside or inside of the shape, and the tolerance of the
+#: augmented Lagrangian, zero for the penalty.
 STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, INERTIA, RADIUS, SIDE, TOLERANCE = range(9)
 NUMBERS = 9
-#: Rows of the points without displacement: area, distance from the axis, place and slope.
+#: Rows of reference data of points: area, distance from the axis, position and slope.
 AREA, OFFSET, START = range(3)
 #: Rows of the points' history data: the multiplier of the augmented Lagrangian over the stiffness,
 #: the anchor of friction in the obstacle's frame, and the distance of the point from it.
