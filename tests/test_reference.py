@@ -14,8 +14,8 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
            "formulations", "io", "materials", "mesh", "results", "scene", "sections", "solvers",
            "sweeps"]
 #: Returned by public methods, and machinery all the same.
-MACHINERY = {"BandMatrix", "Finder", "Inertia", "Masses", "Points", "Recovery", "System", "Spread",
-             "Interpolation", "BeamLayer", "LayerPoints",
+MACHINERY = {"BandMatrix", "Finder", "Inertia", "Masses", "Points", "Recovery", "System",
+             "Distribution", "Interpolation", "BeamLayer", "LayerPoints",
              "Law", "Amplitude", "BodyFields", "Link", "Part",
              "StabilisedMode", "Sampling", "Rule", "Point", "Critical", "Vector"}
 

@@ -190,7 +190,7 @@ NAMED = [
      "np.column_stack([-np.sin(a), np.cos(a)])",
      "np.column_stack([np.sin(a), np.cos(a)])",
      "test_slope_of_a_joint_that_does_not_say_it"),
-    ("spread: points across of the first section", "beam/distribution.py",
+    ("distribution: points across of the first section", "beam/distribution.py",
      "across = lagrange(self.eta, eta.ravel())",
      "across = lagrange(self.eta, np.tile(eta[0], len(eta)))",
      "test_a_density_at_points_that_differ_from_section_to_section"),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import AXIS, Sampled, Spread
+from ..beam.distribution import AXIS, Distribution, Sampled
 from ..beam.kinematics import probe
 from ..beam.kernels.section import beam_gradients
 from ..beam.layout import Layout, WhichBeam, WhichMember
@@ -106,11 +106,11 @@ class FollowerForce(Load):
         columns = np.broadcast_to(self._along[None, None], values.shape)
         return rows.ravel(), columns.ravel(), values.ravel()
 
-    def spread(self, u: Array) -> Spread:
+    def distribution(self, u: Array) -> Distribution:
         if self._place is None:
-            return Spread()
+            return Distribution()
         e, xi = self._place
-        return Spread(stations=(e + xi,), points=((e, xi, self._force(u).T),))
+        return Distribution(stations=(e + xi,), points=((e, xi, self._force(u).T),))
 
 
 class LineLoad(Load):
@@ -139,8 +139,8 @@ class LineLoad(Load):
             return LineLoadInTime(beam, points, given, self.amplitude)
         values = (ask_field("force(x)", given, points.x) if callable(given) else
                   np.broadcast_to(given[:, None, None], points.x.shape))
-        vector, spread = points.load(beam, values)
-        return DeadLoad(beam, vector, self.amplitude, spread)
+        vector, distribution = points.load(beam, values)
+        return DeadLoad(beam, vector, self.amplitude, distribution)
 
 
 class _AxisPoints(NamedTuple):
@@ -156,11 +156,11 @@ class _AxisPoints(NamedTuple):
     lengths: Array
     functions: Array
 
-    def load(self, beam: Beam, values: Array) -> tuple[Array, Spread]:
+    def load(self, beam: Beam, values: Array) -> tuple[Array, Distribution]:
         """Force (N,) of forces per length at the points, (2, ne, np), and its distribution."""
         vector = beam.kernel.scatter(
             np.einsum("kep,iep->eki", self.functions, self.lengths * values))
-        return vector, Spread(sampled=(Sampled(AXIS, np.arange(len(self.lengths)), self.xi,
+        return vector, Distribution(sampled=(Sampled(AXIS, np.arange(len(self.lengths)), self.xi,
                                                values * self.speed),))
 
 
@@ -183,7 +183,7 @@ class LineLoadInTime(TimedLoad):
         super().__init__(beam, amplitude)
         self.points, self.per_length = points, force
 
-    def at(self, t: float) -> tuple[Array, Spread]:
+    def at(self, t: float) -> tuple[Array, Distribution]:
         values = ask_field("force(x, t)", lambda x: self.per_length(x, t), self.points.x)
         return self.points.load(self.beam, values)
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from ..beam.beam import Beam
-from ..beam.distribution import Spread
+from ..beam.distribution import Distribution
 from ..beam.kernels.kernel import stresses_of
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
@@ -64,7 +64,7 @@ class EigenStrain(Load):
     constant = False
     prestress = True
     # of a bound one
-    _spread: Any = None
+    _distribution: Any = None
     # strains (ns, ne) and weighted stresses (ne, ns) of each of the kernel's tables
     _strains: Any = None
     _stresses: Any = None
@@ -108,7 +108,7 @@ class EigenStrain(Load):
 
     def bind(self, beam: Beam) -> Load:
         bound = cast("EigenStrain", super().bind(beam))
-        bound._spread = Spread(eigen=bound)
+        bound._distribution = Distribution(eigen=bound)
         function = getattr(self.amplitude, "function", None)
         if isinstance(function, Coefficient):
             bound.at_rest = function(1.0)
@@ -166,8 +166,8 @@ class EigenStrain(Load):
         strain = self.beam.kernel.strain(u)
         return -float(np.sum(self.eigen_stresses[0].T * strain.reshape(-1, strain.shape[2])))
 
-    def spread(self, u: Array) -> Spread:
-        return self._spread
+    def distribution(self, u: Array) -> Distribution:
+        return self._distribution
 
     # fields
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import AXIS, BODY, Sampled, Spread
+from ..beam.distribution import AXIS, BODY, Distribution, Sampled
 from ..beam.kinematics import element_dofs
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
@@ -218,7 +218,7 @@ class Energy(Density):
         along = d / self.beam.sizes**2
         return force - rest / float(d @ along) * along
 
-    def spread(self, u: Array) -> Spread | None:
+    def distribution(self, u: Array) -> Distribution | None:
         """Distribution of its force; None if psi depends on F, or for layered sections."""
         sampled = []
         for part in self._parts:
@@ -237,7 +237,7 @@ class Energy(Density):
         stations: tuple[float, ...] = ()
         if self.over not in ("cells", "axis"):
             stations = groups_of(self.beam.mesh, surfaces_of(self.beam, self.over, 1))[1]
-        return Spread(sampled=tuple(sampled), stations=stations)
+        return Distribution(sampled=tuple(sampled), stations=stations)
 
     def __repr__(self):
         name = getattr(self.psi, "__name__", type(self.psi).__name__)

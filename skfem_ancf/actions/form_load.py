@@ -15,7 +15,7 @@ from skfem.assembly import BilinearForm, FacetBasis, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam.distribution import BODY, Sampled, Spread, facets_along
+from ..beam.distribution import BODY, Distribution, Sampled, facets_along
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember
 from ..core.errors import (CallbackError, InputError, explained, require_flag, require_slope, shown,
@@ -125,8 +125,8 @@ class FormLoad(Density):
         bound = self._with(beam=beam, _parts=[part], _basis=basis)
         P, w = bound._evaluated(bound._variables(np.zeros(beam.N), part))
         if not vars(w).get("asked", set()) & {"r", "F", "t"}:
-            return DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._spread(P))._with(
-                scaled=self.scaled)
+            dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._distribution(P))
+            return dead._with(scaled=self.scaled)
         if not beam.has_sections:
             raise InputError(f"a form with w.r acts on elements with sections, as "
                              f"ElementBeamANCF(2), and not on {beam!r}")
@@ -191,11 +191,11 @@ class FormLoad(Density):
         require_slope(f"tangent of {self!r}", "the form", before - after, -2.0 * slope,
                       1e-13 * np.max(np.abs(before)))
 
-    def spread(self, u: Array) -> Spread | None:
+    def distribution(self, u: Array) -> Distribution | None:
         part, = self._parts
-        return self._spread(-self._slope(self._variables(u, part), part))
+        return self._distribution(-self._slope(self._variables(u, part), part))
 
-    def _spread(self, P):
+    def _distribution(self, P):
         """Distribution of a force over the body; None if it acts on derivatives."""
         basis, f = self._basis, P[:2]
         if np.any(P[2:]):
@@ -203,13 +203,13 @@ class FormLoad(Density):
         if isinstance(basis, FacetBasis):
             groups, stations = facets_along(self.beam.mesh, basis)
             per_xi = f * basis.dx / basis.W
-            return Spread(stations=stations, sampled=tuple(
+            return Distribution(stations=stations, sampled=tuple(
                 Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
         if not self.beam.across.plain:
             return None
         xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
         values = (f / self.beam.across.layers[0].width).reshape(*f.shape[:2], len(xi), len(eta))
-        return Spread(sampled=(Sampled(BODY, np.arange(f.shape[1]), xi, values, eta),))
+        return Distribution(sampled=(Sampled(BODY, np.arange(f.shape[1]), xi, values, eta),))
 
     def __repr__(self):
         name = getattr(self.form.form, "__name__", type(self.form).__name__)

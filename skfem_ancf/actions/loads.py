@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..beam.beam import Beam
-from ..beam.distribution import Spread, on_facets, stations_of_vector
+from ..beam.distribution import Distribution, on_facets, stations_of_vector
 from ..beam.domain import Domain
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
@@ -175,14 +175,14 @@ class Load(Item):
         """Minus the work done from the reference configuration; None if there is no potential."""
         return None
 
-    def spread(self, u: Array) -> Spread | None:
+    def distribution(self, u: Array) -> Distribution | None:
         """Distribution of the force over the body at the displacement ``u``, for recovered fields.
 
         By default it acts on the nodes, or on the point inside an element, whose degrees of freedom
         it acts on; None (unknown) if these are neighbours.
         """
         stations = stations_of_vector(self.beam, self.force(u))
-        return None if stations is None else Spread(stations=stations)
+        return None if stations is None else Distribution(stations=stations)
 
     def __repr__(self):
         return f"<{type(self).__name__} on {self.beam!r}>"
@@ -286,8 +286,8 @@ class Weight(Load):
         return [self._with(beam=k) for k in which]
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        spread = Spread(gravity=self.g) if isinstance(beam, Beam) else None
-        return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)._with(g=self.g)
+        distribution = Distribution(gravity=self.g) if isinstance(beam, Beam) else None
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude, distribution)._with(g=self.g)
 
 
 def number_at(layout: Layout, at: Any, beam: Any) -> int:
@@ -363,8 +363,8 @@ class DeadLoad(Load):
         Force on its degrees of freedom, shape (N,).
     amplitude
         As for :class:`Load`.
-    spread
-        Its distribution, a :class:`~skfem_ancf.beam.distribution.Spread`; None to determine it.
+    distribution
+        A :class:`~skfem_ancf.beam.distribution.Distribution`; None to determine it.
     """
 
     for_bodies = for_domains = True
@@ -372,17 +372,17 @@ class DeadLoad(Load):
     g: Any = None
 
     def __init__(self, beam: Beam | RigidBody | Domain, vector: ArrayLike,
-                 amplitude: TimeFunction = None, spread: Spread | None = None) -> None:
+                 amplitude: TimeFunction = None, distribution: Distribution | None = None) -> None:
         if not isinstance(beam, (Beam, RigidBody, Domain)):
             raise InputError(f"this load acts on a Beam, got {shown(beam)}")
         super().__init__(beam, amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))
-        self._of, self._spread = beam, spread
+        self._of, self._distribution = beam, distribution
 
-    def spread(self, u: Array) -> Spread | None:
-        if self._spread is None:
-            self._spread = super().spread(u)
-        return self._spread
+    def distribution(self, u: Array) -> Distribution | None:
+        if self._distribution is None:
+            self._distribution = super().distribution(u)
+        return self._distribution
 
     def bind(self, beam: Beam) -> Load:
         if beam is not self._of:
@@ -419,7 +419,7 @@ class Pressure(Load):
     # of a bound one
     matrix: Any
     _rows: Any
-    _spread: Any
+    _distribution: Any
 
     def __init__(self, boundary: Place, p: float, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -436,10 +436,10 @@ class Pressure(Load):
                 "scene.point_force")
         rows = _follower(beam, facets, self.p)
         return self._with(beam=beam, _rows=rows, matrix=rows.tocoo(),
-                          _spread=on_facets(beam.mesh, facets, pressure=self.p))
+                          _distribution=on_facets(beam.mesh, facets, pressure=self.p))
 
-    def spread(self, u: Array) -> Spread | None:
-        return self._spread
+    def distribution(self, u: Array) -> Distribution | None:
+        return self._distribution
 
     def force(self, u: Array) -> Array:
         return self._rows @ (self.beam.q0_local + u)

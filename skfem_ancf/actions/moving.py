@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import Spread, on_points
+from ..beam.distribution import Distribution, on_points
 from ..beam.kinematics import locate
 from ..beam.layout import WhichBeam
 from ..core.errors import (InputError, ask, require_finite, require_finite_scalar,
@@ -31,14 +31,14 @@ class TimedLoad(Load):
     # of the load at a time
     _time: float | None = None
     _vector: Any = None
-    _spread: Any = None
+    _distribution: Any = None
     _last: Any = None
 
     def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
         """Forces (2,) at time t, each with its element and reference point (2,)."""
         raise NotImplementedError
 
-    def at(self, t: float) -> tuple[Array, Spread]:
+    def at(self, t: float) -> tuple[Array, Distribution]:
         """Force (N,) at time t and its distribution; by default from :meth:`places`."""
         return on_points(self.beam, self.places(t))
 
@@ -49,8 +49,9 @@ class TimedLoad(Load):
     def acting(self, t: float | None) -> tuple[float, Load]:
         last, time = self._last, 1.0 if t is None else float(t)
         if last is None or last._time != time:
-            vector, spread = self.at(time)
-            last = self._last = self._with(_time=time, _vector=vector, _spread=spread, _last=None)
+            vector, distribution = self.at(time)
+            last = self._last = self._with(_time=time, _vector=vector, _last=None,
+                                           _distribution=distribution)
         return self.factor(t), last
 
     def force(self, u: Array) -> Array:
@@ -65,8 +66,10 @@ class TimedLoad(Load):
     def potential(self, u: Array) -> float:
         return -float(self.force(u) @ u)
 
-    def spread(self, u: Array) -> Spread | None:
-        return self.acting(None)[1].spread(u) if self._spread is None else self._spread
+    def distribution(self, u: Array) -> Distribution | None:
+        if self._distribution is None:
+            return self.acting(None)[1].distribution(u)
+        return self._distribution
 
 
 class MovingForce(TimedLoad):

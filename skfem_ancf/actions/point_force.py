@@ -56,5 +56,5 @@ class PointForce(Load):
             return DeadLoad(beam, vector, self.amplitude)
         e, X = locate(beam, self.at)
         probe(beam, self.at, (e, X))  # a point of a cable must be on the axis
-        vector, spread = on_points(beam, [(self.total, e, X)])
-        return DeadLoad(beam, vector, self.amplitude, spread)
+        vector, distribution = on_points(beam, [(self.total, e, X)])
+        return DeadLoad(beam, vector, self.amplitude, distribution)

@@ -99,7 +99,7 @@ def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float,
 
 
 @dataclass(frozen=True)
-class Spread:
+class Distribution:
     """The distribution of a load over a beam, in the reference configuration."""
 
     body: Array | None = None  # force per volume, (2,)
@@ -113,23 +113,23 @@ class Spread:
     eigen: Any = None  # an eigenstrain instead of a force
 
 
-def on_points(beam: Beam, places: Sequence[tuple[Array, int, Array]]) -> tuple[Array, Spread]:
-    """The force (N,) of forces (2,) with element and reference point, and its Spread."""
+def on_points(beam: Beam, places: Sequence[tuple[Array, int, Array]]) -> tuple[Array, Distribution]:
+    """The force (N,) of forces (2,) with element and reference point, and its Distribution."""
     vector, points = np.zeros(beam.N), []
     for force, e, X in places:
         dofs, weights = probe_reference(beam, e, X)
         vector[dofs] += force[:, None] * weights
         points.append((e, float(X[0]), np.outer(weights, force)))
-    return vector, Spread(stations=tuple(e + xi for e, xi, _ in points), points=tuple(points))
+    return vector, Distribution(stations=tuple(e + xi for e, xi, _ in points), points=tuple(points))
 
 
-def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
-    """The Spread of a ``traction`` or ``pressure`` on facets (n,)."""
+def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Distribution:
+    """The Distribution of a ``traction`` or ``pressure`` on facets (n,)."""
     n, ne = mesh.p.shape[1], mesh.nelements
     on = np.zeros(n + 2 * ne, dtype=bool)
     on[np.asarray(facets)] = True
     stations = tuple(station_of_node(mesh, k) for k in on[:n].nonzero()[0].tolist())
-    return Spread(faces=(on[n:n + ne], on[n + ne:]), stations=stations, **how)
+    return Distribution(faces=(on[n:n + ne], on[n + ne:]), stations=stations, **how)
 
 
 def station_of_node(mesh: MeshBeam, node: int) -> float:

@@ -78,5 +78,5 @@ class StrainEnergy(Energy):
         out[2:, 2:] = moduli_of(law, F, frame).reshape(4, 4, *y.shape[1:])
         return out
 
-    def spread(self, u: Any) -> None:
+    def distribution(self, u: Any) -> None:
         return None

@@ -89,7 +89,7 @@ def recover(state: Any, number: int, at: list[float], u: Array,
             if load.beam is beam:
                 at_rest = state.base is not None and not load.first_order
                 factor, now = load.acting(t)
-                loads.append((scale * factor, now.spread(
+                loads.append((scale * factor, now.distribution(
                     (state.base if at_rest else state).u_of(number))))
         sampled, places = distributed(state, beam, unit)
         acceleration = viscous = None

@@ -92,10 +92,10 @@ def _kinks(state):
     for load in state.system.loads:
         if not hasattr(load.beam, "mesh"):
             continue  # a rigid body
-        spread, vector = getattr(load, "_spread", None), getattr(load, "vector", None)
-        if vector is None or spread is None or len(spread.stations) != 1:
+        distribution, vector = getattr(load, "_distribution", None), getattr(load, "vector", None)
+        if vector is None or distribution is None or len(distribution.stations) != 1:
             continue
-        beam, station = load.beam, spread.stations[0]
+        beam, station = load.beam, distribution.stations[0]
         force = state.load * load.factor(state.t) * vector.reshape(-1, beam.nd // 2, 2)[:, 0].sum(0)
         at_node = abs(station - round(station)) < SNAP
         if not np.any(force) or (at_node and beam.element.axis_degree == 3):
