@@ -347,6 +347,10 @@ def test_layers_have_the_colours_of_their_materials():
     colours = {tuple(c.get_facecolor()[0]) for c in marked(ax, "layer")}
     assert colours == {p.get_facecolor() for p in ax.get_legend().get_patches()}
     assert len(colours) == 2 and Scene(line()).plot().get_legend() is None
+    many = [Beam(line().mesh.translated((0, k)), ElementBeamANCF(2),
+                 StVenantKirchhoff(1e6 * (k + 1), 0.3), width=0.1) for k in range(9)]
+    assert not marked(Scene(*many).plot(), "layer")  # no colour stands for two materials
+    assert len(marked(Scene(*many[1:]).plot(), "layer")) == 8
 
 
 def test_what_acts_along_a_body_is_written_beside_it():

@@ -141,7 +141,7 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
     scenery = Scenery([state], "displacement", thickness, True, None, (8, 2), False)
     scenery.margin, inside = WIDE, ax is not None
     if ax is None:
-        ax = Figure(figsize=_figsize(scenery.every[:, :2], len(_laws(state.beams)) > 1),
+        ax = Figure(figsize=_figsize(scenery.every[:, :2], bool(_laws(state.beams))),
                     layout="constrained").add_subplot()
     paint(ax, scenery, [0], None, BODIES[0])
     _materials(ax, scenery, state.beams, (8, 2), inside)
@@ -159,9 +159,10 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
 
 
 def _laws(beams):
+    """The legend text of each material and its colour; none for one material or too many."""
     every = dict.fromkeys(layer.material for beam in beams for layer in beam.across.layers)
-    said = dict.fromkeys(map(_law, every))
-    return {text: BODIES[k % len(BODIES)] for k, text in enumerate(said)}
+    texts = dict.fromkeys(map(_law, every))
+    return dict(zip(texts, BODIES)) if 1 < len(texts) <= len(BODIES) else {}
 
 
 def _law(material):
@@ -175,7 +176,7 @@ def _materials(ax, scenery, beams, subdivide, inside):
     from matplotlib.patches import Patch
 
     colours = _laws(beams)
-    if len(colours) == 1:
+    if not colours:
         return
     for body, beam in zip(scenery.frames[0], beams):
         which, layers = layers_of(beam, subdivide), beam.across.layers
@@ -185,7 +186,7 @@ def _materials(ax, scenery, beams, subdivide, inside):
                 body.cells_of(which == k, scenery.factor), facecolor=colour, edgecolor=colour,
                 linewidth=0.3, zorder=1.2, gid="layer"))
     ax.legend(handles=[Patch(facecolor=colour, edgecolor=INK, linewidth=0.5, label=text)
-                       for text, colour in list(colours.items())[:len(BODIES)]],
+                       for text, colour in colours.items()],
               fontsize=8, frameon=False, **({} if inside else {
                   "loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}))
 
