@@ -279,7 +279,8 @@ for _name in ("strain", "stress", "displacements"):
 call("Scene", lambda **k: Scene(*k.values()), beams=beam())
 call("scene.clamp", of(free, "clamp"), "thickness=name", boundary="left", beam=0, thickness="fixed")
 call("scene.pin", of(free, "pin"), boundary="left", beam=0)
-call("scene.fix", of(free, "fix"), boundary="left", names=["r^1"], displacement=0.0, beam=0)
+call("scene.fix", of(free, "fix"), "displacement=varying", boundary="left", names=["r^1"],
+     displacement=0.0, beam=0)
 call("scene.damping", moving(clamped, "damping"), "stiffness=not_negative modal=ratios", mass=0.1,
      stiffness=1e-3, modal=[0.1])
 call("scene.spring", moving(clamped, "spring"), between=((1.0, 0.0), (1.0, 0.5)), k=1.0,

@@ -82,6 +82,7 @@ class PrescribedDisplacement(Joint):
         dofs = member.dofs(self.at, self.names)
         self.equations = tuple(f"force on {member.dofnames[d % member.nd]}" for d in dofs)
         self.dofs = dofs + layout.offset(member)
+        self.offset(np.zeros(1), 0)  # what is wrong with the function is said here
 
     def value(self, u: Array, t: float) -> Array:
         return u[self.dofs] + self.offset(np.array([t]), len(u))[0]
