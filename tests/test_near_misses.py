@@ -87,3 +87,5 @@ def test_constructors_and_methods_that_add_items_name_their_arguments(things):
             call()
     with pytest.raises(InputError, match=r"'y'; known: .* did you mean 'r\^2'\?"):
         things["Scene"].fix("right", "y")
+    with pytest.raises(InputError, match="'load'; known: 'loads', 'beams', 'mesh', .*'loads'"):
+        things["Scene"].replace(load=[])

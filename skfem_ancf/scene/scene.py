@@ -16,8 +16,8 @@ from ..actions.loads import Load
 from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
-from ..core.errors import (ConvergenceError, InputError, Interrupted, ask, require_finite,
-                           require_finite_scalar, require_function, require_label,
+from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, ask,
+                           require_finite, require_finite_scalar, require_function, require_label,
                            require_positive, shown)
 from ..core.steps import Steps
 from ..core.types import Array, StrPath
@@ -235,7 +235,13 @@ class Scene(Model):
             if changes or (loads is None and beams is None):
                 k = self.layout.beams.index(select_beam(self.beams, beam))
                 beams = list(self.beams if beams is None else beams)
-                beams[k] = beams[k].replace(**changes)
+                try:
+                    beams[k] = beams[k].replace(**changes)
+                except NameUnknown as error:
+                    if error.name in changes:  # arguments of the scene are known, too
+                        error = NameUnknown(error.kind, error.name,
+                                            ["loads", "beams", *error.known])
+                    raise error from None
             scene = self if beams is None else self._on(beams)
             return scene if loads is None else scene._loaded(loads)
 
