@@ -171,7 +171,7 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
 
 
 def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
-    """Of beams that contain a point those with the nearest axes; all others if a body does, too."""
+    """The members ``found`` with the nearest axes if all are beams, else all."""
     beams: list[Any] = [layout.members[k] for k in found]
     if len(found) < 2 or isinstance(at, str) or not all(isinstance(b, Beam) for b in beams):
         return found

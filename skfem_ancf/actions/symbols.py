@@ -319,7 +319,7 @@ def _support(at, fixed, direction=(0.0, -1.0)):
 
 
 def _support_of(layout, beam, at, fixed):
-    """What holds a point: of a beam at a node, away from it, else from below."""
+    """A support symbol: at a node of a beam outward, elsewhere below."""
     member, direction = layout.beam(beam), (0.0, -1.0)
     if isinstance(member, Beam):
         off = np.hypot(*(member.mesh.p - at.start[:, None]))
