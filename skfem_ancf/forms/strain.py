@@ -42,13 +42,7 @@ def strain_energy(beam: Any) -> Energy:
 
 
 class StrainEnergy(Energy):
-    """The energy of :func:`strain_energy`.
-
-    Parameters
-    ----------
-    beam
-        The beam.
-    """
+    """The energy of :func:`strain_energy`, of a ``beam``."""
 
     def __init__(self, beam: Any = None) -> None:
         super().__init__(strain_energy, strain_energy, strain_energy, beam=beam, scaled=False)

@@ -21,20 +21,12 @@ LINE = re.compile("line([0-9]*)")
 
 def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
                     tol: float | None = None) -> FrameGraph:
-    """The graph of the line cells of a mesh.
+    """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF.
 
-    Parameters
-    ----------
-    mesh
-        A ``meshio.Mesh``, or a file of meshio or DXF. Cells "line" are straight, "line3", "line4",
-        ... are polynomials through their points, "vertex" cells name nodes.
-    groups
-        Names of the sets of lines that become beams; by default those in ``named``, and those that
-        share no line with another set.
-    named
-        Names that other arguments of the caller refer to.
-    tol
-        As for :class:`FrameGraph`.
+    Cells "line" are straight, "line3", "line4", ... are polynomials through their points, "vertex"
+    cells name nodes. ``groups`` are names of the sets of lines that become beams; by default those
+    in ``named``, to which other arguments refer, and those that share no line with another set.
+    ``tol`` is as for :class:`FrameGraph`.
     """
     mesh = _mesh_of(mesh)
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):

@@ -30,26 +30,12 @@ class Nodes(Joint):
     for supports of the leader ``r - r_0 = d`` and ``(cos a, sin a) x g = 0``. Linear solvers use
     unknowns of the nodes instead of the multipliers, see :mod:`skfem_ancf.equations.condensation`.
 
-    Parameters
-    ----------
-    nodes, hinged
-        The node of each end, and whether it is hinged, shape (ends,).
-    fixed
-        Whether position x, y and rotation of each node are fixed, (number, 3).
-    graph, lines
-        The frame graph, and the number of the line of each chain, (ends / 2,).
-    settlements
-        Prescribed displacements of supports.
-
-    Attributes
-    ----------
-    leader, followers, turned
-        The leading end at the node of each end; following ends, and those with equal rotation.
-    fixed_x, fixed_y, fixed_angle
-        Leading ends with supports.
-    positions, directions, weights
-        DOFs of each end's position, (ends, 2), and of its section direction, (2, ends, n), with
-        weights (ends, n), padded with zeros.
+    ``nodes, hinged`` are the node of each end, and whether it is hinged, (ends,); ``fixed`` tells
+    whether position x, y and rotation of each node are fixed, (number, 3), and ``settlements`` by
+    how much they are displaced; ``lines`` are the numbers in ``graph`` of the chains, (ends / 2,).
+    Derived: the ``leader`` of each end; ``followers``, and those with equal rotation, ``turned``;
+    leaders with supports ``fixed_x, fixed_y, fixed_angle``; DOFs of ``positions`` (ends, 2) and
+    section ``directions`` (2, ends, n) with ``weights`` (ends, n), padded with zeros.
     """
 
     constant = False
