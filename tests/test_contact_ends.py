@@ -49,6 +49,13 @@ def test_a_wire_hangs_over_a_drum_that_alone_holds_it(element):
     assert np.allclose(x, [-0.302, 0.302], atol=0.05) and np.allclose(y, y[0], atol=1e-3)
 
 
+@pytest.mark.parametrize("mu, heavier", [(0.0, 12.0), (0.1, 20.0)])
+def test_a_wire_slides_off_a_drum_and_the_error_says_so(mu, heavier):
+    scene = wire(mu).point_force((0, -10.0), at=(-1, 0)).point_force((0, -heavier), at=(1, 0))
+    with pytest.raises(SupportError, match="nothing holds the beam along its axis"):
+        scene.solve_static()
+
+
 # a strip in a channel
 
 
@@ -97,6 +104,19 @@ def test_a_rod_is_pressed_end_on_against_a_wall(element, mu, gap):
     scene.fix("left", ["r^2", "r_X^2"] if element is CABLE else ["r^2", "r_Y0^1"])
     state = few(scene.point_force((load, 0), at=(0, 0), amplitude=ramp).run(1.0, increments=5))
     assert np.allclose(state.contact().total, [-load, 0], atol=1e-3 * load)
+
+
+@elements
+def test_a_rod_that_friction_holds_at_a_wall_buckles_out(element):
+    """Straight it would bear hundreds of times Euler's load, in an equilibrium that is unstable."""
+    h, push = 0.01, 0.02
+    scene = Scene(strip(8, 1.0, h, element)).obstacle(Line((1, 0), (-1, 0)), friction=0.3)
+    scene.joint("position", at=(0, 0), r=lambda t: (push * t, 0))
+    scene.fix("left", "r_X^2" if element is CABLE else "r_Y0^1")
+    state = scene.solve_static()
+    euler = np.pi**2 * 2e8 * h**4 / 12
+    assert state.stability == "stable" and state.iterations < 100
+    assert 0.5 * euler < -state.contact().total[0] < 2.1 * euler
 
 
 # a circle that touches
@@ -210,3 +230,22 @@ def test_a_wiper_blade_presses_evenly(element):
     inside = np.abs(contact.points[0]) < 0.3 * L
     assert state.iterations <= MOST and inside.sum() > 20
     assert np.allclose(contact.pressure[inside], F / L / width, rtol=1e-2)
+
+
+@elements
+def test_a_rod_presses_by_its_force_over_its_end(element):
+    """A corner is a point of two faces, and its force is on the one that touches."""
+    h, F = 0.01, 10.0
+    scene = Scene(strip(4, 0.1, h, element)).obstacle(Line((0.1, 0), (-1, 0)))
+    scene.fix("left", ["r^2", "r_X^2"] if element is CABLE else ["r^2", "r_Y0^1"])
+    contact = scene.point_force((F, 0), at="left").solve_static().contact()
+    assert np.allclose(contact.pressure, F / h**2, rtol=1e-2)
+
+
+@elements
+def test_a_strip_presses_by_its_weight_up_to_its_ends(element):
+    h = 0.01
+    scene = Scene(strip(16, 1.0, h, element)).obstacle(Line((0, -h / 2)), friction=0.3)
+    contact = scene.gravity((0, -9.81)).solve_static().contact()
+    assert contact.points[0].min() < 1e-3 and contact.points[0].max() > 0.999
+    assert np.allclose(contact.pressure, 7800 * h * 9.81, rtol=1e-2)

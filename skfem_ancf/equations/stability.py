@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS, Inertia
@@ -16,6 +18,8 @@ logger = logging.getLogger(__name__)
 
 #: Smallest stiffness of unconstrained motions, relative to that of the loads.
 STABILISING = 1e-6
+#: Largest number of position DOFs for dense eigenvalues.
+DENSE = 64
 #: Largest relative difference of nodal displacements in a rigid translation.
 SAME = 0.2
 #: Relative size of forces that are zero.
@@ -62,7 +66,8 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
 
     Without a potential, as for a pressure with free edges, the tangent K is unsymmetric. det K < 0
     (an odd number of negative eigenvalues) means divergence: unstable. A positive definite
-    symmetric part excludes it. All else is undecided, and flutter depends on the mass: see
+    symmetric part excludes it. Otherwise an eigenvalue with a negative real part, for equal masses
+    at the nodes, means unstable. All else is undecided, and flutter depends on the mass: see
     ``scene.modes``.
     """
     try:
@@ -84,9 +89,44 @@ def verdict_of_factors(system: Any) -> Verdict:
     if system.solver.determinant_sign() < 0:
         return Verdict("unstable", negative, f"by divergence: {who} no potential")
     if negative:
+        if _diverges(system):
+            return Verdict("unstable", negative, f"by divergence: {who} no potential")
         return Verdict("undecided", negative, f"{who} no potential, and only the symmetric "
                        "part of the tangent is indefinite: see scene.modes")
     return Verdict("singular" if singular else "stable", 0, RUBS if rubs else FOLLOWS)
+
+
+def _diverges(system):
+    """True if a motion grows, by the factors: an eigenvalue has a negative real part.
+
+    As of equal masses at the nodes.
+    """
+    at, inverse = inverse_on_positions(system)
+    if len(at) <= DENSE:
+        return bool(np.any(np.linalg.eigvals(np.array([inverse(y)[at] for y in np.eye(len(at))])
+                                             ).real < 0.0))
+    G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
+    try:
+        return bool(eigs(G, k=1, which="SR", v0=G @ np.ones(len(at)), tol=1e-3,
+                         return_eigenvectors=False)[0].real < 0.0)
+    except ArpackNoConvergence:
+        return False
+
+
+def inverse_on_positions(system: Any) -> tuple[Array, Callable[[Array], Array]]:
+    """Free positions of nodes (n,), and a function of forces there (n,): the displacement (N,).
+
+    By the factors of the tangent.
+    """
+    at = np.nonzero((position_weights(system) > 0) & system.constraints.free)[0]
+    none = np.zeros(system.constraints.m)
+
+    def inverse(y):
+        b = np.zeros(system.N)
+        b[at] = np.ravel(y)
+        return system.solver.solve(b, none)[0]
+
+    return at, inverse
 
 
 def _is_symmetric(system):

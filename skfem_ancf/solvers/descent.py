@@ -13,7 +13,8 @@ from ..actions.forces.turns import Turns
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS
 from ..core.types import Array
-from ..equations.stability import position_weights, potential, verdict
+from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
+                                   position_weights, potential, verdict)
 from ..equations.system import System
 from .outcome import Equilibrium, StaticResult, StepFailed
 
@@ -23,10 +24,11 @@ logger = logging.getLogger(__name__)
 STRIDES = (0.1, 0.02, 0.004)
 #: First displacement along a negative direction, relative to the scene's size.
 KICK = 0.02
+#: Size of small corrections, number of consecutive small ones that indicates a stall at an unstable
+#: point, and number of inverse iterations for the softest direction.
+SMALL, STALLED, POWERS = 1e-3, 4, 4
 #: Number of unstable points that a descent may leave.
 KICKS = 6
-#: Largest number of position DOFs for dense eigenvalues.
-DENSE = 64
 #: Ratio of compliances that indicates a limit point.
 SOFTER = 8.0
 #: Number of step cuts at unstable points before the path counts as unstable.
@@ -35,6 +37,9 @@ CUTS = 3
 DESCENT = 200
 #: Largest radius, and displacement that counts as diverged, relative to the scene's size.
 LARGEST, LOST = 0.5, 20.0
+#: Number of iterations between stored displacements; smallest cosine between successive changes, and
+#: smallest change relative to the scene's size, of a rigid motion without end.
+BACK, ONWARD, AWAY = 50, 0.5, 0.01
 #: How often a correction through an obstacle is halved.
 HALVED = 8
 
@@ -96,15 +101,35 @@ class Descent:
         self._sizes = system.constraints.coordinate_sizes
         self._radius, self._largest = stride, min(5.0 * stride, LARGEST)
         self._shift, self._before = 0.0, np.zeros(system.N)
+        self._small, self._calls, self._passed = 0, 0, []  # displacements (N,) on the way
+
+    def onward(self) -> tuple[Array, Array] | None:
+        """The displacement and its last change (N,) of a motion without end; else None."""
+        if len(self._passed) < 3:
+            return None
+        last, before = self._passed[-1] - self._passed[-2], self._passed[-2] - self._passed[-3]
+        along, far = self.product(last, before), AWAY * self.system.size
+        if largest_displacement(self.system, last) < far or along < ONWARD * np.sqrt(
+                self.product(last, last) * self.product(before, before)):
+            return None
+        return self._passed[-1], last
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                    dm: Array) -> bool:
         """Solve for a correction within a kernel; False on failure."""
         if np.max(np.abs(u / self._sizes)) > LOST:
             return False
+        self._calls += 1
+        if self._calls % BACK == 0:
+            self._passed.append(u.copy())
         found = self._bounded(lambda: self.system.solver.factorize(u, t, multipliers), R, phi)
         if found is None:
             return False
+        small = (self._shift > 0.0 and np.max(np.abs(found[0] / self._sizes)) < SMALL
+                 and not self.system.constraints.missing_supports)  # no rigid motion
+        self._small = self._small + 1 if small else 0
+        if self._small == STALLED:
+            found, self._small = (found[0] + self._softest(R, found[0]), found[1]), 0
         du[:], dm[:] = self._held_back(t, u, *found)
         now, before = du / self._sizes, self._before
         along = now @ before / (np.sqrt(now @ now * (before @ before)) or 1.0)
@@ -114,6 +139,14 @@ class Descent:
             self._radius = min(1.5 * self._radius, self._largest)
         self._before = now
         return True
+
+    def _softest(self, R, v):
+        """A step along the softest direction, which leaves an unstable point."""
+        none = np.zeros(self.system.constraints.m)
+        for _ in range(POWERS):
+            v = self.system.solver.solve(v / self._sizes**2, none)[0]
+            v = v / (np.max(np.abs(v / self._sizes)) or 1.0)
+        return KICK * (v if R @ v >= 0.0 else -v)
 
     def _held_back(self, t, u, du, dm):
         """Shorten a correction until nothing passes through an obstacle."""
@@ -183,14 +216,7 @@ class Descent:
         return float(np.max(values, initial=0.0))
 
     def _inverse_eigenvectors(self, count, which):
-        at = np.nonzero((self._weights > 0) & self.system.constraints.free)[0]
-        none, N = np.zeros(self.system.constraints.m), self.system.N
-
-        def inverse(y):
-            b = np.zeros(N)
-            b[at] = np.ravel(y)
-            return self.system.solver.solve(b, none)[0]
-
+        at, inverse = inverse_on_positions(self.system)
         count = min(count, len(at))
         if not count:
             return inverse, np.zeros(0), np.zeros((0, 0))

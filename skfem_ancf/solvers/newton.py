@@ -18,7 +18,7 @@ from ..equations import stability
 from ..equations.system import System
 from . import descent
 from .increment import Increment, Options, Route
-from .outcome import Attempt, Equilibrium, Soft, StaticResult, StepFailed, Unstable
+from .outcome import Attempt, Away, Equilibrium, Soft, StaticResult, StepFailed, Unstable
 from .strategies import STABILISED_BY_LOADS, STRATEGIES, Strategy
 
 logger = logging.getLogger(__name__)
@@ -28,6 +28,8 @@ ITERATIONS = 10
 MAX_ITERATIONS = 10000
 #: Number of iterations of load steps, and of cuts of the first step, before the next strategy.
 FEW, CUT = 60, 3
+#: Largest number of iterations of all strategies for the whole load, in scenes with obstacles.
+MOST = 1000
 #: Number of unstabilised equilibria after which the search without friction ends.
 UNSTABILISED = 2
 #: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, others a single iteration.
@@ -163,6 +165,8 @@ class Search:
                 self._note(strategy.name, str(failure))
                 self._unstable = self._unstable or isinstance(failure, Unstable)
                 self._failure = failure
+                if self._exhausted or isinstance(failure, Away):
+                    break
                 if self._unstabilised == UNSTABILISED and not self.rubs:
                     break
                 continue
@@ -185,6 +189,7 @@ class Search:
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
+        self._spent = 0
         if failure:
             logger.info("%s: %s", self.attempts[-1], failure)
 
@@ -222,10 +227,16 @@ class Search:
         text = self.system.constraints.missing_supports
         text += ". No stable equilibrium was found in which the loads hold what is free"
         if self.loose:
-            text += f": at the one found nothing holds {self.loose}"
+            text += f": nothing holds {self.loose}"
         if self.touches and not self.rubs:
             text += ". Obstacles without friction hold nothing along their surface: friction= does"
         return text
+
+    @property
+    def _exhausted(self):
+        """True if all strategies together have reached :data:`MOST`."""
+        spent = self._spent + sum(attempt.iterations for attempt in self.attempts)
+        return self.touches and self.at_once and self.rules.method == "auto" and spent >= MOST
 
     # for strategies
 
@@ -323,6 +334,12 @@ class Search:
                     found = self._firm(found, step, eased)
         except NO_FACTORS as error:
             raise StepFailed("a tangent has no factors") from error
+        except StepFailed as failure:
+            away = down.onward() if self.stabilised_by_loads else None
+            if away is None:
+                raise
+            self.loose = stability.motion_in_words(system, *away)
+            raise Away(f"{failure}, and the scene goes on") from None
         finally:
             self._spent += step.record.iterations
         return step.reached(found)
@@ -412,6 +429,7 @@ class Search:
                     if stable and (cuts > descent.CUTS or size < rules.min_step or many):
                         found = step.rescue(failure)
                     none = rules.few and not result.steps and result.rejected > CUT
+                    none = none or self._exhausted
                     if found is None and (size < rules.min_step or many or none):
                         failure.load = load
                         raise
@@ -431,7 +449,9 @@ class Search:
                 logger.info("load %.6g converged in %d iterations", load, step.record.iterations)
                 if step.record.iterations <= patience * max(8, rules.max_iterations // 3):
                     size *= 2.0
-                if rules.few and spent >= FEW * patience and result.load < 1.0 and not result.doubt:
+                many = rules.few and spent >= FEW * patience and not (
+                    result.doubt and not self.touches)
+                if result.load < 1.0 and (many or self._exhausted):
                     raise StepFailed(f"the full load was not reached in {spent} iterations")
         return result
 

@@ -108,6 +108,10 @@ class Diverging(StepFailed):
     """The first corrections of a load step did not decrease."""
 
 
+class Away(StepFailed):
+    """A descent goes on in a motion that nothing restrains."""
+
+
 class Soft(StepFailed):
     """The second correction of the mixed iteration did far more work than the loads."""
 

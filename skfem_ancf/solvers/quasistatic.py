@@ -22,7 +22,10 @@ logger = logging.getLogger(__name__)
 #: Fraction of the allowed iterations up to which the next increment grows; its growth; reduction
 #: after a failure.
 FEW, LARGER, CUT = 0.7, 1.5, 0.25
-FOLLOWED, JUMPED = "followed", "jumped"
+FOLLOWED, JUMPED, AT_REST = "followed", "jumped", "at rest"
+#: Smallest increment from rest, relative to the largest, of scenes that only loads or obstacles
+#: support: smaller loads stabilise no better.
+CUTS_AT_REST = CUT**3
 #: Iterations of a descent in an increment.
 BOUNDED = 20
 #: Largest number of consecutive jumps.
@@ -52,7 +55,7 @@ def first(system: System, t: float, u: Array | None, memory: Array | None, rules
         search = Search(system, u, memory, rules, stable, False)
         if search.stabilised_by_loads:
             try:
-                return Instant(t, search.at_rest(), "at rest")
+                return Instant(t, search.at_rest(), AT_REST)
             except StepFailed:
                 logger.debug("t = %.6g: not at rest", t)
         result = search.find()
@@ -76,10 +79,12 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
     jumps = 0
     for end in ends[ends > begin.t]:
         most = (end - begin.t) / increments
-        size = most
+        size, least = most, rules.min_step * most
         while begin.t < end:
             t = end if begin.t + 1.001 * size >= end else begin.t + size
-            smallest = size <= rules.min_step * most
+            if begin.way == AT_REST:
+                least = max(least, CUTS_AT_REST * most)
+            smallest = size <= least
             try:
                 found = _next(system, begin, t, rules, stable, smallest)
             except StepFailed as failure:

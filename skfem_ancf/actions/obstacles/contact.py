@@ -88,11 +88,14 @@ def _balanced(group, pressure):
     ends[1, -2 * m:] = ends[0, -2 * m:]
     nodes = np.unique(ends * 4 + side, return_inverse=True)[1].reshape(2, -1)
     touching = pressure > 0.0
+    moved = _corners(group, touching)
+    nodes[:, moved[0]] = nodes[:, moved[1]]
     closed = touching.copy()
     for k in (0, 1):
         along = np.pad(touching[:-2 * m].reshape(-1, 2, m // 2)[:, k].ravel(), m)
         filled = binary_closing(along, np.ones(m // 2 + 1))[m:-m]
         closed[:-2 * m].reshape(-1, 2, m // 2)[:, k] = filled.reshape(-1, m // 2)
+    closed[moved[0]] = False
     shares = group.weights[[0, half]] * group.areas
     force, area = (np.bincount(nodes.ravel(), (shares * factor).ravel())
                    for factor in (pressure, closed))
@@ -100,4 +103,29 @@ def _balanced(group, pressure):
     x = group.starts[:2].reshape(2, 2 * n, m // 2)
     way = np.cumsum(np.hypot(*np.diff(x, axis=2, prepend=x[..., :1])), axis=1)
     xi = (way / np.maximum(way[:, -1:], 1e-300)).ravel()
+    xi[moved[0]] = xi[moved[1]]
     return np.where(touching, (1.0 - xi) * mean[0] + xi * mean[1], 0.0)
+
+
+def _corners(group, touching):
+    """Points at corners, and a point each of the face there that touches more; (2, k).
+
+    A corner is a point of bottom or top and points of an end. A face that touches only there faces
+    away from the obstacle: its force is on the other one.
+    """
+    m, last = group.points, (group.elements - 2) * group.points
+    places, pairs = np.vstack([group.starts[:2], group.offsets]), []
+    for end, element, first in ((last, 0, 0), (last + m, last - m, -1)):
+        ends = np.arange(end, end + m)
+        for side in (element, element + m // 2):
+            sides = np.arange(side, side + m // 2)
+            corner = sides[first]
+            apart = np.abs(places[:, ends] - places[:, [corner]]).max(axis=0)
+            near = apart < 1e-6 * group.height
+            rest = [group.areas[face[touching[face]]].sum() for face in (
+                sides[sides != corner], ends[~near])]
+            if rest[0] < rest[1]:
+                pairs.append((corner, ends[~near][0]))
+            elif rest[0] > rest[1]:
+                pairs += [(i, corner) for i in ends[near]]
+    return np.array(pairs, dtype=int).reshape(-1, 2).T
