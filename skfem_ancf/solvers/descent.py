@@ -37,8 +37,8 @@ CUTS = 3
 DESCENT = 200
 #: Largest radius, and displacement that counts as diverged, relative to the scene's size.
 LARGEST, LOST = 0.5, 20.0
-#: Number of iterations between stored displacements; smallest cosine between successive changes, and
-#: smallest change relative to the scene's size, of a rigid motion without end.
+#: Number of iterations between stored displacements; smallest cosine between successive changes
+#: and smallest change, relative to the scene's size, of a motion without end.
 BACK, ONWARD, AWAY = 50, 0.5, 0.01
 #: How often a correction through an obstacle is halved.
 HALVED = 8
