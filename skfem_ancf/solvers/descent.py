@@ -101,7 +101,8 @@ class Descent:
         self._sizes = system.constraints.coordinate_sizes
         self._radius, self._largest = stride, min(5.0 * stride, LARGEST)
         self._shift, self._before = 0.0, np.zeros(system.N)
-        self._small, self._calls, self._passed = 0, 0, []  # displacements (N,) on the way
+        self._small = self._calls = 0
+        self._passed: list[Array] = []
 
     def onward(self) -> tuple[Array, Array] | None:
         """The displacement and its last change (N,) of a motion without end; else None."""
