@@ -163,6 +163,27 @@ def test_a_beam_follows_two_rollers_that_move(element, mu):
     assert state.position((0.8, 0))[1] == pytest.approx(0.05, abs=2e-3)
 
 
+# a shallow arch that a circle pushes through
+
+
+@elements
+def test_an_arch_does_not_pass_through_the_circle_that_snaps_it(element):
+    """In one step the circle would be below the arch, and lift it."""
+    h, rise, R, way = 0.01, 0.04, 0.05, 0.1
+    mesh = MeshBeam.init_curve(lambda s: np.array([s, rise * np.sin(np.pi * s)]),
+                               np.linspace(0, 1, 17), h)
+    scene = Scene(Beam(mesh, element, RUBBER, width=h)).pin("left").pin("right")
+    scene.obstacle(Circle((0.5, rise + h / 2 + R), R), friction=0.3,
+                   position=lambda t: (0, -way * t))
+    try:
+        state = scene.solve_static()
+    except ConvergenceError as error:
+        assert "scene.run" in str(error)
+        return
+    assert state.contact().total[1] < 0.0
+    assert state.displacement((0.5, rise))[1] == pytest.approx(-way, rel=0.02)
+
+
 # a chain on the sea bed
 
 

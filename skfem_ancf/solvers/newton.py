@@ -216,6 +216,9 @@ class Search:
         elif isinstance(failure, Unstable):
             text += ("No stable equilibrium was found from there: stable=False accepts the "
                      "unstable one, scene.continuation() follows the path")
+        elif self.touches:
+            text += ("Around obstacles the way matters: use scene.run(), which takes it in small "
+                     "increments; or a larger max_iterations")
         else:
             text += ("Beyond a limit point there is none: use scene.continuation(). Otherwise more "
                      "elements or a larger max_iterations may help")
@@ -319,6 +322,10 @@ class Search:
         far = options._replace(most=min(most, 7 * self.rules.max_iterations))
 
         contacts.put_back(self._memory)
+        # descents start where obstacles have moved to
+        times = (route.acting(level)[1] for level in (0.0, 1.0))
+        if passed := contacts.passed(*((result.u, t) for t in times)):
+            raise StepFailed(passed)
 
         def iterate(begin: Any) -> Equilibrium:
             return step.iterate(begin, far, down)
