@@ -116,7 +116,7 @@ def test_a_rod_that_friction_holds_at_a_wall_buckles_out(element):
     state = scene.solve_static()
     euler = np.pi**2 * 2e8 * h**4 / 12
     assert state.stability == "stable" and state.iterations < 100
-    assert 0.5 * euler < -state.contact().total[0] < 2.1 * euler
+    assert euler < -state.contact().total[0] < 4.1 * euler  # its end is hinged or flat
 
 
 # a circle that touches
