@@ -206,6 +206,21 @@ def test_a_chain_on_the_sea_bed_is_pulled_by_its_end(element, mu, pinned):
         pytest.approx(40 * w, rel=1e-3))
 
 
+@pytest.mark.parametrize("pull", [0.5, 1.0])
+def test_a_chain_of_hinged_bars_is_pulled_by_its_end(pull):
+    """Those bars slip that the pull reaches, in units of the weight of a bar."""
+    h, n, w = 0.05, 6, 7800 * 0.05**2 * 9.81
+    law = StVenantKirchhoff(2e9, 0.3, 7800.0)
+    scene = Scene(*(strip(2, 1.0, h, ElementBeamCable(3), (k, 0.0), law) for k in range(n)))
+    for k in range(n - 1):
+        scene.hinge((k, "right"), (k + 1, "left"))
+    scene.gravity((0, -9.81)).obstacle(Line((0, -h / 2)), friction=0.3)
+    scene.point_force((pull * w, 0), at="right", beam=n - 1)
+    state = scene.solve_static()
+    assert state.iterations <= MOST
+    assert np.allclose(state.contact().total, [-pull * w, n * w], atol=1e-3 * w)
+
+
 def test_a_chain_that_nothing_anchors_says_so():
     scene = Scene(strip(10, 10.0, 0.05)).gravity((0, -9.81)).obstacle(Line((0, -0.025)))
     with pytest.raises(SupportError, match=r"nothing holds the beam along \(1, 0\).*friction="):

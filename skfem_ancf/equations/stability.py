@@ -103,14 +103,15 @@ def _diverges(system):
     """
     at, inverse = inverse_on_positions(system)
     if len(at) <= DENSE:
-        return bool(np.any(np.linalg.eigvals(np.array([inverse(y)[at] for y in np.eye(len(at))])
-                                             ).real < 0.0))
+        values = np.linalg.eigvals(np.array([inverse(y)[at] for y in np.eye(len(at))]))
+        return bool(np.any(values.real < -ROUND_OFF * np.abs(values).max(initial=0.0)))
     G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
     try:
-        return bool(eigs(G, k=1, which="SR", v0=G @ np.ones(len(at)), tol=1e-3,
-                         return_eigenvectors=False)[0].real < 0.0)
+        least, largest = (eigs(G, k=1, which=which, v0=G @ np.ones(len(at)), tol=1e-3,
+                               return_eigenvectors=False)[0] for which in ("SR", "LM"))
     except ArpackNoConvergence:
         return False
+    return bool(least.real < -ROUND_OFF * abs(largest))
 
 
 def inverse_on_positions(system: Any) -> tuple[Array, Callable[[Array], Array]]:
