@@ -280,7 +280,7 @@ def test_what_cannot_be_recovered_is_raw_and_says_why():
         return -v.grad[1, 0]
 
     state = small_beam(element, lambda s: s.load(push))
-    assert "not known" in state.recovered[0] and state.recovery() is None
+    assert "unknown" in state.recovered[0] and state.recovery() is None
     assert_allclose(state.strain((0.3, 0.02)), state.strain((0.3, 0.02), recover=False))
     scene = gravity_cantilever(element)
     assert scene.recovered == {0: ""}
