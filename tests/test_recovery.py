@@ -286,6 +286,6 @@ def test_what_cannot_be_recovered_is_raw_and_says_why():
     assert scene.recovered == {0: ""}
     bare = Scene(*scene.beams).clamp("left")
     shape = bare.state(1e-3 * np.sin(np.arange(scene.system.N)))
-    assert "no equilibrium" in shape.recovered[0]
+    assert "not an equilibrium" in shape.recovered[0]
     mode = Scene(*scene.beams).clamp("left").modes(1, scene).mode(0, 0.1)
     assert "those of the elements" in mode.recovered[0] and mode.recovery() is None
