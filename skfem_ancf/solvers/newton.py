@@ -20,6 +20,7 @@ from . import descent
 from .increment import Increment, Options, Route
 from .outcome import Attempt, Away, Equilibrium, Soft, StaticResult, StepFailed, Unstable
 from .strategies import STABILISED_BY_LOADS, STRATEGIES, Strategy
+from .touching import SOON
 
 logger = logging.getLogger(__name__)
 
@@ -292,7 +293,10 @@ class Search:
         """The equilibrium at the end of a route in one step."""
         route = route or self.route
         result = self._beginning(route)
-        step = Increment(self.system, result, 1.0, self._options(route, method, watched=True))
+        options = self._options(route, method, watched=True)
+        if self.touches and self.stable:  # a descent follows
+            options = options._replace(most=min(SOON, options.most))
+        step = Increment(self.system, result, 1.0, options)
         try:
             with np.errstate(all="ignore"):  # overflow shows in the residual
                 found = step.solve(self._wanted(route))
