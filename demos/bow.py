@@ -10,7 +10,7 @@ three phases starts from the equilibrium of the one before.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.integrate import solve_bvp
+from scipy.integrate import solve_bvp, trapezoid
 
 from skfem_ancf import (Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, Steps,
                         StVenantKirchhoff)
@@ -75,7 +75,7 @@ nock, force = history.sensors["nock"][:, 0], history.sensors["force"]
 stored = 2 * np.ptp(history.strain_energy)
 print(f"brace height {100 * nock[0]:.1f} cm; {pull:g} N at {nock[-1] / inch:.1f} in, and "
       f"{stored:.1f} J, {stored / pull / np.ptp(nock):.2f} of the pull times the way")
-assert np.isclose(stored, np.trapezoid(force, nock), rtol=5e-3)
+assert np.isclose(stored, trapezoid(force, nock), rtol=5e-3)
 
 # %%
 # The draw curve, and the stress on the back of the limb, the face away from the archer.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_bvp
+from scipy.integrate import solve_bvp, trapezoid
 
 from skfem_ancf import (Beam, CallbackError, Circle, ConvergenceError, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, InputError, Line, MeshBeam,
@@ -200,7 +200,7 @@ def test_a_strip_is_bent_around_a_drum_drawn_over_it_and_springs_back():
     for history, force, down in (smooth, rough):
         bent, drawn = history.during("bend")[-1], history.during("draw")[-1]
         k = np.arange(bent, drawn + 1)
-        given = np.trapezoid(force[k], way(history.t[k])) - pull * (down[drawn] - down[bent])
+        given = trapezoid(force[k], way(history.t[k])) - pull * (down[drawn] - down[bent])
         stored, rubbed = (x[drawn] - x[bent] for x in (history.strain_energy, history.dissipated))
         assert np.isclose(given - stored, rubbed, atol=1e-3 * pull * 0.05)
         assert np.all(np.diff(history.dissipated) >= 0.0)
@@ -232,7 +232,7 @@ def elastica_bow(string, places):
                                       b[3] - string * np.cos(p[1])]), s, y, p, tol=1e-6)
         assert result.success
         s, y, p = result.x, result.y, result.p
-        out.append((2 * p[0] * np.sin(p[1]), np.trapezoid(y[1]**2, s)))
+        out.append((2 * p[0] * np.sin(p[1]), trapezoid(y[1]**2, s)))
     return np.array(out).T
 
 
