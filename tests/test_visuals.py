@@ -120,6 +120,12 @@ def test_colour_bars_say_the_unit(state):
         state.plot("S_xx", unit=1)
 
 
+def test_the_bar_of_a_function_without_a_name_says_the_unit(state):
+    ax = state.plot(lambda v: 1e-6 * v["S_xx"], unit="MPa")
+    found = {text for bar in ax.figure.axes for text in (bar.get_xlabel(), bar.get_ylabel())}
+    assert "(MPa)" in found and not any("lambda" in text for text in found)
+
+
 def test_several_states_share_a_picture():
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamANCF(2),
                 StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.02)

@@ -89,9 +89,10 @@ class Field:
 
     @property
     def symbol(self) -> str:
-        """The formula in the title, or all of it."""
+        """The formula in the title, or all of it; "" for a function without a name."""
         formula = re.search(r"\$[^$]+\$", self.title)
-        return formula.group() if formula else self.title or self.name
+        name = "" if self.name == "lambda" else self.name
+        return formula.group() if formula else self.title or name
 
     def of(self, values: Values) -> Array:
         """The field at the points of Values, (n,) or (components, n)."""

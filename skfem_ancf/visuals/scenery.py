@@ -285,7 +285,7 @@ class Scenery:
     def label(self, text: str, unit: str | None) -> str:
         """A text with the unit; by default that of the field in the scene; "" for none."""
         unit = unit_of(self.field, units_of(self._states[0])) if unit is None else unit
-        return text if unit in ("", "1") else f"{text} ({unit})"
+        return text if unit in ("", "1") else f"{text} ({unit})".strip()
 
     def colours(self, cmap: Any) -> Any:
         """The given colour map, or by default one that fits the field."""
