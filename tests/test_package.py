@@ -195,8 +195,8 @@ def test_the_readme_runs_with_the_dependencies_alone(tmp_path):
 
 
 def test_what_is_heavy_is_imported_when_it_is_needed():
-    heavy = ("scipy.spatial", "scipy.optimize", "scipy.interpolate", "scipy.integrate", "numba",
-             "meshio", "matplotlib", "pyvista", "h5py", "tqdm")
+    heavy = ("scipy.spatial", "scipy.optimize", "scipy.interpolate", "scipy.integrate",
+             "scipy.ndimage", "numba", "meshio", "matplotlib", "pyvista", "h5py", "tqdm")
     code = f"import sys, skfem_ancf; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], text=True, check=True,
                           stdout=subprocess.PIPE)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 from ..actions.obstacles.outlines import obstacles_of
 from ..core.archive import output_file
@@ -74,6 +73,8 @@ class PvdWriter(SeriesWriter):
         t
             Its time, later than that of the previous frame.
         """
+        from xml.sax.saxutils import quoteattr  # which imports http and ssl
+
         t = require_next(state, t, self.frames[-1][0] if self.frames else None)
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
         frame = save_vtu(state, self.path.with_name(name), **self.options)

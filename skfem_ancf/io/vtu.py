@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
@@ -188,6 +187,8 @@ def _write(path, body, dtype, units=()):
 
 def _completed(text, body, units):
     """Add field data, names of components and units, which meshio does not write."""
+    from xml.sax.saxutils import escape, quoteattr  # which imports http and ssl
+
     facts = "".join(
         f'<DataArray type="{"Int64" if x.dtype.kind == "i" else "Float64"}" Name={quoteattr(name)}'
         f' NumberOfTuples="{len(x)}" format="ascii">{" ".join(map(repr, x.tolist()))}</DataArray>\n'

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import binary_closing
 
 from ...core.errors import InputError, require_index
 from ...core.types import Array
@@ -81,6 +80,8 @@ def _balanced(group, pressure):
     between two in contact count if these are less than an element apart. The positions of both
     nodes have the functions number 0 and half; each side of the beam is separate.
     """
+    from scipy.ndimage import binary_closing  # its import takes as long as a solution
+
     n, m, half = group.elements, group.points, len(group.weights) // 2
     side = np.tile(np.arange(m) // (m // 2), n)
     side[-2 * m:] = 2 + np.repeat((0, 1), m)  # the ends of the beam, each as a whole
