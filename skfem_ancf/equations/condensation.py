@@ -22,6 +22,7 @@ from ..actions.joints.nodes import Nodes, chain_ends
 from ..beam.beam import Beam
 from ..core.linalg import NO_FACTORS, SMALL, BandMatrix, Inertia
 from ..core.types import Array
+from .signature import diagonal_factors
 
 logger = logging.getLogger(__name__)
 
@@ -169,8 +170,8 @@ class Condensed:
         if not n:
             return np.zeros(0), None
         A = sparse.coo_array((ends.ravel()[self._inside], self._entries), (n, n)).tocsc()
-        lu = splu(A, "NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        if not np.array_equal(lu.perm_r, lu.perm_c):
+        lu = diagonal_factors(A, "NATURAL")
+        if lu is None:
             raise np.linalg.LinAlgError("a pivot of the nodes is zero")
         return A.diagonal(), lu
 

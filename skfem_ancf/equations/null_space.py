@@ -7,16 +7,15 @@ Each joint equation eliminates a DOF: ``x = T y + x_0`` with ``J T = 0``. The re
 from __future__ import annotations
 
 import logging
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from ..core.linalg import SMALL, BandMatrix, Inertia
 from ..core.types import Array
-from .signature import DEPENDENT, inertia_of, members
+from .signature import DEPENDENT, Block, blocks, diagonal_factors, inertia_of
 
 logger = logging.getLogger(__name__)
 
@@ -24,34 +23,6 @@ logger = logging.getLogger(__name__)
 DENSE = 100
 #: Largest relative residual of factors without pivoting.
 ROUGH = 1e-8
-
-
-class Block(NamedTuple):
-    """Groups of equations of one size without a common DOF."""
-
-    rows: Array  # equations of each group, (g, k)
-    columns: Array  # DOFs of each group, (g, c)
-    entries: Array  # numbers of the entries of J in these groups
-    places: Array  # their positions in a flat array of shape (g, k, c)
-
-
-def blocks(rows: Array, columns: Array, m: int, n: int) -> list[Block]:
-    """Independent groups of the rows of a matrix (m, n) with entries (k,)."""
-    links = sparse.coo_array((np.ones(len(rows)), (rows, m + columns)), (m + n, m + n))
-    number, group = connected_components(links, directed=False)
-    (all_rows, row), (all_columns, column) = (members(x, number) for x in (group[:m], group[m:]))
-    shape = np.array([[len(x) for x in all_of] for all_of in (all_rows, all_columns)]).T
-    out = []
-    for k, c in np.unique(shape[shape[:, 0] > 0], axis=0):
-        some = np.flatnonzero(np.all(shape == (k, c), axis=1))
-        place = np.full(number, -1)
-        place[some] = np.arange(len(some))
-        entries = np.flatnonzero(place[group[rows]] >= 0)
-        i, j = rows[entries], columns[entries]
-        out.append(Block(np.array([all_rows[g] for g in some]),
-                         np.array([all_columns[g] for g in some]).reshape(len(some), c), entries,
-                         (place[group[i]] * k + row[i]) * c + column[j]))
-    return out
 
 
 def eliminated(A: Array) -> tuple[Array, Array, Array]:
@@ -166,15 +137,8 @@ class NullSpace:
 
     def _factors(self, symmetric):
         """LU factors, and whether all pivots are on the diagonal."""
-        if symmetric:
-            try:
-                lu = splu(self._reduced, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                          options={"SymmetricMode": True})
-                if np.array_equal(lu.perm_r, lu.perm_c):
-                    return lu, True
-            except RuntimeError:
-                logger.debug("a pivot on the diagonal is zero")
-        return splu(self._reduced), False
+        lu = diagonal_factors(self._reduced, "MMD_AT_PLUS_A") if symmetric else None
+        return (splu(self._reduced), False) if lu is None else (lu, True)
 
     def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
         """Solve for right-hand sides b (n,) and c (m,); returns x and l."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -78,19 +79,44 @@ def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
         return
     J = sparse.csr_array(J)
     J.eliminate_zeros()
-    (m, n), entries = J.shape, J.tocoo()
-    links = sparse.coo_array((np.ones(J.nnz), (entries.row, m + entries.col)), (m + n, m + n))
+    entries = J.tocoo()
+    found: list[Any] = []
+    for block in blocks(entries.row, entries.col, *J.shape):
+        shape = *block.rows.shape, block.columns.shape[1]
+        A = np.bincount(block.places, entries.data[block.entries], int(np.prod(shape)))
+        found += zip(block.rows, block.columns, A.reshape(shape))
+    yield from sorted(found, key=lambda group: group[0][0])
+
+
+class Block(NamedTuple):
+    """Groups of equations of one size without a common DOF."""
+
+    rows: Array  # equations of each group, (g, k)
+    columns: Array  # DOFs of each group, (g, c)
+    entries: Array  # numbers of the entries of J in these groups
+    places: Array  # their positions in a flat array of shape (g, k, c)
+
+
+def blocks(rows: Array, columns: Array, m: int, n: int) -> list[Block]:
+    """Independent groups of the rows of a matrix (m, n) with entries (k,)."""
+    links = sparse.coo_array((np.ones(len(rows)), (rows, m + columns)), (m + n, m + n))
     number, group = connected_components(links, directed=False)
-    rows, row = members(group[:m], number)
-    columns, column = members(group[m:], number)
-    for g, some in enumerate(members(group[entries.row], number)[0]):
-        if len(rows[g]):
-            A = np.zeros((len(rows[g]), len(columns[g])))
-            A[row[entries.row[some]], column[entries.col[some]]] = entries.data[some]
-            yield rows[g], columns[g], A
+    (all_rows, row), (all_columns, column) = (_members(x, number) for x in (group[:m], group[m:]))
+    shape = np.array([[len(x) for x in all_of] for all_of in (all_rows, all_columns)]).T
+    out = []
+    for k, c in np.unique(shape[shape[:, 0] > 0], axis=0):
+        some = np.flatnonzero(np.all(shape == (k, c), axis=1))
+        place = np.full(number, -1)
+        place[some] = np.arange(len(some))
+        entries = np.flatnonzero(place[group[rows]] >= 0)
+        i, j = rows[entries], columns[entries]
+        out.append(Block(np.array([all_rows[g] for g in some]),
+                         np.array([all_columns[g] for g in some]).reshape(len(some), c), entries,
+                         (place[group[i]] * k + row[i]) * c + column[j]))
+    return out
 
 
-def members(group: Array, number: int) -> tuple[list[Array], Array]:
+def _members(group, number):
     """Members of each group, and the position of each member in its group."""
     order, count = np.argsort(group, kind="stable"), np.bincount(group, minlength=number)
     place, ends = np.empty(len(group), dtype=int), np.cumsum(count)
@@ -136,14 +162,23 @@ def is_definite(A: sparse.csr_array) -> bool:
         return False
 
 
+def diagonal_factors(A: sparse.csc_array, order: str) -> Any:
+    """Sparse LU of a symmetric matrix with all pivots on the diagonal, or None.
+
+    ``order`` is a column ordering of :func:`scipy.sparse.linalg.splu`.
+    """
+    try:
+        lu = splu(A, order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:  # a pivot is zero
+        return None
+    return lu if np.array_equal(lu.perm_r, lu.perm_c) else None
+
+
 def _pivots(A):
     """Pivots of a symmetric matrix with unit diagonal; LinAlgError if they are unreliable."""
     for order in ("MMD_AT_PLUS_A", "COLAMD"):
-        try:
-            lu = splu(A.tocsc(), order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        except RuntimeError:  # a pivot is zero
-            continue
-        if np.array_equal(lu.perm_r, lu.perm_c) and np.max(np.abs(lu.L.data)) < LARGEST:
+        lu = diagonal_factors(A.tocsc(), order)
+        if lu is not None and np.max(np.abs(lu.L.data)) < LARGEST:
             return lu.U.diagonal()
     raise np.linalg.LinAlgError("the matrix is singular")
 
