@@ -193,6 +193,14 @@ def test_a_scene_is_drawn_before_it_is_solved():
     assert low < support[:, 0].min() and high > 2
 
 
+def test_a_displacement_that_follows_time_is_drawn_as_a_support():
+    def supports(value):
+        ax = Scene(line()).clamp("left").fix("right", "r^2", displacement=value).plot()
+        return len(marked(ax, "support"))
+
+    assert supports(lambda t: -0.1 * t) == supports(-0.1) > 0
+
+
 def test_a_force_that_pulls_at_an_end_is_drawn_outside():
     (tail, tip), = arrows(Scene(line()).clamp("left").point_force((4, 0), at=(2, 0)).plot())
     assert_allclose(tail, (2, 0), atol=1e-12)

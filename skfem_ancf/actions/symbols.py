@@ -25,7 +25,8 @@ from .joints.glue import Glue
 from .joints.guides import OnCircle, OnLine
 from .joints.nodes import Nodes
 from .joints.plane_section import PlaneSection
-from .joints.prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
+from .joints.prescribed import (PrescribedAngle, PrescribedDisplacement, PrescribedPosition,
+                                PrescribedTurn)
 from .joints.settlements import COMPONENTS
 from .joints.sliders import Sleeve, Slot
 from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
@@ -294,16 +295,18 @@ def _boundary(layout: Layout, domain: Domain, boundary: Any) -> Vector:
     return Vector(np.nanmean(place, axis=1), pairs, np.full(len(dofs) // 2, 2 / len(dofs)))
 
 
+@symbols.register(PrescribedDisplacement)
 @symbols.register(Support)
 def _(support, layout):
     member = layout.beam(support.beam)
-    dofs = member.dofs(support.boundary, support.names)
+    boundary = support.boundary if isinstance(support, Support) else support.at
+    dofs = member.dofs(boundary, support.names)
     if isinstance(member, RigidBody):
-        yield _support([point(layout, member, support.boundary)],
+        yield _support([point(layout, member, boundary)],
                        "x y angle" if len(dofs) == 4 else "x y")
     elif isinstance(member, Domain):
         fixed = [name for k, name in enumerate(("x", "y")) if np.any(dofs % 2 == k)]
-        at = _boundary(layout, member, support.boundary)
+        at = _boundary(layout, member, boundary)
         away = at.start - np.mean(member.basis.mesh.p, axis=1)
         yield _support([at], " ".join([*fixed, "angle"]), away / (np.hypot(*away) or 1.0))
     else:
