@@ -221,9 +221,14 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
                          f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
                          "unless it is constant") from error
     require_entries(f"the stiffness of {load!r}", i, j, v, beam.N)
-    far = np.abs(np.asarray(i) // beam.nd - np.asarray(j) // beam.nd)
-    if np.any(far > (beam.bandwidth // beam.nd if isinstance(beam, Domain) else 1)):
-        raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
+    low, high = np.sort(np.stack([i, j]).astype(np.int64) // beam.nd, axis=0)
+    far = high - low > (beam.bandwidth // beam.nd if isinstance(beam, Domain) else 1)
+    if isinstance(beam, Beam):  # the next node may be that of another chain
+        first, last = np.sort(beam.mesh.t, axis=0)
+        far |= (low < high) & ~np.isin(low * beam.N + high, first * beam.N + last)
+    if np.any(far):
+        k = int(np.argmax(far))
+        raise InputError(f"the stiffness of {load!r} couples the nodes {low[k]} and {high[k]}: "
                          "only neighbours of the chain may be coupled, as they are in its elements")
     beside(partial(_require_derivatives, bound), bound.beam.sizes)
     return bound

@@ -17,6 +17,7 @@ from ..actions.forces.kernels import add_resisting_force
 from ..actions.forces.system import Forces
 from ..actions.joints.base import Joint
 from ..actions.joints.director import UnitDirector
+from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..beam.beam import Beam
 from ..beam.domain import Domain
@@ -105,7 +106,8 @@ class System:
                                            map(_holds, self.loads)) or any(
                                                domain.held for domain in domains) else None)
         self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
-                                           for domain in domains)], self.N, self.bandwidth)
+                                           for domain in domains)], self.N, self.bandwidth,
+                             None if self.constraints.frame is None else chain_places(self.beams))
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         if self.damping.stiffness and domains:

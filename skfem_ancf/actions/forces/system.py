@@ -24,12 +24,14 @@ KINDS = 4
 class Forces:
     """The bound force elements of a scene; ``custom`` are the user-defined ones.
 
-    ``far``: an element couples DOFs outside the band. ``symmetric``: all derivatives are symmetric.
-    ``resists``: there are velocity-dependent forces. ``masses`` contribute to the mass matrix;
-    ``contacts`` are the obstacles.
+    ``far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given, with
+    places that differ by more than 1. ``symmetric``: all derivatives are symmetric. ``resists``:
+    there are velocity-dependent forces. ``masses`` contribute to the mass matrix; ``contacts`` are
+    the obstacles.
     """
 
-    def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
+    def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int,
+                 places: Array | None = None) -> None:
         self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
         parts: list[Part] = []
         self.custom = []
@@ -60,7 +62,9 @@ class Forces:
             row, at = row + m, end
         self._blocks, self.rows, self.size = blocks, row, at
         self._couplings = [self._coupling(k) for k in range(len(blocks))]
-        self._far = [bool(np.any(np.abs(i - j) > bandwidth)) for i, j, _, _ in self._couplings]
+        self._far = [bool(np.any(np.abs(i - j) > bandwidth)
+                          or places is not None and np.any(np.abs(places[i] - places[j]) > 1))
+                     for i, j, _, _ in self._couplings]
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         self.contacts = Contacts(self.elements)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -267,6 +268,17 @@ def chain_ends(beam: Beam) -> Array:
     """First and last node of each chain of a beam's mesh, shape (chains, 2)."""
     left, right = beam.mesh.t
     return np.stack([np.setdiff1d(left, right), np.setdiff1d(right, left)], axis=1)
+
+
+def chain_places(beams: Sequence[Beam]) -> Array:
+    """A number for each DOF of beams (N,): that of its node, with a gap between any two chains."""
+    out, first = [], 0
+    for beam in beams:
+        starts = np.zeros(beam.mesh.p.shape[1], dtype=np.int64)
+        starts[chain_ends(beam)[:, 0]] = 1
+        out.append(np.repeat(first + np.arange(len(starts)) + np.cumsum(starts), beam.nd))
+        first = out[-1][-1] + 1
+    return np.concatenate(out)
 
 
 def _directions(beam: Beam, nodes: Array) -> tuple[Any, Array]:
