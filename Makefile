@@ -27,6 +27,7 @@ export OMP_NUM_THREADS ?= 1
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
 	@echo "open $(CURDIR)/out/cantilever.png"
+	@echo "for long runs: $(PY) -m pip install '.[fast]' && $(PY) -m skfem_ancf compile"
 
 # what the demo needs, and each step of it said: the first thing that somebody sees
 $(VENV)/demo.stamp: pyproject.toml | $(PY)
@@ -35,7 +36,7 @@ $(VENV)/demo.stamp: pyproject.toml | $(PY)
 	@touch $@
 
 test: $(VENV)/test.stamp
-	$(PY) -m skfem_ancf.equations.compile
+	$(PY) -m skfem_ancf compile
 	$(PY) -m pytest -n 2 $(ARGS)
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
@@ -49,7 +50,7 @@ ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io items 
 test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic NUMBA_BOUNDSCHECK=1 \
 	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic; \
-	  $(PY) -m skfem_ancf.equations.compile && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
+	  $(PY) -m skfem_ancf compile && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
 	  $(LEAST)/bin/python -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
 
@@ -58,7 +59,7 @@ margins: $(VENV)/test.stamp
 	$(PY) -m pytest $(ARGS) tests --margins out/margins.txt
 
 test-least: $(LEAST)/stamp
-	$(LEAST)/bin/python -m skfem_ancf.equations.compile
+	$(LEAST)/bin/python -m skfem_ancf compile
 	$(LEAST)/bin/python -m pytest -n 2 $(ARGS)
 
 $(LEAST)/stamp: pyproject.toml tests/least.py | $(PY)
@@ -98,7 +99,7 @@ mutants: $(VENV)/coverage.stamp
 	$(PY) benchmarks/mutation/mutation.py $(ARGS)
 
 coverage: $(VENV)/coverage.stamp
-	$(PY) -m skfem_ancf.equations.compile
+	$(PY) -m skfem_ancf compile
 	$(PY) -m pytest -n 2 --cov --cov-report=term-missing:skip-covered --cov-fail-under=95 $(ARGS)
 
 # the scripts of the pages and the examples of the docstrings, the pages with every warning an

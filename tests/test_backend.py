@@ -1,19 +1,23 @@
 """What is compiled, by the size of the task, and what is kept of it."""
 
+import ast
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-from skfem_ancf.core import code_cache
+from skfem_ancf.core import code_cache, source
 from skfem_ancf.core.errors import CompilationWarning
-from skfem_ancf.core.switch import expecting
 from skfem_ancf.equations import backend
+from skfem_ancf.solvers.increment import ITERATIONS
 
 ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "skfem_ancf"
 
 SCRIPT = """
 import sys
@@ -68,6 +72,7 @@ def auto(needs_compiled, monkeypatch):
 
     monkeypatch.setattr(backend, "LOADED", {})
     monkeypatch.setattr(backend, "PROBLEMS", [])
+    monkeypatch.setattr(backend, "_worked", 0.0)
     monkeypatch.setattr(backend, "ITERATION", 1e-2)  # of larger meshes than are solved here
     monkeypatch.setattr(jit, "entry", entry)
     monkeypatch.setattr(loops, "part", lambda name: 0)
@@ -80,22 +85,51 @@ def auto(needs_compiled, monkeypatch):
 STEPS = dict(t_end=1.0, dt=1e-3)
 
 
-def test_small_tasks_run_in_numpy_however_many(auto):
+def test_work_in_numpy_is_counted_until_compiling_pays(auto, monkeypatch):
+    """Many small solutions are one large task, and so are an analysis or steps of it."""
     s, loads = auto
-    for _ in range(40):
+    one, price = ITERATIONS * s.system.backend.seconds(1), backend.compiling(
+        s.system.backend._missing("equilibrium")) / backend.SERVES
+    number = 0
+    while not loads and number < 1000:
+        reason = s.plan()["compiled loop"].reason
         s.solve_static()
+        number += 1
+    assert loads == ["equilibrium"]
+    assert number == pytest.approx(price / one, abs=1)  # as the last of them would pay it
+    assert "s once, in this process NumPy takes about" in reason
+    assert scene().plan()["compiled loop"].reason.endswith("compiled code is loaded")
+    assert backend._worked == 0.0  # paid
+
+
+def test_code_on_disk_is_loaded_sooner_but_not_at_once(auto, monkeypatch):
+    s, loads = auto
+    monkeypatch.setattr(code_cache, "on_disk", lambda *names: True)
+    number = 0
+    while not loads and number < 1000:
+        s.solve_static()
+        number += 1
+    assert number == pytest.approx(backend.LOADING / (ITERATIONS * s.system.backend.seconds(1)),
+                                   abs=1)
+    assert backend._worked > 0.0  # other functions follow at once
+    s.integrate(0.02, 1e-3)
+    assert loads == ["equilibrium", "steps"]
+
+
+def test_small_tasks_run_in_numpy(auto):
+    s, loads = auto
+    s.solve_static()
     s.integrate(0.01, 1e-3)
     assert not loads
-    assert "would take about" not in s.plan()["compiled loop"].reason
-    assert "NumPy takes about" in s.plan()["compiled loop"].reason
+    assert "loading compiled code at least" in s.plan()["compiled loop"].reason
 
 
-def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
+def test_a_long_motion_is_compiled_on_its_way_which_is_said(auto, capsys):
     s, loads = auto
     assert s.plan("dynamic")["compiled loop"].status == "computed"
     assert s.plan()["compiled loop"].status == "skipped"
     s.integrate(**STEPS, t_eval=[1.0])
-    assert loads == ["steps"]
+    assert loads[0] == "steps"
     said = capsys.readouterr().err.splitlines()
     assert said[0].startswith("skfem_ancf: compiling once, about ") and " s, cached in " in said[0]
     assert said[-1].endswith("100%") and len(said) == 3  # the kernel, and the steps
@@ -104,22 +138,49 @@ def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
     assert loads == ["steps", "evaluate"]
 
 
-def test_members_and_steps_count(auto, monkeypatch):
-    """A sweep, a path and a motion of automatic steps are as large as what they repeat."""
+@pytest.mark.parametrize("measure", ["a function", "probes"])
+def test_members_of_a_sweep_count(measure, auto):
+    """They are solved by the same process, in threads or not."""
     from skfem_ancf import sweep
-    from skfem_ancf.core.switch import expected
 
     s, loads = auto
-    seen = []
-    sweep(lambda x: s, {"x": np.arange(7)}, lambda s: seen.append(expected()) or 0.0)
-    assert seen == [7.0] * 7 and expected() == 1.0
-    monkeypatch.setattr(code_cache, "on_disk", lambda *names: True)
-    with expecting(1000):
-        s.solve_static()
-    assert loads == ["equilibrium"]
-    small = scene()
-    assert not small.system.backend._missing("equilibrium")  # and so it is used at once
-    assert small.plan()["compiled loop"].reason.endswith("compiled code is loaded")
+    few = 20
+    sweep(lambda x: s, {"x": np.arange(few)}, ("displacement", (1, 0)) if measure == "probes" else
+          lambda s: s.solve_static().displacement((1, 0))[1])
+    assert not loads
+    assert backend._worked > 0.9 * few * ITERATIONS * s.system.backend.seconds(1)
+
+
+def test_all_that_is_compiled_marks_the_cache():
+    """Files of compiled functions and of what they use; no others, so that work goes on there."""
+    files = {path.relative_to(PACKAGE).with_suffix("").as_posix() for path in
+             code_cache.compiled_files()}
+    assert {"solvers/iteration", "core/loops", "core/jit", "beam/kernels/tables"} <= files
+    assert not files & {"core/switch", "core/code_cache", "equations/backend", "scene/scene"}
+    for function, module in source.MARKED.items():
+        if module is not None or not function.__module__.startswith("skfem_ancf"):
+            continue
+        for name in function.__code__.co_names:
+            used = vars(sys.modules[function.__module__]).get(name)
+            if used is None or isinstance(used, ModuleType) or not _ours(function, name, used):
+                continue
+            assert _ours(function, name, used) in files, (function, name)
+
+
+def _ours(function, name, used):
+    """The file of the package that defines what a function uses by a name, or None."""
+    tree = ast.parse(Path(sys.modules[function.__module__].__file__).read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and any((a.asname or a.name) == name
+                                                    for a in node.names):
+            module = import_module("." * node.level + (node.module or ""),
+                                   sys.modules[function.__module__].__package__)
+            if source.MARKED.get(used if callable(used) else None) is not None:
+                return None  # replaced by its loops
+            found = Path(module.__file__)
+            return (found.relative_to(PACKAGE).with_suffix("").as_posix()
+                    if found.is_relative_to(PACKAGE) else None)
+    return None
 
 
 def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_path):
@@ -138,12 +199,18 @@ def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_pat
             function.cache_clear()
 
 
+def test_the_command_says_how_it_is_used():
+    done = subprocess.run([sys.executable, "-m", "skfem_ancf"], cwd=ROOT, capture_output=True,
+                          text=True)
+    assert done.returncode == 1 and "python -m skfem_ancf compile" in done.stderr
+
+
 def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
     from skfem_ancf.core.switch import VARIABLE
-    from skfem_ancf.equations.compile import main
+    from skfem_ancf.equations.compile import compile_all
 
     monkeypatch.setenv(VARIABLE, "1")
-    main()
+    compile_all()
     assert set(backend.COMPILING) <= set(backend.LOADED)
     assert code_cache.on_disk(*backend.COMPILING)
 
@@ -160,9 +227,9 @@ def test_what_cannot_be_compiled_runs_in_numpy(error, auto, monkeypatch, caplog)
         raise error
 
     monkeypatch.setattr(jit, "entry", fail)
-    with expecting(10000):
-        for _ in range(2):
-            assert s.solve_static().converged
+    monkeypatch.setattr(backend, "_worked", 1000.0)
+    for _ in range(2):
+        assert s.solve_static().converged
     said = [r.message for r in caplog.records if "runs in NumPy" in r.message]
     assert len(said) == 1 and str(error) in said[0]
     assert str(error) in s.plan()["compiled loop"].reason

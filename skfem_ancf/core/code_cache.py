@@ -6,6 +6,7 @@ import gc
 import hashlib
 import logging
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,16 +23,24 @@ class NotCompiled(Exception):
     """A user's function that Numba cannot compile."""
 
 
+#: Lines of files that are compiled, and names of others on which compiled code depends.
+_MARKS = re.compile(rb"^\s*(@source|@primitive|import numba|from numba)", re.MULTILINE)
+_ALSO = "loops.py", "tables.py", "words.py"
+
+
+@cache
+def compiled_files() -> dict[Path, bytes]:
+    """Text of all compiled files by path: of marked functions, their loops, and their tables."""
+    package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
+    texts = {path: path.read_bytes() for path in sorted(package.rglob("*.py"))}
+    return {path: text for path, text in texts.items()
+            if path.name in _ALSO or _MARKS.search(text)}
+
+
 @cache
 def _stamp() -> str:
     """Hash of all compiled files: Numba checks only the file of a function, not its callees."""
-    total = hashlib.sha256()
-    package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
-    for path in sorted(package.rglob("*.py")):
-        text = path.read_bytes()
-        if b"@source" in text or b"numba" in text or path.name == "loops.py":
-            total.update(text)
-    return total.hexdigest()[:10]
+    return hashlib.sha256(b"".join(compiled_files().values())).hexdigest()[:10]
 
 
 @cache

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
 
 from .errors import InputError
 
-#: Environment variable: "0" disables Numba, "1" compiles at once, "auto" (default) compiles for
-#: large tasks.
+#: Environment variable: "0" disables Numba, "1" compiles at once, "auto" (default) compiles
+#: when the process has worked long enough in NumPy.
 VARIABLE = "SKFEM_ANCF_COMPILED"
 
 
@@ -22,36 +19,8 @@ def wanted() -> str:
     value = os.environ.get(VARIABLE, "auto")
     if value not in ("0", "1", "auto"):
         raise InputError(f"the environment variable {VARIABLE} must be 0 (without Numba), 1 "
-                         f"(compile at once) or auto (for large tasks), got {value!r}")
+                         f"(compile at once) or auto (when it pays), got {value!r}")
     return value
-
-
-_EXPECTED: ContextVar[float] = ContextVar("expected", default=1.0)
-
-
-@contextmanager
-def expecting(number: float) -> Iterator[None]:
-    """Declare that the block repeats its content; nested numbers multiply.
-
-    The product of members of a sweep, steps and iterations decides whether compiling pays.
-
-    Examples
-    --------
-    >>> from skfem_ancf.core.switch import expected, expecting
-    >>> with expecting(100), expecting(3):
-    ...     expected()
-    300.0
-    """
-    token = _EXPECTED.set(expected() * max(1.0, float(number)))
-    try:
-        yield
-    finally:
-        _EXPECTED.reset(token)
-
-
-def expected() -> float:
-    """Expected number of iterations of the current task."""
-    return _EXPECTED.get()
 
 
 def compiled_off() -> str | None:

@@ -12,7 +12,6 @@ from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted,
                            require_finite_scalar, require_flag, require_function, require_positive,
                            shown, warn)
 from ..core.progress import progress_bar
-from ..core.switch import expecting
 from ..core.types import Array, StrPath
 from ..equations.stability import largest_displacement
 from ..equations.system import System
@@ -177,8 +176,7 @@ def _go(run, file, progress):
     system, task, inverted, looked = run.system, run.task, None, run.steps
     system.forces.contacts.sweep.begin()
     try:
-        with expecting(run.iterations), progress_bar(progress, total=task.span,
-                                                     desc="time") as bar:
+        with progress_bar(progress, total=task.span, desc="time") as bar:
             bar.update(run.y.t - task.t_start)
             while not run.done:
                 before = run.y.t

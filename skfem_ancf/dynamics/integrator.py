@@ -33,6 +33,8 @@ logger = logging.getLogger(__name__)
 DEPTH = 6  # how often a step is halved
 #: Factors of the step size that are tried to step past a singular position of the joints.
 LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
+#: Approximate iterations of a step, by which work in NumPy is counted.
+OF_STEP = 3
 #: Largest number of steps in a block, and of stored floats.
 BLOCK, STORED = 256, 2_000_000
 
@@ -231,7 +233,7 @@ class Integrator:
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
         try:
             with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
-                done = self._backend.of(function)(self._matrices, *args)
+                done = self._backend.of(function, OF_STEP * len(rows))(self._matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may continue from y
             self._load_state(before)
             self.forget()

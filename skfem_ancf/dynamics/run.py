@@ -32,8 +32,6 @@ EPS = np.finfo(float).eps
 CLOSE = 1e-6
 #: Degrees of freedom times steps of a block, so that progress bars and Ctrl-C react in time.
 SHOWN = 50_000
-#: Expected iterations of a step, and expected number of steps of automatic size.
-ITERATIONS, AUTOMATIC = 3, 1000
 #: The first step of automatic size, over the duration of the motion.
 FIRST = 1e-4
 #: Smallest automatic step size after failures, over the duration of the motion.
@@ -171,12 +169,6 @@ class Run:
         """Set ``y.turns`` from the previous angles (k,); returns y."""
         y.turns = self._turns.follow(last, y.u[None])[0]
         return y
-
-    @property
-    def iterations(self) -> float:
-        """Expected number of iterations."""
-        task = self.task
-        return ITERATIONS * (AUTOMATIC if task.dt is None else task.span / task.dt)
 
     # segments between breakpoints
 

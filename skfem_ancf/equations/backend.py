@@ -15,7 +15,7 @@ import numpy as np
 from ..beam.kernels.law import CUSTOM
 from ..core import code_cache
 from ..core.progress import announced_bar
-from ..core.switch import compiled_off, expected, wanted
+from ..core.switch import compiled_off, wanted
 from .tables import Tables
 
 logger = logging.getLogger(__name__)
@@ -35,8 +35,10 @@ LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Approximate seconds of an iteration in NumPy, and of each element and point of contact in it.
 ITERATION, ELEMENT, POINT = 1e-3, 1.2e-5, 4e-6
-#: Number of equal tasks over which compiling should pay.
+#: Compiling costs so many times the work in NumPy after which it begins: a later process works on.
 SERVES = 5
+#: Approximate seconds that this process has worked in NumPy since it last compiled.
+_worked = 0.0
 
 
 class Choice(NamedTuple):
@@ -52,10 +54,10 @@ _IS_LOADED = Choice("loaded", "compiled code is loaded")
 class Backend:
     """Runs the kernels of a system.
 
-    The choice depends on the size of the task before it starts: expected iterations
-    (:func:`~skfem_ancf.core.switch.expecting`), elements, and points of contact. Functions that are
-    loaded are used. Cached ones are loaded if NumPy would take longer than loading. Others are
-    compiled if that pays in :data:`SERVES` runs.
+    The process counts its work in NumPy: iterations times elements and points of contact. As soon
+    as what is done and the next call reach the price, compiled code is taken, so the choice costs
+    at most twice the better one, however a user divides his work. The price of functions that are
+    loaded is 0, of cached ones :data:`LOADING`, of others a part of the time for compiling.
     """
 
     def __init__(self, system: Any) -> None:
@@ -93,12 +95,12 @@ class Backend:
         vars(backend).pop("linearised", None)
         return backend
 
-    def choose(self, name: str) -> Choice:
-        """The choice for the next call of a kernel, by its name."""
-        choice = self._chosen(name)
+    def choose(self, name: str, iterations: float = 1.0) -> Choice:
+        """The choice for the next call of a kernel, by its name and expected iterations."""
+        choice = self._chosen(name, iterations)
         return choice if self._plain is None else Choice("plain", self._plain)
 
-    def _chosen(self, name):
+    def _chosen(self, name, iterations):
         missing = self._missing(name)
         if not missing and not PROBLEMS and self._plain is None and wanted() != "0":
             return _IS_LOADED
@@ -108,21 +110,18 @@ class Backend:
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == ["evaluate"]:
             return Choice("compiled", "its parts are loaded")
-        work = self.seconds(expected())
+        work = _worked + self.seconds(iterations)
+        so_far = f"in this process NumPy takes about {work:.2g} s so far"
         if work < LOADING:
-            return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, loading "
-                          f"compiled code at least {LOADING:g} s")
+            return Choice("plain", f"{so_far}, loading compiled code at least {LOADING:g} s")
         missing = [part for part in missing if not code_cache.on_disk(part)]
         if not missing:
-            return Choice("compiled", f"compiled code is on disk, NumPy would take about "
-                          f"{work:.2g} s for {_iterations()}")
+            return Choice("compiled", f"compiled code is on disk, {so_far}")
         seconds, times = compiling(missing), SERVES if code_cache.can_keep() else 1
         if times * work >= seconds:
-            return Choice("compiled", f"compiling takes about {seconds:.2g} s once, NumPy would "
-                          f"take about {work:.2g} s for {_iterations()}")
-        return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, compiling "
-                      f"would take about {seconds:.2g} s; python -m "
-                      "skfem_ancf.equations.compile does it beforehand")
+            return Choice("compiled", f"compiling takes about {seconds:.2g} s once, {so_far}")
+        return Choice("plain", f"{so_far}, compiling would take about {seconds:.2g} s; python -m "
+                      "skfem_ancf compile does it beforehand")
 
     def _missing(self, name):
         """Names of a kernel and its parts that are not loaded."""
@@ -142,9 +141,11 @@ class Backend:
             self._workspaces[make.__name__] = make(self.tables.plain, *sizes)
         return self._workspaces[make.__name__]
 
-    def of(self, kernel: Callable) -> Callable:
+    def of(self, kernel: Callable, iterations: float = 1.0) -> Callable:
         """A kernel bound to the equations, its first argument, in NumPy or compiled."""
-        if self.choose(kernel.__name__).way == "plain":
+        global _worked
+        if self.choose(kernel.__name__, iterations).way == "plain":
+            _worked += self.seconds(iterations)
             return self._in_numpy(kernel)
 
         def run(*args):
@@ -175,12 +176,16 @@ class Backend:
 
     def _load(self, kernel, args):
         """The compiled function and its equations; announces long compilations."""
+        global _worked
         name = kernel.__name__
         if self._flat is None or name not in LOADED:
             from ..core.jit import entry
             from . import loops
 
-            with _LOCK, announced(self._missing(name)) as update:
+            missing = self._missing(name)
+            if not code_cache.on_disk(*missing):
+                _worked = 0.0
+            with _LOCK, announced(missing) as update:
                 for part in self.tables.parts:
                     load_part(part, update)
                 if self._flat is None:
@@ -205,11 +210,6 @@ def load_part(name: str, update: Callable[[str], None]) -> None:
 def compiling(names: Iterable[str]) -> float:
     """Approximate seconds for compiling names of :data:`SECONDS`."""
     return sum(SECONDS[name] for name in names)
-
-
-def _iterations():
-    n = expected()
-    return "one evaluation" if n <= 1 else f"{n:.3g} iterations"
 
 
 #: One thread at a time compiles.

@@ -1,4 +1,4 @@
-"""Compile all kernels and cache them on disk: ``python -m skfem_ancf.equations.compile``."""
+"""Compile all kernels and cache them on disk: ``python -m skfem_ancf compile``."""
 
 import os
 import sys
@@ -8,7 +8,7 @@ from ..core.code_cache import folder, nothing_collected, on_disk
 from ..core.switch import VARIABLE, compiled_off
 
 
-def main() -> None:
+def compile_all() -> None:
     """Solve a small scene in statics and in time; its types are those of every scene."""
     os.environ[VARIABLE] = "1"
     import numpy as np
@@ -37,7 +37,3 @@ def main() -> None:
                 raise SystemExit(PROBLEMS[0])
             update(name)
     assert set(COMPILING) <= set(LOADED)
-
-
-if __name__ == "__main__":
-    main()

@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..dynamics.choice import choose_scheme
-from ..dynamics.run import ITERATIONS as OF_STEP
+from ..dynamics.integrator import OF_STEP
 from ..actions.eigenstrain import EigenStrain
 from ..core.errors import NameUnknown, require_option
 from ..core.origin import ours
-from ..solvers.newton import ITERATIONS as OF_STATICS
-from ..core.switch import expecting
+from ..solvers.increment import ITERATIONS
 from ..equations.system import System
 
 KINDS = ("static", "linear", "dynamic")
@@ -139,8 +138,8 @@ def _solution(s, dynamic, linear):
     if linear:
         yield Item("compiled loop", "skipped", "one solve")
     else:
-        with expecting(STEPS * OF_STEP if dynamic else OF_STATICS):
-            way, reason = s.backend.choose("steps" if dynamic else "equilibrium")
+        way, reason = (s.backend.choose("steps", STEPS * OF_STEP) if dynamic else
+                       s.backend.choose("equilibrium", ITERATIONS))
         yield Item("compiled loop", "skipped" if way == "plain" else "computed", "whole " + (
             f"time steps, in blocks, of {STEPS}" if dynamic else "iterations") + f": {reason}")
     if dynamic:

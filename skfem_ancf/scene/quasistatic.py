@@ -14,7 +14,6 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknow
                            require_flag, require_integer, require_positive)
 from ..core.progress import progress_bar
 from ..core.steps import Steps
-from ..core.switch import expecting
 from ..core.types import Array
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
@@ -27,9 +26,6 @@ from ..solvers.outcome import StaticResult, StepFailed
 from ..solvers.quasistatic import JUMPED, Instant, first, follow
 
 logger = logging.getLogger(__name__)
-
-#: Desired number of iterations of an increment.
-ITERATIONS = 8
 
 
 class QuasiStatic(Scheme):
@@ -100,9 +96,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
                          f"after the start at t = {t_start:g}")
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     made.t = t_start
-    count = increments * len(ends)
     try:
-        with (system.forces.contacts.lent(), expecting(ITERATIONS * count),
+        with (system.forces.contacts.lent(),
               progress_bar(progress, total=ends[-1] - t_start, desc="time") as bar):
             begin = _begin(system, t_start, start, u, rules, stable)
             for instant in follow(system, ends, increments, begin, rules, stable):

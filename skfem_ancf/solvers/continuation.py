@@ -10,14 +10,11 @@ import numpy as np
 from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
                            require_function, require_integer, require_positive, shown)
 from ..core.progress import progress_bar
-from ..core.switch import expecting
 from ..equations.system import System
 from .critical import Critical, find_critical
 from .tracing import Failed, Point, Tracer
 
 logger = logging.getLogger(__name__)
-#: Approximate evaluations of the equations in a step.
-EVALUATIONS = 10
 #: Largest number of steps.
 MAX_STEPS = 10**6
 #: Deviation of a step from a straight line, relative to its length and to the load.
@@ -92,8 +89,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
     points, critical, step = [_start(tracer, branch, side)], [], ds
-    with (expecting(EVALUATIONS * steps),
-          progress_bar(progress, total=steps, desc="path") as bar):
+    with progress_bar(progress, total=steps, desc="path") as bar:
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
             try:

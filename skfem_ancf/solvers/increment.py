@@ -23,6 +23,8 @@ logger = logging.getLogger(__name__)
 
 #: Largest number of pressure corrections (augmented Lagrangian) in a load step.
 AUGMENTED = 50
+#: Approximate iterations to an equilibrium, by which work in NumPy is counted.
+ITERATIONS = 8
 #: Tolerance of an equilibrium that is only a start.
 NEAR = 1e-2
 
@@ -180,7 +182,8 @@ class Increment:
             x = Unknowns(u.copy(), multipliers.copy(), np.empty(system.N), tables.stresses,
                          tables.stresses)
             residuals = np.zeros((options.most + 1, 2))
-            status, n = backend.of(equilibrium)(target, rules, x, scratch, residuals)
+            status, n = backend.of(equilibrium, ITERATIONS)(target, rules, x, scratch,
+                                                            residuals)
             if status != SINGULAR or solver is not None:
                 break
             solver = default  # with pivoting

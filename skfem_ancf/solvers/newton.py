@@ -12,7 +12,6 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, require_fi
                            require_integer, require_option, require_positive)
 from ..core.linalg import NO_FACTORS
 from ..core.progress import progress_bar
-from ..core.switch import expecting
 from ..core.types import Array
 from ..equations import stability
 from ..equations.system import System
@@ -24,8 +23,7 @@ from .touching import SOON
 
 logger = logging.getLogger(__name__)
 
-#: Expected and largest number of iterations in a load step.
-ITERATIONS = 10
+#: Largest number of iterations in a load step.
 MAX_ITERATIONS = 10000
 #: Number of iterations of load steps, and of cuts of the first step, before the next strategy.
 FEW, CUT = 60, 3
@@ -114,8 +112,7 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     if u is not None:
         u = require_finite("u", u, (system.N,))
     rules = Steps(method, tol, max_iterations, float(first_step), min_step)
-    steps = 1.0 + max(0.0, np.log2(1.0 / first_step))  # each doubles the last
-    with system.forces.contacts.lent(), expecting(ITERATIONS * steps):
+    with system.forces.contacts.lent():
         return Search(system, u, memory, rules, stable, progress).find()
 
 

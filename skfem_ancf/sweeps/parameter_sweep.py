@@ -15,7 +15,6 @@ from ..core.errors import (CallError, CallbackError, CheckpointWarning, FileErro
                            Interrupted, NameUnknown, SweepWarning, require_function,
                            require_integer, require_path, shown, warn)
 from ..core.progress import progress_bar
-from ..core.switch import expecting
 from ..core.types import Array, ArrayLike, StrPath
 from .members import Sweep, column_of, require_plain
 from .probes import Probes, measured
@@ -118,8 +117,7 @@ def sweep(build: Callable[..., Any],
     else:
         source = (in_threads if isinstance(task.measure, Probes) else here)(task, members, places)
     try:
-        with (progress_bar(progress, len(members), "members") as bar, closing(source),
-              expecting(len(places))):
+        with progress_bar(progress, len(members), "members") as bar, closing(source):
             bar.update(len(members) - len(places))
             for k, found in source:
                 record.add(k, found)

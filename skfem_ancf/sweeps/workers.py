@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import copy_context
 from functools import partial
 from queue import SimpleQueue
 from typing import Any, NamedTuple
@@ -18,7 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.errors import AncfError, CallbackError, InputError, PickleError, require_like, shown
-from ..core.switch import expecting
 from ..core.types import Array
 
 #: Values by name, or the text of an error.
@@ -29,16 +27,14 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 class Task(NamedTuple):
-    """Builds and measures a member; ``share`` is the number of members per process."""
+    """Builds and measures a member."""
 
     build: Callable[..., Any]
     measure: Callable[[Any], Any]
-    share: float = 1.0
 
     def __call__(self, member: dict[str, Any]) -> Found:
         """Measured values of a member by name, or the text of the error."""
-        with expecting(self.share):
-            return self.begun(member)()
+        return self.begun(member)()
 
     def begun(self, member: dict[str, Any]) -> Callable[[], Found]:
         """Build the scene of a member now; returns a function that measures it."""
@@ -81,7 +77,7 @@ def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int])
     with ThreadPoolExecutor(threads) as pool:
         try:
             for k in places:
-                flying.append((k, pool.submit(copy_context().run, task.begun(members[k]))))
+                flying.append((k, pool.submit(task.begun(members[k]))))
                 if len(flying) > 2 * threads:
                     first, future = flying.popleft()
                     yield first, future.result()
@@ -196,7 +192,6 @@ def _distribute(submit, workers, task, members, places):
     Members in flight when a worker dies are computed again one at a time, to find the cause.
     """
     places, again, flying, back = deque(places), deque(), {}, SimpleQueue()
-    task = task._replace(share=len(places) / workers)
     try:
         while places or again or flying:
             alone = bool(again)
