@@ -121,7 +121,7 @@ def test_files_and_classes_are_of_a_size_to_be_read():
 #: From the ground up: a folder imports from those below its floor.
 FLOORS = [["core"], ["mesh", "materials", "sweeps"], ["elements"],
           ["sections", "formulations"], ["beam"], ["actions", "recovery"],
-          ["equations", "forms", "io", "visuals"], ["results"], ["solvers", "dynamics"], ["scene"]]
+          ["equations", "forms", "io", "visuals"], ["results"], ["solvers", "dynamics"], ["scene"], ["__main__"]]
 FLOOR = {folder: height for height, folders in enumerate(FLOORS) for folder in folders}
 
 
