@@ -621,7 +621,8 @@ class Scene(Model):
             :class:`~skfem_ancf.Steps` with names, or the time at the end, or several times at
             which an increment ends.
         increments
-            Least number of increments of each step; each is an instant of the history.
+            Number of equal increments of each step, whose ends are instants of the history. Cuts
+            add instants between them.
         start
             A State to begin with, or None for the equilibrium at the time 0. An instant of a
             history goes on from its time, other states from 0. It may be one of a scene of the

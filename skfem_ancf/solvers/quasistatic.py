@@ -72,16 +72,20 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
     equilibrium becomes unstable, the strategies of :func:`~skfem_ancf.solvers.newton.solve_static`
     look for another one under constant loads.
 
-    ``ends`` are increasing times at which increments must end, ``increments`` the least number
-    between two of them. Raises StepFailed or ConvergenceError.
+    ``ends`` are increasing times; ``increments`` is the number of instants of a grid between two of
+    them. Increments end at each of these instants, also after cuts. Raises StepFailed or
+    ConvergenceError.
     """
     yield begin
     jumps = 0
     for end in ends[ends > begin.t]:
+        grid = np.linspace(begin.t, end, increments + 1)[1:]
         most = (end - begin.t) / increments
         size, least = most, rules.min_step * most
         while begin.t < end:
-            t = end if begin.t + 1.001 * size >= end else begin.t + size
+            target = grid[np.searchsorted(grid, begin.t, side="right")]
+            parts = np.ceil((target - begin.t) / size - 1e-3)
+            t = target if parts <= 1.0 else begin.t + (target - begin.t) / parts
             if begin.way == AT_REST:
                 least = max(least, CUTS_AT_REST * most)
             smallest = size <= least
