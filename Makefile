@@ -1,6 +1,7 @@
 # make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png; nothing else is installed
 # make test    the tests, on two processes; ARGS="..." goes to pytest
 # make test-settings   most of them as on an old processor, and without Numba and with least versions
+# make test-noise   all that solves, with noise in the last digits, in compiled code and in NumPy
 # make test-least   the tests, with the least versions that pyproject.toml promises
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
@@ -22,7 +23,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings test-least lint paper bench stress fuzz mutants margins coverage docs pictures dist clean
+.PHONY: demo test test-settings test-noise test-least lint paper bench stress fuzz mutants margins coverage docs pictures dist clean
 
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
@@ -53,6 +54,20 @@ test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 	  $(PY) -m skfem_ancf compile && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
 	  $(LEAST)/bin/python -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
+
+# each number that processors round differently is changed by a few units in the last place
+SEEDS := 1 2 3
+QUIET := bad_arguments basis bench docstrings elements forms io items mapping mesh mutation near_misses \
+  package paper prose pyvista readme reference rooms search typing verification visuals
+
+test-noise: $(VENV)/test.stamp
+	set -e; for seed in $(SEEDS); do \
+	  $(PY) tests/noise.py $$seed; \
+	  for compiled in 1 0; do \
+	    SKFEM_ANCF_COMPILED=$$compiled $(PY) -m pytest -n 2 --noise $$seed $(ARGS) tests \
+	      $(QUIET:%=--ignore=tests/test_%.py); \
+	  done; \
+	done
 
 margins: $(VENV)/test.stamp
 	mkdir -p out

@@ -6,6 +6,7 @@ import pkgutil
 import re
 from dataclasses import is_dataclass
 from functools import cached_property
+from importlib.util import find_spec
 
 import pytest
 import test_reference as reference
@@ -14,8 +15,9 @@ import skfem_ancf
 from skfem_ancf.core.source import MARKED
 
 #: Not looked at: loops that are compiled in place of functions of their names; and where arrays of
-#: equations are packed for them.
-OTHERS = ("core.loops", "equations.loops", "beam.kernels.loops")
+#: equations are packed for them. Without Numba, what compiles them cannot be imported.
+OTHERS = ("core.loops", "equations.loops", "beam.kernels.loops",
+          *(() if find_spec("numba") else ("core.jit",)))
 
 #: Annotations of arrays, whose shapes are to be said.
 ARRAYS = ("Array", "ArrayLike")

@@ -4,8 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from skfem import Basis, BilinearForm, LinearForm, asm
 from skfem.helpers import ddot, dot
@@ -15,6 +13,9 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, ElementBeamPate
 from skfem_ancf.actions.loads import EndMoment, Pressure
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
+
+hypothesis = pytest.importorskip("hypothesis")
+given, settings, st = hypothesis.given, hypothesis.settings, hypothesis.strategies
 
 STEP = 1e-30
 BODIES = {

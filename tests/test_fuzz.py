@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, note, settings
-from hypothesis import strategies as st
+
+hypothesis = pytest.importorskip("hypothesis")
+given, settings, st = hypothesis.given, hypothesis.settings, hypothesis.strategies
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 if not (FOLDER / "fuzz.py").exists():
@@ -42,11 +43,11 @@ def scripts(draw):
 
 
 @settings(max_examples=50, derandomize=True, database=None, deadline=None,
-          suppress_health_check=list(HealthCheck))
+          suppress_health_check=list(hypothesis.HealthCheck))
 @given(scripts(), st.integers(0, 4))
 def test_a_random_scene_ends_in_an_equilibrium_or_in_an_error_of_ours(script, number):
     outcome, wrong = fuzz.run(script, compare=number == 0)
-    note(f"{fuzz.HEADER}COMPILED = True\n{script}{outcome}: {wrong}")
+    hypothesis.note(f"{fuzz.HEADER}COMPILED = True\n{script}{outcome}: {wrong}")
     assert not wrong
 
 

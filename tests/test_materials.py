@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, EnergyMomentum, InputError, MeshBeam, NameUnknown,
@@ -18,6 +16,9 @@ try:
 except ImportError:
     def njit(function):
         return function
+
+hypothesis = pytest.importorskip("hypothesis")
+given, settings, st = hypothesis.given, hypothesis.settings, hypothesis.strategies
 
 STEP = 1e-30
 E, NU = 2.1e11, 0.3
