@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.band import clear, copy, mirror
-from ..beam.strain_energy import FlatBody, evaluate_body
-from ..beam.kernels.strain import EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT
+from ..core.band import add_multiple, clear, copy, mirror
+from ..beam.strain_energy import FlatBody, add_eigen_force, add_eigen_mean, add_eigen_tangent
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import custom_force, custom_joints, custom_load_stiffness, custom_mean_force
 from ..core.source import F1, F2, I1, indices, primitive, source
@@ -166,24 +165,15 @@ def _of_moments(loads, factors):
 
 
 @source
-def add_eigenstrains(loads, what, factors, u, v, out, flat, ld):
-    """Subtract the internal forces, or their tangent, of eigenstrains.
-
-    ``what`` is EIGENSTRAIN: the force at u; EIGENSTRAIN_MEAN: the mean force with exact work
-    from u to v; EIGENSTRAIN_TANGENT: the derivative at u, added to ``flat``. Forces are added to
-    ``out``.
-    """
-    given, f = np.empty(loads.eigenstrains.shape[1]), np.empty(u.size)
-    clear(given)
-    clear(f)
+def _eigenstrains(loads, factors):
+    """Minus the eigenstrains: loads subtract the internal force that belongs to them."""
+    given = np.zeros(loads.eigenstrains.shape[1])
     first = factors.size - loads.eigenstrains.shape[0]
     for k in range(loads.eigenstrains.shape[0]):
         c, one = factors[first + k], loads.eigenstrains[k]
         for i in indices(given.size):
             given[i] -= c * one[i]
-    evaluate_body(loads.eigenstrained, what, u, v, f, given, given[:0], flat, ld)
-    for i in indices(out.size):
-        out[i] -= f[i]
+    return given
 
 
 @source
@@ -194,7 +184,9 @@ def external_force(loads, factors, t, scale, u, out):
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
     if loads.eigenstrains.shape[0] > 0:
-        add_eigenstrains(loads, np.int64(EIGENSTRAIN), factors, u, u, out, out[:0], np.int64(0))
+        f = np.zeros(u.size)
+        add_eigen_force(loads.eigenstrained, u, _eigenstrains(loads, factors), f)
+        add_multiple(-1.0, f, out)
     if loads.custom > 0:
         custom_force(loads.custom, t, scale, u, out)
 
@@ -210,8 +202,9 @@ def mean_external_force(loads, factors, t, u0, u1, out):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
     if loads.eigenstrains.shape[0] > 0:
-        add_eigenstrains(loads, np.int64(EIGENSTRAIN_MEAN), factors, u0, u1, out, out[:0],
-                         np.int64(0))
+        f = np.zeros(u0.size)
+        add_eigen_mean(loads.eigenstrained, u0, u1, _eigenstrains(loads, factors), f)
+        add_multiple(-1.0, f, out)
     if loads.custom > 0:
         custom_mean_force(loads.custom, t, u0, u1, out)
 
@@ -225,7 +218,7 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
     lower = A.flat[A.top:]
     add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
     if loads.eigenstrains.shape[0] > 0:
-        add_eigenstrains(loads, np.int64(EIGENSTRAIN_TANGENT), factors, u, u, u[:0], lower, A.ld)
+        add_eigen_tangent(loads.eigenstrained, u, _eigenstrains(loads, factors), lower, A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)

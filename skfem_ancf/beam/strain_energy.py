@@ -10,8 +10,9 @@ from ..core.source import I1, I2, primitive, shaped, source
 from .beam import Beam
 from .kernels.arrays import add_changes, add_transposed
 from .kernels.law import LINEAR
-from .kernels.strain import (FORCE, GIVEN, GRADIENTS, LINEARISED, MEAN, STRESS, TANGENT,
-                             UNSYMMETRIC, VISCOUS, run)
+from .kernels.runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
+                           run_gradients, run_linearised, run_mean, run_mean_mixed, run_mixed,
+                           run_stress, run_tangent, run_unsymmetric, run_viscous)
 from .kernels.tables import CABLE, StrainTables, repeated, together
 
 #: Columns of the table of a body: begin and end of stresses; samples and DOFs of an element; begin
@@ -140,19 +141,11 @@ def _gradients(body, k, gradients):
 
 
 @source
-def evaluate_body(body, what, u, v, f, given, out, flat, ld):
-    """Call :func:`~skfem_ancf.beam.kernels.strain.evaluate` for all tables."""
-    for k in range(body.table.shape[0]):
-        written = _gradients(body, k, out) if what == GRADIENTS else _stress(body, k, out)
-        run(tables_of(body, k), what, u, v, f, _stress(body, k, given), written, flat, ld)
-
-
-@source
 def body_force(body, u, f):
     """The internal force."""
     clear(f)
-    none = f[:0]
-    evaluate_body(body, np.int64(FORCE), u, u, f, none, none, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_force(tables_of(body, k), u, f)
 
 
 @source
@@ -164,14 +157,16 @@ def body_tangent(body, u, f, independent, use_independent, stresses, A):
     clear(f)
     clear(A.flat)
     given = independent if use_independent else independent[:0]
-    evaluate_body(body, np.int64(TANGENT), u, u, f, given, stresses, A.flat[A.top:], A.ld)
+    for k in range(body.table.shape[0]):
+        run_tangent(tables_of(body, k), u, _stress(body, k, given), _stress(body, k, stresses), f,
+                    A.flat[A.top:], A.ld)
 
 
 @source
 def body_stress(body, u, stresses):
     """The stresses at u."""
-    none = u[:0]
-    evaluate_body(body, np.int64(STRESS), u, u, none, none, stresses, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_stress(tables_of(body, k), u, _stress(body, k, stresses))
 
 
 @source
@@ -187,8 +182,9 @@ def body_mean_stress(body, copies, weights, stresses, out):
 @source
 def body_linearised(body, u, du, stresses, independent):
     """Stresses at u plus their linearised change by du."""
-    none = u[:0]
-    evaluate_body(body, np.int64(LINEARISED), u, du, none, stresses, independent, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_linearised(tables_of(body, k), u, du, _stress(body, k, stresses),
+                       _stress(body, k, independent))
 
 
 @source
@@ -204,16 +200,16 @@ def add_viscous_stress(viscous, body, copies, k, u, v, scratch, out):
 @source
 def add_viscous_force(body, u, v, f):
     """Add the force of viscous stresses."""
-    none = f[:0]
-    evaluate_body(body, np.int64(VISCOUS), u, v, f, none, none, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_viscous(tables_of(body, k), u, v, f)
 
 
 @source
 def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
     clear(f)
-    none = f[:0]
-    evaluate_body(body, np.int64(MEAN), u0, u1, f, none, none, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_mean(tables_of(body, k), u0, u1, f)
 
 
 @source
@@ -223,30 +219,37 @@ def body_mixed(body, mean, u0, u1, f, independent, stresses):
     The stresses of the strain are written.
     """
     clear(f)
-    evaluate_body(body, np.int64(MEAN if mean else FORCE), u0 if mean else u1, u1, f, independent,
-                  stresses, f[:0], np.int64(0))
+    for k in range(body.table.shape[0]):
+        given, out = _stress(body, k, independent), _stress(body, k, stresses)
+        if mean:
+            run_mean_mixed(tables_of(body, k), u0, u1, given, out, f)
+        else:
+            run_mixed(tables_of(body, k), u1, given, out, f)
 
 
 @source
 def add_force_of(body, u, stresses, f):
     """Add the force at u of given stresses."""
-    none = f[:0]
-    evaluate_body(body, np.int64(GIVEN), u, u, f, stresses, none, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_given(tables_of(body, k), u, _stress(body, k, stresses), f)
 
 
 @source
 def body_gradients(body, u, gradients):
     """Derivatives of the strains and the weighted stresses at u for each element."""
-    none = u[:0]
-    evaluate_body(body, np.int64(GRADIENTS), u, u, none, none, gradients, none, np.int64(0))
+    for k in range(body.table.shape[0]):
+        run_gradients(tables_of(body, k), u, _gradients(body, k, gradients))
 
 
 @source
 def body_tangent_by(body, u, stresses, gradients, A):
     """As :func:`body_gradients`, with the lower half of the tangent for given stresses."""
     clear(A.flat)
-    evaluate_body(body, np.int64(GRADIENTS), u, u, u[:0], stresses, gradients, A.flat[A.top:],
-                  A.ld)
+    body_gradients(body, u, gradients)
+    none = u[:0]
+    for k in range(body.table.shape[0]):
+        run_tangent(tables_of(body, k), u, _stress(body, k, stresses), none, none, A.flat[A.top:],
+                    A.ld)
 
 
 @source
@@ -277,5 +280,26 @@ def add_force_by(body, copies, gradients, stresses, f):
 @source
 def add_unsymmetric(body, u, v, U):
     """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
-    none = u[:0]
-    evaluate_body(body, np.int64(UNSYMMETRIC), u, v, none, none, none, U.flat, U.ld)
+    for k in range(body.table.shape[0]):
+        run_unsymmetric(tables_of(body, k), u, v, U.flat, U.ld)
+
+
+@source
+def add_eigen_force(body, u, given, f):
+    """Add the change of the force at u by eigenstrains, see :func:`eigenstrain_body_of`."""
+    for k in range(body.table.shape[0]):
+        run_eigen_force(tables_of(body, k), u, _stress(body, k, given), f)
+
+
+@source
+def add_eigen_mean(body, u0, u1, given, f):
+    """Add the change of the mean force from u0 to u1."""
+    for k in range(body.table.shape[0]):
+        run_eigen_mean(tables_of(body, k), u0, u1, _stress(body, k, given), f)
+
+
+@source
+def add_eigen_tangent(body, u, given, flat, ld):
+    """Add the change of the tangent at u to a lower half."""
+    for k in range(body.table.shape[0]):
+        run_eigen_tangent(tables_of(body, k), u, _stress(body, k, given), flat, ld)

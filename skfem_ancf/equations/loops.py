@@ -9,13 +9,15 @@ from ..actions.contact.kernels import of_contacts
 from ..actions.contact.tables import ContactTables, Question
 from ..actions.forces.kernels import Kinds, of_kinds
 from ..beam.kernels.law import point_of
-from ..beam.kernels.strain import evaluate
+from ..beam.kernels.strain import (EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT, FORCE, GIVEN,
+                                   GRADIENTS, LINEARISED, MEAN, STRESS, TANGENT, UNSYMMETRIC,
+                                   VISCOUS, evaluate)
 from ..beam.kernels.tables import StrainTables
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
 from ..core.jit import MADE, address, caller, compiled, reader
 from ..core.origin import ours
-from ..core.source import F1, F3
+from ..core.source import F1, F3, source
 from ..core.words import Words
 from .tables import Equations
 
@@ -32,8 +34,65 @@ def tables_of(body, k):
     return _read(body.packs[k])
 
 
-def run(t, what, u, v, f, given, out, flat, ld):
-    _call_strain(t.address, (t, what, u, v, f, given, out, flat, ld))
+@source
+def _run(t, what, u, v, f, given, out, flat, ld):
+    _call_strain(t.address, (t, np.int64(what), u, v, f, given, out, flat, ld))
+
+
+def run_force(t, u, f):
+    _run(t, FORCE, u, u, f, u[:0], u[:0], u[:0], 0)
+
+
+def run_stress(t, u, out):
+    _run(t, STRESS, u, u, u[:0], u[:0], out, u[:0], 0)
+
+
+def run_linearised(t, u, du, given, out):
+    _run(t, LINEARISED, u, du, u[:0], given, out, u[:0], 0)
+
+
+def run_mean(t, u, v, f):
+    _run(t, MEAN, u, v, f, u[:0], u[:0], u[:0], 0)
+
+
+def run_mixed(t, u, given, out, f):
+    _run(t, FORCE, u, u, f, given, out, u[:0], 0)
+
+
+def run_mean_mixed(t, u, v, given, out, f):
+    _run(t, MEAN, u, v, f, given, out, u[:0], 0)
+
+
+def run_given(t, u, given, f):
+    _run(t, GIVEN, u, u, f, given, u[:0], u[:0], 0)
+
+
+def run_viscous(t, u, v, f):
+    _run(t, VISCOUS, u, v, f, u[:0], u[:0], u[:0], 0)
+
+
+def run_tangent(t, u, given, out, f, flat, ld):
+    _run(t, TANGENT, u, u, f, given, out, flat, ld)
+
+
+def run_gradients(t, u, out):
+    _run(t, GRADIENTS, u, u, u[:0], u[:0], out, u[:0], 0)
+
+
+def run_unsymmetric(t, u, v, flat, ld):
+    _run(t, UNSYMMETRIC, u, v, u[:0], u[:0], u[:0], flat, ld)
+
+
+def run_eigen_force(t, u, given, f):
+    _run(t, EIGENSTRAIN, u, u, f, given, u[:0], u[:0], 0)
+
+
+def run_eigen_mean(t, u, v, given, f):
+    _run(t, EIGENSTRAIN_MEAN, u, v, f, given, u[:0], u[:0], 0)
+
+
+def run_eigen_tangent(t, u, given, flat, ld):
+    _run(t, EIGENSTRAIN_TANGENT, u, u, u[:0], given, u[:0], flat, ld)
 
 
 def evaluate_points(law, strain, out):

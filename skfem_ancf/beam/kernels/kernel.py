@@ -13,8 +13,8 @@ from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from . import arrays
 from .law import LINEAR, law_evaluate
-from .strain import (EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT, FORCE, GIVEN, GRADIENTS,
-                     MEAN, STRESS, TANGENT, VISCOUS, evaluate)
+from .runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
+                   run_gradients, run_mean, run_stress, run_tangent, run_viscous)
 from .tables import StrainTables, apart, linearised, repeated, scaled
 
 #: Approximate number of elements whose energies are evaluated together.
@@ -94,15 +94,15 @@ class ElementKernel:
 
     def forces(self, u: Array) -> Array:
         """Internal forces of the elements."""
-        return self._forces(self.tables, FORCE, u)
+        return self._forces(self.tables, run_force, u)
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """The force (N,) whose work from u0 to u1 is the change of the energy."""
-        return self.scatter(self._forces(self.tables, MEAN, u0, u1))
+        return self.scatter(self._forces(self.tables, run_mean, u0, u1))
 
     def forces_of(self, stresses: list[Array], u: Array) -> Array:
         """Element forces of given stresses."""
-        return self._forces(self.tables, GIVEN, u, given=stresses)
+        return self._forces(self.tables, run_given, u, given=stresses)
 
     def eigenstrain_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:
         """Change of :meth:`forces`, or of their mean from u to ``end``, by eigenstrains.
@@ -110,31 +110,29 @@ class ElementKernel:
         ``given`` are stresses for tables of linear laws, and strains at the points of others,
         (3, points, ne).
         """
-        what = EIGENSTRAIN if end is None else EIGENSTRAIN_MEAN
-        return self._forces(self.tables, what, u, end, given)
+        run = run_eigen_force if end is None else run_eigen_mean
+        return self._forces(self.tables, run, u, end, given)
 
     def eigenstrain_tangents(self, given: list[Array], u: Array) -> Array:
         """Change of the :meth:`tangents` by eigenstrains, see :meth:`eigenstrain_forces`."""
-        return self._tangents(EIGENSTRAIN_TANGENT, u, given)
+        return self._tangents(run_eigen_tangent, u, self.tables, given)
 
-    def _forces(self, tables, what, u, v=None, given=None):
-        """Element forces by :func:`~skfem_ancf.beam.kernels.strain.evaluate`."""
-        u = self.gather(self._checked(u)).ravel()
-        v = u if v is None else self.gather(self._checked(v)).ravel()
-        out = np.zeros_like(u)
+    def _forces(self, tables, run, u, v=None, given=None):
+        """Element forces by a kernel of :mod:`.runs`."""
+        u = [self.gather(self._checked(x)).ravel() for x in (u, v) if x is not None]
+        out = np.zeros_like(u[0])
         for k, t in enumerate(map(apart, tables)):
-            evaluate(t, what, u, v, out, u[:0] if given is None else given[k].ravel(), u[:0],
-                     u[:0], 0)
+            run(t, *u, *([] if given is None else [given[k].ravel()]), out)
         return out.reshape(self.t.shape[1], -1, 2)
 
     def viscous_forces(self, u: Array, v: Array, time: float) -> Array:
         """Viscous element forces for the rate v of the displacement."""
-        return self._forces(self.viscous_tables(time), VISCOUS, u, v)
+        return self._forces(self.viscous_tables(time), run_viscous, u, v)
 
     def small_forces(self, u: Array) -> Array:
         """Linearised element forces; complex for a :func:`~skfem_ancf.core.linear.step`."""
         z = self._checked(u if np.iscomplexobj(u) else step(0.0, u))
-        out = 1j * self._forces(map(linearised, self.tables), FORCE, z).imag  # without round-off
+        out = 1j * self._forces(map(linearised, self.tables), run_force, z).imag  # without round-off
         return out if np.iscomplexobj(u) else first_order(out)
 
     def small_energy(self, u: Array) -> float:
@@ -146,7 +144,7 @@ class ElementKernel:
 
     def tangents(self, u: Array) -> Array:
         """Element tangents (ne, 2 nb, 2 nb)."""
-        return self._tangents(TANGENT, u)
+        return self._tangents(_run_tangent, u, self.tables)
 
     def geometric(self, u: Array, stress: Array) -> Array:
         """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m).
@@ -154,14 +152,13 @@ class ElementKernel:
         The stresses of all :attr:`tables` are side by side; further columns are ignored.
         """
         given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
-        return self._tangents(EIGENSTRAIN_TANGENT, u, given, map(linearised, self.tables))
+        return self._tangents(run_eigen_tangent, u, map(linearised, self.tables), given)
 
-    def _tangents(self, what, u, given=None, tables=None):
+    def _tangents(self, run, u, tables, given=None):
         u, n = self.gather(self._checked(u)).ravel(), 2 * self.nd
         flat = np.zeros((self.t.shape[1], n, n + 1))
-        for k, t in enumerate(map(apart, self.tables if tables is None else tables)):
-            evaluate(t, what, u, u, np.zeros_like(u), u[:0] if given is None else given[k].ravel(),
-                     u[:0], flat.reshape(-1), n + 1)
+        for k, t in enumerate(map(apart, tables)):
+            run(t, u, u[:0] if given is None else given[k].ravel(), flat.reshape(-1), n + 1)
         i, j = np.tril_indices(n)
         out = np.empty((len(flat), n, n))
         out[:, i, j] = out[:, j, i] = flat[:, j, i - j]
@@ -179,11 +176,11 @@ class ElementKernel:
             Weighted stresses, (ne, m): ``B^T stress`` is the internal force.
         """
         u, ne, n = self._checked(u), self.t.shape[1], 2 * self.nd
-        found, stresses, none = [], [], u[:0]
+        found, stresses = [], []
         for t in self.tables:
             both, T = np.empty((2, ne, t.rows.shape[1], n)), np.empty((ne, t.rows.shape[1]))
-            evaluate(t, GRADIENTS, u, u, none, none, both.reshape(-1), none, 0)
-            evaluate(t, STRESS, u, u, none, none, T.reshape(-1), none, 0)
+            run_gradients(t, u, both.reshape(-1))
+            run_stress(t, u, T.reshape(-1))
             found.append(both)
             stresses.append(T)
         if self.constant is not None:
@@ -199,6 +196,10 @@ class ElementKernel:
     def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere."""
         return False
+
+
+def _run_tangent(t, u, given, flat, ld):
+    run_tangent(t, u, given, given, np.zeros_like(u), flat, ld)
 
 
 def _square_root(K):

@@ -7,7 +7,7 @@ ns); see :mod:`.tables`.
 
 import numpy as np
 
-from ...core.source import primitive, shaped, source
+from ...core.source import shaped, source
 from .arrays import (add_constant, add_forces, add_geometric, add_material, add_products,
                      add_stiffness, add_to_band, at_points, block, changed, derivatives,
                      difference, displaced, from_points, middle, moduli_of, moved, linear_moduli,
@@ -159,12 +159,6 @@ def put_gradients(t, u, B, HB):
         put_columns(two, HB[first:last])
 
 
-@primitive("skfem_ancf.equations.loops")
-def run(t, what, u, v, f, given, out, flat, ld):
-    """:func:`evaluate`; compiled code calls its address, so that it is compiled once."""
-    evaluate(t, what, u, v, f, given, out, flat, ld)
-
-
 @source
 def evaluate(t, what, u, v, f, given, out, flat, ld):
     """Evaluate the elements of one table.
@@ -214,5 +208,5 @@ def evaluate(t, what, u, v, f, given, out, flat, ld):
         add_forces_at(t, what, u, du, T, shift, S, f)
     if what == MEAN:
         add_constant_force(t, u + 0.5 * du, f)
-    elif what == FORCE or what == TANGENT:
+    elif f.size > 0 and (what == FORCE or what == TANGENT):
         add_constant_force(t, u, f)
