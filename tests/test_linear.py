@@ -43,6 +43,28 @@ def test_reactions_of_a_propped_beam_do_not_depend_on_the_load(element, q):
     assert_allclose(found.Q, shear, rtol=1e-8, atol=1e-8 * q)
 
 
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(2), ElementBeamANCFCubic(2),
+                                     ElementBeamCable(3), ElementBeamCable(5)], ids=repr)
+@pytest.mark.parametrize("L, places", [(1.0, (0.37,)), (10.0, (3.7,)), (1.0, (0.385, 0.46)),
+                                       (1.0, (0.01, 0.93)), (1.0, (0.375, 0.37))])
+def test_forces_inside_elements(element, L, places):
+    """Jumps of Q and kinks of M, at places that are no nodes; a moment at the end."""
+    x = np.linspace(0.0173, 0.99, 33) * L
+    mesh = MeshBeam.init_line(np.linspace(0, L, 9), 0.1)
+    scene = Scene(Beam(mesh, element, STEEL, width=0.1)).clamp("left")
+    scene.moment("right", 200.0)
+    M, Q = 200.0 + 0.0 * x, 0.0 * x
+    for k, a in enumerate(places):
+        F = 1e3 * (k + 1)
+        scene.point_force((0, -F), at=(a, 0))
+        M, Q = M - F * np.maximum(a - x, 0.0), Q - F * (x < a)
+    found = scene.solve_linear().resultants([(a, 0) for a in x])
+    assert found.recovered
+    assert_allclose(found.M, M, atol=1e-9 * np.abs(M).max())
+    assert_allclose(found.Q, Q, atol=1e-9 * np.abs(Q).max())
+    assert_allclose(found.N, 0, atol=1e-9 * np.abs(Q).max())
+
+
 @pytest.mark.parametrize("recover", [True, False])
 def test_strain_and_stress_of_a_cantilever_are_those_of_bending(recover):
     """sigma = M y / I, eps_yy = - nu eps_xx, whatever the load; no normal force."""

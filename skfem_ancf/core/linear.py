@@ -41,6 +41,11 @@ def first_order(z: Any) -> Any:
     return z.real + z.imag / STEP if np.iscomplexobj(z) else z
 
 
+def largest(z: Array) -> Any:
+    """Largest modulus; of a result at a :func:`step` that of its change, without round-off."""
+    return np.max(np.abs(z.imag / STEP if np.iscomplexobj(z) else z))
+
+
 def angle_of(x: Any, y: Any) -> Any:
     """``arctan2(y, x)`` in radians, also for a :func:`step`."""
     if not np.iscomplexobj(x):

@@ -32,6 +32,7 @@ from numpy.polynomial.chebyshev import chebint, chebvander
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..beam.strains import on_grid, stress_at
+from ..core.linear import largest
 from ..core.quadrature import gauss
 from ..core.types import Array, Law
 from ..formulations.ecm import EnhancedContinuum
@@ -281,12 +282,20 @@ class Recovery:
         self.has_stress = (len(layers) == 1 and layers[0].face is None
                            and beam.element.carries_shear_parabola
                            and not isinstance(beam.formulation, EnhancedContinuum))
-        self.segments = [Segment(self, a, b) for a, b in pairwise(forces.cuts)]
-        strain = max(np.max(np.abs(segment.stretch - 1.0)) for segment in self.segments)
-        change = max(segment.change for segment in self.segments) / max(strain, TINY)
+        self.segments: list[Segment] = []
+        try:
+            self.segments = self._solved()
+        except NotRecovered as why:
+            self.why = self.why or str(why)
+
+    def _solved(self):
+        found = [Segment(self, a, b) for a, b in pairwise(self.forces.cuts)]
+        strain = max(largest(segment.stretch - 1.0) for segment in found)
+        change = max(segment.change for segment in found) / max(strain, TINY)
         if change > UNSETTLED:
             raise NotRecovered("the iteration does not converge: the last change of the strain is "
                                f"{change:.0%} of its largest value")
+        return found
 
     def _heights(self, e, xi):
         return (self.beam.mesh.mapping().height(xi[:, None], e)[0] + 0.0 * xi[:, None])[:, 0]
@@ -344,7 +353,7 @@ class Recovery:
         before = ((xi > 1.0 - SNAP) | ~at_node) & ~np.asarray(after)
         found = np.where(before, np.searchsorted(cuts, place),
                          np.searchsorted(cuts, place, side="right")) - 1
-        return np.clip(found, 0, len(self.segments) - 1)
+        return np.clip(found, 0, len(cuts) - 2)
 
     def at(self, e: Array, X: Array, rows: slice = slice(7)) -> Array:
         """Rows of strain, stress and angle (7 in all) at points X (2, n); shape (rows, n)."""

@@ -156,7 +156,7 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
     else:
         (e, xi), after = at, np.zeros(len(at[0]), dtype=bool)
     if recovery is not None:
-        values = _recovered(recovery, e, xi, after)
+        values = _recovered(recovery, u, e, xi, after)
         if not beam.has_sections:
             values.update(_strains_of_cable(beam, eigen, e, xi, values["N"], values["M"]))
     elif beam.has_sections:
@@ -193,9 +193,15 @@ def _result(R, M, angle, stretch, shear, curvature):
                 stretch=stretch, shear=shear, angle=angle, force=R)
 
 
-def _recovered(recovery, e, xi, after):
-    segment = recovery.segment_of(e, xi, after)
+def _recovered(recovery, u, e, xi, after):
+    """Section forces, and strains of the axis, or those of the elements where fields diverge."""
+    segment, beam = recovery.segment_of(e, xi, after), recovery.beam
     R, M = recovery.forces.at(e, xi, recovery.forces.cuts[segment])
+    if not recovery.segments:
+        if beam.has_sections:
+            return _result(R, M, *_axis_of_element(beam, u, e, xi))
+        (_, t), strain, curvature, _ = cable_axis(beam, u, e, xi)
+        return _result(R, M, angle_of(*t), 1.0 + strain, 0.0 * xi, curvature)
     out = np.empty((4, len(e)), R.dtype)
     s = recovery.arc.at(e, xi)
     for k in np.unique(segment):

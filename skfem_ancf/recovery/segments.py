@@ -10,7 +10,7 @@ import scipy
 from scipy.linalg import solve_banded
 
 from ..beam.distribution import AXIS
-from ..core.linear import angle_of, first_order, unwrapped
+from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array
 from ..mesh.mapping import cross
 from ..sections.jumps import beside
@@ -224,7 +224,7 @@ class Segment:
             self.stretch = self.stretch + change
             if self.stress_given:
                 self.S[0] += E * self.stretch * change
-            if np.max(np.abs(change)) < 1e-12 * np.max(np.abs(self.eps[0])):
+            if largest(change) < 1e-12 * largest(self.eps[0]):
                 break
 
     def _turn(self):
@@ -306,8 +306,8 @@ class Segment:
             self._balance(BALANCE)
             self._turn()
             self._equilibrium()
-            self.change = np.max(np.abs(self.stretch - before))
-            if self.change <= np.max(np.abs(self.stretch - 1.0)) * (
+            self.change = largest(self.stretch - before)
+            if self.change <= largest(self.stretch - 1.0) * (
                     SETTLED if k < ROUNDS - 1 else SLOWLY):
                 break
         self._balance()
