@@ -128,6 +128,7 @@ class Beam(Immutable):
             element = choose_element(mesh, self.material.reference()[0], fields, tolerance)
         if not isinstance(element, ElementBeam):
             raise InputError(f"element must be a ElementBeam, got {shown(element)}")
+        element = self.section.element_for(element)
         if damping is not None and not isinstance(damping, KelvinVoigt):
             raise InputError("damping must be a KelvinVoigt, as KelvinVoigt(1e-4), or None, got "
                              f"{shown(damping)}")

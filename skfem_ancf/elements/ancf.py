@@ -7,6 +7,7 @@ from numpy.polynomial import legendre
 
 from ..core.errors import require_integer, require_option
 from ..core.immutable import read_only
+from ..core.origin import ours
 from ..core.quadrature import gauss_lobatto
 from ..core.types import Array
 from .base import ElementBeam, SectionFunctions
@@ -76,6 +77,9 @@ class ElementBeamANCF(ElementBeam):
         functions = SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1)))
         names, functionals = self._coordinates()
         super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
+
+    def plane(self) -> ElementBeam | None:
+        return ElementBeamANCF(1) if ours(self) else None
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         return ([f"r_Y{k}" for k in range(len(self.section_points))],

@@ -144,6 +144,10 @@ class ElementBeam(Immutable, Element):
         """
         return None
 
+    def plane(self) -> ElementBeam | None:
+        """The element of order 1 with the same axis, or None: for sections that stay plane."""
+        return None
+
     def across(self, n: int) -> Rule:
         """n Gauss points eta and weights across the section."""
         return gauss(n) if self._measure is None else self._measure.gauss(n)

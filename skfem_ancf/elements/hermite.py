@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..core.origin import ours
 from .ancf import ElementBeamANCF
-from .base import DEGREES, require_degree
+from .base import DEGREES, ElementBeam, require_degree
 
 
 class ElementBeamANCFHermite(ElementBeamANCF):
@@ -48,6 +48,9 @@ class ElementBeamANCFHermite(ElementBeamANCF):
         if not ours(self) or self.axis_degree == DEGREES[-1]:
             return None
         return ElementBeamANCFHermite(self.order, self.axis_degree + 2, self._points)
+
+    def plane(self) -> ElementBeam | None:
+        return ElementBeamANCFHermite(1, self.axis_degree) if ours(self) else None
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         names, functionals = super()._coordinates()

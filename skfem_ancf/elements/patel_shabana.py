@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.origin import ours
+from .ancf import ElementBeamANCF
 from .base import ElementBeam, SectionFunctions
 
 
@@ -28,3 +30,6 @@ class ElementBeamPatelShabana(ElementBeam):
         # P' = 1 for r_Y, and P' = eta for h r_YY: legendre coefficients in 2 eta
         super().__init__(SectionFunctions(np.array([[1.0, 0.0], [0.0, 0.5]])),
                          ["r_Y", "r_YY"], [(0.0, 0, 1), (0.0, 0, 2)], ["r_Y", "r_YY"])
+
+    def plane(self) -> ElementBeam | None:
+        return ElementBeamANCF(1) if ours(self) else None

@@ -271,7 +271,7 @@ class Recovery:
             "stiffnesses; State.resultants() has the section forces")
         self.intervals = Intervals(layers, beam.element.order)
         laws = [layer.material.law(layer.shear) for layer in layers]
-        if forces.small:  # linearised laws
+        if forces.small or not beam.has_sections:  # linearised laws; a cable has no others
             laws = [law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
                     for law in laws]
         self.laws = list(zip(self.intervals.layers, laws))

@@ -16,7 +16,9 @@ from ..core.errors import (CallError, InputError, ask_array, require_flag, requi
                            require_positive, shown)
 from ..core.immutable import Immutable
 from ..core.types import Array, HasShear
-from ..materials import Material, StVenantKirchhoff
+from ..elements.base import ElementBeam
+from ..materials import Material
+from ..materials.plane_sections import PlaneSections
 from ..mesh.mesh_beam import MeshBeam
 from .measure import MORE, WHOLE, Piece, Uniform, Weighted
 from .moving import Moving
@@ -166,7 +168,11 @@ class Section(Immutable):
     @staticmethod
     def numbers(EA: float, EI: float, GA: float | None = None, rhoA: float | None = None,
                 rhoI: float | None = None, width: float = 1.0) -> Section:
-        """A section given by stiffnesses and inertias about the axis.
+        """A section given by stiffnesses and inertias about the axis: the beam of Reissner and Simo.
+
+        Sections stay plane and keep their size. So an element with sections of a higher order is
+        replaced by that of order 1 with the same axis; ``beam.element`` is the one in use. The
+        formulation is "assumed".
 
         Parameters
         ----------
@@ -183,7 +189,13 @@ class Section(Immutable):
         Raises
         ------
         InputError
-            If a number is not positive.
+            If a number is not positive; when the Beam is made, if a user-defined element has an
+            order above 1.
+
+        References
+        ----------
+        Simo: "A finite strain beam formulation. The three-dimensional dynamic problem. Part I",
+        Computer Methods in Applied Mechanics and Engineering 49 (1985).
 
         Examples
         --------
@@ -194,6 +206,10 @@ class Section(Immutable):
         0.6
         """
         return Numbers(EA, EI, GA, rhoA, rhoI, width)
+
+    def element_for(self, element: ElementBeam) -> ElementBeam:
+        """The element of a beam with this section, from the one that the user gives."""
+        return element
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         """The layers on the mesh of a beam, from bottom to top.
@@ -332,8 +348,9 @@ def _layer(given, k, h):
 class Numbers(Section):
     """A section given by stiffnesses, see :meth:`Section.numbers`.
 
-    It is a rectangle with E = EA / (b h) and nu = 0, whose height sqrt(12 EI / EA) may differ from
-    the height h of the mesh, which section coordinates and plots use.
+    Two Gauss points at a distance of sqrt(EI / EA) from the axis have its stiffnesses. Masses at
+    sqrt(rhoI / rhoA) have its inertias. The height of the mesh serves section coordinates and plots
+    only.
     """
 
     has_materials = True
@@ -349,31 +366,29 @@ class Numbers(Section):
         if rhoI is not None and rhoA is None:
             raise InputError("rhoI is given without rhoA: give both, or neither of them")
 
+    def element_for(self, element: ElementBeam) -> ElementBeam:
+        plane = element if element.order < 2 else element.plane()
+        if plane is None:
+            raise InputError(f"{self!r} has plane sections: it takes cables and elements of order "
+                             f"1, got {type(element).__name__} of order {element.order}")
+        return plane
+
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
         b, h = self.width_of_faces, mesh.height
         if mesh.heights is not None:
             raise InputError("a section given by numbers is constant along the beam: use a mesh of "
                              "constant height")
-        E = self.EA / (b * h)
         GA = 5.0 / 12.0 * self.EA if self.GA is None else self.GA
         density = None if self.rhoA is None else self.rhoA / (b * h)
-        law = _Given(E=E, nu=0.0, density=density, shear_correction=2.0 * GA / self.EA)
+        law = PlaneSections(self.EA / (b * h), GA / (b * h), density)
         part = np.sqrt(12.0 * self.EI / self.EA) / h
         own = part if self.rhoI is None or self.rhoA is None else (
             np.sqrt(12.0 * self.rhoI / self.rhoA) / h)
         return [Layer(law, b, Uniform(0.5 - 0.5 * part, 0.5 + 0.5 * part), face=(b, b), outer=b,
-                     density=density, shear=2.4 * GA / self.EA,
-                     inertia=Uniform(0.5 - 0.5 * own, 0.5 + 0.5 * own))]
+                      density=density, shear=1.2, inertia=Uniform(0.5 - 0.5 * own, 0.5 + 0.5 * own))]
 
     def __repr__(self) -> str:
         return f"Section.numbers(EA={self.EA:g}, EI={self.EI:g})"
-
-
-class _Given(StVenantKirchhoff):
-    """Hooke's law whose shear factor gives the requested shear stiffness at every order."""
-
-    def shear_factor(self, element: HasShear) -> float:
-        return super().shear_factor(element) * (1.2 if element.carries_shear_parabola else 1.0)
 
 
 #: Sizes of a profile besides the height, which is that of the mesh.

@@ -15,6 +15,7 @@ from .frames import (
                      williams_toggle,
 )
 from .pendulums import double_pendulum, rigid_pendulum, rigid_pendulum_period
+from .reissner import Reissner
 from .rods import (
                      elastica_extensible_tip,
                      elastica_tip_load,
@@ -26,7 +27,7 @@ from .rods import (
 from .sections import euler_bernoulli_tip, inertia, root_transverse_strain, shear_factor
 from .vibration import euler_bernoulli_frequencies, timoshenko_frequencies
 
-__all__ = ["clamped_hinged_arch", "clamped_hinged_arch_limit", "double_pendulum",
+__all__ = ["Reissner", "clamped_hinged_arch", "clamped_hinged_arch_limit", "double_pendulum",
            "elastica_extensible_tip", "elastica_tip_load", "euler_bernoulli_frequencies",
            "euler_bernoulli_tip", "euler_buckling_load", "gravity_cantilever", "greenhill_load",
            "inertia", "lee_frame", "lee_frame_limits", "rigid_pendulum", "rigid_pendulum_period",
