@@ -28,13 +28,15 @@ PARTS = "StrainTables", "elements", "contacts"
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
 COMPILING = {"StrainTables": 24.0, "elements": 3.0, "contacts": 12.0,
-             "equilibrium": 14.0, "steps": 27.0, "evaluate": 2.0}
+             "tangent": 2.0, "force": 1.0, "linearised": 1.0, "steps": 27.0}
 #: The same for functions that are compiled on first use only.
-WHERE_USED = {"collocate": 25.0}
+WHERE_USED = {"collocate": 25.0, "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
+#: Seconds of compiling that need no reason once the parts are loaded.
+SHORT = 2.0
 #: Approximate seconds of an iteration in NumPy, and of each element and point of contact in it.
-ITERATION, ELEMENT, POINT = 1e-3, 1.2e-5, 4e-6
+ITERATION, ELEMENT, POINT = 3e-4, 6e-6, 4e-6
 #: Compiling costs so many times the work in NumPy after which it begins: a later process works on.
 SERVES = 5
 #: Approximate seconds that this process has worked in NumPy since it last compiled.
@@ -108,7 +110,7 @@ class Backend:
             return Choice("plain", self._off)
         if wanted() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
-        if missing == ["evaluate"]:
+        if missing == [name] and SECONDS[name] <= SHORT:
             return Choice("compiled", "its parts are loaded")
         work = _worked + self.seconds(iterations)
         so_far = f"in this process NumPy takes about {work:.2g} s so far"
@@ -142,12 +144,21 @@ class Backend:
         return self._workspaces[make.__name__]
 
     def of(self, kernel: Callable, iterations: float = 1.0) -> Callable:
-        """A kernel bound to the equations, its first argument, in NumPy or compiled."""
-        global _worked
-        if self.choose(kernel.__name__, iterations).way == "plain":
-            _worked += self.seconds(iterations)
-            return self._in_numpy(kernel)
+        """A kernel bound to the equations, its first argument, in NumPy or compiled.
 
+        ``iterations`` are those of the work that is done with it.
+        """
+        return self.leaves(kernel, iterations=iterations)[0]
+
+    def leaves(self, *kernels: Callable, iterations: float) -> list[Callable]:
+        """As :meth:`of` for some kernels, all as the first is chosen."""
+        global _worked
+        if self.choose(kernels[0].__name__, iterations).way == "plain":
+            _worked += self.seconds(iterations)
+            return [self._in_numpy(kernel) for kernel in kernels]
+        return [self._compiled(kernel) for kernel in kernels]
+
+    def _compiled(self, kernel):
         def run(*args):
             try:
                 function, equations = self._load(kernel, args)

@@ -21,10 +21,12 @@ def compile_all() -> None:
         raise SystemExit(f"nothing is compiled: {reason}")
     scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamCable(3),
                        StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.01)).clamp("left")
-    system = scene.system
+    system, zero = scene.system, np.zeros(scene.system.N)
     works: dict[str, Callable[[], object]] = {
-             "evaluate": lambda: system.internal_force(np.zeros(system.N)),
-             "equilibrium": scene.solve_static,
+             "tangent": lambda: system.assemble(zero),
+             "force": lambda: system.internal_force(zero + 1e-9),
+             "linearised": lambda: system.linearised_stress(
+                 zero, *2 * [system.backend.tables.stresses], zero),
              "steps": lambda: scene.integrate(0.02, 0.01, EnergyMomentum())}
     if on_disk(*COMPILING):
         print(f"all is compiled already, in {folder()}", file=sys.stderr)

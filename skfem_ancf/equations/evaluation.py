@@ -1,41 +1,102 @@
-"""Single evaluations of the equations of a scene."""
+"""Evaluations of the equations of a scene, which run in NumPy or compiled."""
 
 import numpy as np
 
-from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
-                                  body_stress, body_tangent)
-from ..actions.forces.kernels import AT_ONCE, add_elastic_force, add_element_tangent
-from ..core.source import source
+from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_tangent,
+                                      contact_along, contact_work)
 from ..actions.tables import add_load_stiffness
-
-FORCE, TANGENT, LINEARISED, STRESS, MEAN, VISCOUS = range(6)
+from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
+                                  body_tangent)
+from ..core.band import dot
+from ..core.source import indices, source
 
 
 @source
-def evaluate(e, what, u, v, factors, t, scale, use_independent, stresses, independent, f):
-    """Evaluate the equations e; one function, so that it is compiled once.
+def force(e, u, at, f):
+    """Set the internal force f at u; ``at`` is the time, or the load factor in statics."""
+    body_force(e.body, u, f)
+    add_elastic_force(e.forces, at, 0.0, u, u, f)
 
-    ``what`` is FORCE: the internal force f at u; TANGENT: also the tangent of the residual in
-    ``e.K`` and the stresses, with the independent stresses in the geometric part if
-    ``use_independent``; LINEARISED: stresses linearised from u to u + v; STRESS: stresses at u;
-    MEAN: the mean force from u to v; VISCOUS: the viscous force at the velocity v. ``factors``,
-    ``t`` and ``scale`` are as for :func:`~skfem_ancf.actions.tables.external_force`.
+
+@source
+def mean_force(e, u0, u1, at, f):
+    """Set the mean of the internal force, with exact work from u0 to u1."""
+    body_mean(e.body, u0, u1, f)
+    add_elastic_force(e.forces, at, AT_ONCE, u0, u1, f)
+
+
+@source
+def viscous_force(e, u, v, f):
+    """Add the viscous force of the materials at the velocity v."""
+    add_viscous_force(e.viscous, u, v, f)
+
+
+@source
+def tangent(e, u, factors, t, scale, at, use_independent, stresses, independent, f):
+    """Set internal force, stresses, and the tangent of the residual, in ``e.K``.
+
+    The geometric part uses the independent stresses if ``use_independent``. ``factors``, ``t`` and
+    ``scale`` are as for :func:`~skfem_ancf.actions.tables.external_force`.
     """
-    at = t if np.isfinite(t) else scale  # time, or load factor in statics
-    if what == FORCE:
-        body_force(e.body, u, f)
-        add_elastic_force(e.forces, at, 0.0, u, u, f)
-    elif what == TANGENT:
-        body_tangent(e.body, u, f, independent, use_independent, stresses, e.K)
-        add_elastic_force(e.forces, at, 0.0, u, u, f)
-        add_load_stiffness(e.loads, factors, t, scale, u, e.K)
-        add_element_tangent(e.forces, at, u, e.K)
-    elif what == LINEARISED:
-        body_linearised(e.body, u, v, stresses, independent)
-    elif what == STRESS:
-        body_stress(e.body, u, stresses)
-    elif what == MEAN:
-        body_mean(e.body, u, v, f)
-        add_elastic_force(e.forces, at, AT_ONCE, u, v, f)
-    else:
-        add_viscous_force(e.viscous, u, v, f)
+    body_tangent(e.body, u, f, independent, use_independent, stresses, e.K)
+    add_elastic_force(e.forces, at, 0.0, u, u, f)
+    add_load_stiffness(e.loads, factors, t, scale, u, e.K)
+    add_element_tangent(e.forces, at, u, e.K)
+
+
+@source
+def linearised(e, u, du, stresses, independent):
+    """Set the independent stresses: stresses at u plus their linearised change by du."""
+    body_linearised(e.body, u, du, stresses, independent)
+
+
+#: Line search with contact: accepted relative residual along the correction; largest number of
+#: trials; largest number of intervals.
+LEFT, TRIES, PARTS = 0.5, 12, 16
+
+
+@source
+def hold_back(e, t, u, R, du, dm):
+    """Line search for a correction that runs into obstacles; scales du and dm.
+
+    The residual along the correction, of the equations linearised without contact plus the actual
+    contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close in
+    turn.
+    """
+    work, two, scratch = dot(R, du), np.empty(2), np.zeros(u.size)
+    contact_along(e.forces, t, u, du, two)
+    if not work > 0.0:
+        return
+    parts = int(min(max(np.ceil(two[1]), 1.0), PARTS))
+    before, low, high = contact_work(e.forces, t, u, du, scratch), 0.0, 1.0
+    left, left_low = work, work
+    for k in range(parts):
+        high = (k + 1.0) / parts
+        left = _left(e, t, u, du, high, work, two[0], before, scratch)
+        if left < -LEFT * work:
+            break
+        low, left_low = high, left
+    if left >= -LEFT * work:
+        return
+    s = high
+    for k in range(TRIES):
+        s = 0.5 * (low + high) if left_low <= 0.0 or k > 2 else max(
+            low + 0.1 * (high - low), low + (high - low) * left_low / (left_low - left))
+        now = _left(e, t, u, du, s, work, two[0], before, scratch)
+        if abs(now) <= LEFT * work:
+            break
+        if now > 0.0:
+            low, left_low = s, now
+        else:
+            high, left = s, now
+    for i in indices(du.size):
+        du[i] *= s
+    for k in indices(dm.size):
+        dm[k] *= s
+
+
+@source
+def _left(e, t, u, du, s, work, along, before, scratch):
+    """Residual along the correction at a fraction s of it."""
+    now = contact_work(e.forces, t, u + s * du, du, scratch)
+    return (1.0 - s) * work - (now - before - s * along)

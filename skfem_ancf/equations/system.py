@@ -29,9 +29,9 @@ from ..core.linalg import BandMatrix
 from ..core.types import Array
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
+from . import evaluation
 from .backend import Backend
 from .constraints import Constraints
-from .evaluation import FORCE, LINEARISED, MEAN, TANGENT, VISCOUS, evaluate
 from .linear_solver import LinearSolver
 from .mass_solver import MassSolver, ModalDamping
 from .scales import Scales
@@ -219,11 +219,11 @@ class System:
         self._require_displacement(u)
         if not (u.any() or self.forces.elements) and all(b.kernel.linear for b in self.beams):
             return np.zeros(self.N)  # without round-off
-        return self._evaluate(FORCE, u, load=load, t=t)
+        return self._force(evaluation.force, u, at=self._time(load, t))
 
     def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
         """The internal force (N,) whose work from u0 to u1 is the change of the strain energy."""
-        return self._evaluate(MEAN, u0, u1, t=t)
+        return self._force(evaluation.mean_force, u0, u1, at=self._time(1.0, t))
 
     def strain_energy(self, u: Array, t: float = 1.0) -> float:
         """Strain energy of beams and potential of force elements."""
@@ -286,7 +286,7 @@ class System:
 
     def damping_force(self, u: Array, v: Array, t: float | None = None) -> Array:
         """The damping force at u and v, shape (N,)."""
-        force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
+        force = self._force(evaluation.viscous_force, u, v) if self.viscous else np.zeros(self.N)
         if self.forces.resists:
             add_resisting_force(self.backend.tables.plain.forces, 0.0 if t is None else t, u, v,
                                 force)
@@ -349,33 +349,38 @@ class System:
         t = self.clock if t is None else t
         self.K.clear()
         self.solver.assembled_at(u, load if t is None else t)
-        stresses = self.backend.tables.stresses
+        tables = self.backend.tables
+        stresses, force, at = tables.stresses, np.zeros(self.N), self._time(load, t)
         if not geometric:
             independent = np.zeros_like(stresses)
-        force = self._evaluate(TANGENT, u, None, load, t, (stresses, independent), geometric)
+        factors, time = tables.static_factors(load), np.nan if t is None else float(t)
+        if t is None and not geometric:
+            factors, time = tables.linear_factors(load), np.inf
+        elif t is not None and self._varying:
+            factors = load * tables.factors(np.array([t]))[0]
+        given = tables.stresses if independent is None else independent
+        self.backend.of(evaluation.tangent)(
+            np.array(u, dtype=float), factors, time, float(load), at, independent is not None,
+            stresses, given, force)
         return force, stresses
 
     def linearised_stress(self, u: Array, stresses: Array, du: Array) -> Array:
         """Stresses (n,) at u, linearised to ``u + du``: S + C B(u) du."""
         independent = np.zeros_like(stresses)
-        self._evaluate(LINEARISED, u, du, stresses=(stresses, independent))
+        self.backend.of(evaluation.linearised)(u, du, stresses, independent)
         return independent
 
-    def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=(None, None), geometric=True):
-        """Run :func:`~skfem_ancf.equations.evaluation.evaluate`; returns the force."""
-        tables, t = self.backend.tables, self.clock if t is None else t
-        u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
-        first = what == TANGENT and t is None and not geometric
-        factors = tables.linear_factors(load) if first else tables.static_factors(load)
-        time = np.inf if first else np.nan if t is None else float(t)
-        if what == TANGENT and t is not None and self._varying:
-            factors = load * tables.factors(np.array([t]))[0]
-        none = tables.stresses if stresses[1] is None else None
-        of, independent = (none if x is None else x for x in stresses)
+    def _force(self, kernel, *displacements, **at):
+        """The force (N,) of a function of :mod:`skfem_ancf.equations.evaluation`."""
         force = np.zeros(self.N)
-        self.backend.of(evaluate)(what, u, v, factors, time, float(load),
-                                  stresses[1] is not None, of, independent, force)
+        self.backend.of(kernel)(*(np.array(u, dtype=float) for u in displacements), *at.values(),
+                                force)
         return force
+
+    def _time(self, load, t):
+        """The time, or the load factor in statics."""
+        t = self.clock if t is None else t
+        return float(load if t is None else t)
 
     def _require_displacement(self, u):
         if u.shape != (self.N,):

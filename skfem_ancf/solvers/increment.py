@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError
 from ..core.types import Array
 from ..equations import stability
 from ..equations.system import System
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
-                        Target, Unknowns, equilibrium, workspace_for_iterations)
+                        Target, equilibrium)
 from .outcome import Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed, Unstable
 from .touching import SOON, found_touching
 
@@ -23,8 +22,6 @@ logger = logging.getLogger(__name__)
 
 #: Largest number of pressure corrections (augmented Lagrangian) in a load step.
 AUGMENTED = 50
-#: Approximate iterations to an equilibrium, by which work in NumPy is counted.
-ITERATIONS = 8
 #: Tolerance of an equilibrium that is only a start.
 NEAR = 1e-2
 
@@ -169,36 +166,22 @@ class Increment:
         system, options = self.system, options or self.options
         u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
         backend = backend or system.backend
-        tables, given, default = backend.tables, solver is not None, system.solver
-        target = self._target(tables, u)
         rules = rules_of(system, options.method, options.tol, options.most,
-                         FIRST if wary else WATCHED if options.watched and not given else 0)
-        scratch = backend.workspace(workspace_for_iterations, system.constraints.m)
-        if solver is None and default.coupled:
-            solver = default
-        while True:
-            if solver is not None:
-                rules = rules._replace(solver=handle_of(solver))
-            x = Unknowns(u.copy(), multipliers.copy(), np.empty(system.N), tables.stresses,
-                         tables.stresses)
-            residuals = np.zeros((options.most + 1, 2))
-            status, n = backend.of(equilibrium, ITERATIONS)(target, rules, x, scratch,
-                                                            residuals)
-            if status != SINGULAR or solver is not None:
-                break
-            solver = default  # with pivoting
+                         FIRST if wary else WATCHED if options.watched and not solver else 0)
+        status, x, residuals, works = equilibrium(
+            backend, self._target(backend.tables, u), rules, solver or system.solver, u,
+            multipliers)
+        n = len(works)
         self.record.iterations += n
-        self.record.force_residuals += residuals[:n + 1, 0].tolist()
-        self.record.energy_residuals += residuals[:n, 1].tolist()
+        self.record.force_residuals += residuals
+        self.record.energy_residuals += works
         self._require_converged(status, n, rules)
         if system.inverted(x.u):
             raise StepFailed("an element is turned inside out")
         if lost := system.constraints.lost(x.u):
             raise StepFailed(lost)
         if n == 0:
-            default.forget()
-        elif solver is None:
-            default.take_factors()
+            system.solver.forget()
         return Equilibrium(x.u, x.multipliers, x.force)
 
     def _target(self, tables, u):
@@ -264,5 +247,5 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int,
     """Convergence criteria; ``wary`` as in :class:`~skfem_ancf.solvers.iteration.Rules`."""
     scales = system.scales
     # the residual has the round-off of all DOFs, the work that of the strains
-    return Rules(int(method == "mixed"), max_iterations, tol, 8.0 * scales.work_noise,
-                 8.0 * scales.force_noise, 0, wary)
+    return Rules(method == "mixed", max_iterations, tol, 8.0 * scales.work_noise,
+                 8.0 * scales.force_noise, wary)

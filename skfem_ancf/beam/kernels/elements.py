@@ -1,0 +1,433 @@
+"""Strain energy of elements with the same samples of strain, in NumPy: stresses, force and tangent.
+
+An end of a sample is a row of position derivatives with a direction. The strain changes by the sum
+over its ends of ``direction . change of the row``: this holds for derivatives, with the directions
+at u, and for finite changes, with mean directions, see :meth:`Elements.directions`. Rows, ends and
+samples are first in arrays, elements last.
+
+Rows are ``r = x + R (G (D U))``. U are the DOFs relative to the left node, without its position, so
+that translations have no round-off. G is shared and R and D are diagonal (equal or graded meshes,
+arcs), or each element has its own G (other curved meshes, tapers) and R and D are one.
+
+The tangent is a product of constant matrices with few coefficients, those of products of two rows.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from ...core.types import Array
+from .law import LINEAR, conserve, law_evaluate
+from .tables import CABLE, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables
+
+#: Relative difference between shared and own derivatives that is round-off.
+SAME = 1e-13
+
+
+def scaled(G: Array) -> tuple[Array, Array, Array]:
+    """One G, and R (k, rows) and D (k, m) with ``G[e] = R[e] G D[e]``; or all G, and ones."""
+    k, rows, m = G.shape
+    R, D = np.ones((k, rows)), np.ones((k, m))
+    if k == 1:
+        return G, R, D
+    size = np.abs(G[0]) / np.abs(G[0]).max(axis=0)
+    with np.errstate(all="ignore"):
+        ratio = np.where(size > 1e-9, G / G[0], np.nan)
+        full = size.min(axis=1).argmax()  # a row with all functions
+        E = ratio[:, full] / ratio[:, full, m // 2, None]  # 1 for the position of the right node
+        S = ratio[:, np.arange(rows), size.argmax(axis=1)] / E[:, size.argmax(axis=1)]
+        same = np.abs(S[:, :, None] * G[0] * E[:, None] - G) <= SAME * np.abs(G).max(
+            axis=1, keepdims=True)
+    return (G[:1], S, E) if same.all() else (G, R, D)
+
+
+@lru_cache(64)
+def _entries(m: int) -> Any:
+    """Lower half of an element matrix with the left node's position, from its parts.
+
+    Returns rows, columns and signs of the entries; functions (without the left node's) and part of
+    each: xx, yy, or xy, the component x of the first and y of the second function.
+    """
+    i, j = np.tril_indices(2 * m + 2)
+    (k, x), (l, y) = divmod(i, 2), divmod(j, 2)
+    sign = np.where(k == 0, -1.0, 1.0) * np.where(l == 0, -1.0, 1.0)
+    k, l = np.where(k == 0, m // 2, k - 1), np.where(l == 0, m // 2, l - 1)
+    swap = x > y  # the entry of y and x is that of x and y with functions exchanged
+    return i, j, sign, np.where(swap, l, k), np.where(swap, k, l), np.where(x == y, x, 2)
+
+
+@lru_cache(64)
+def _of_products(m: int) -> Array:
+    """Positions of the entries in the parts of :meth:`Elements.matrices`, stacked."""
+    _, _, _, k, l, part = _entries(m)
+    high, low, n = np.maximum(k, l), np.minimum(k, l), m * (m + 1) // 2
+    number = high * (high + 1) // 2 + low
+    return np.where(part < 2, 3 * number + part, (3 + (k < l)) * n + number)
+
+
+@lru_cache(64)
+def _to_rows(terms: bytes, rows: int) -> Any:
+    """Sparse matrix from coefficients (4 n,) to W (3 rows^2,) of xx, yy and xy between rows."""
+    from scipy import sparse
+
+    k, l = np.frombuffer(terms, np.int64).reshape(2, -1)
+    n, one = len(k), np.arange(len(k))
+    to = np.concatenate([part * rows**2 + a * rows + b for part, a, b in (
+        (0, k, l), (0, l, k), (1, k, l), (1, l, k), (2, k, l), (2, l, k))])
+    of = np.concatenate([c * n + one for c in (0, 0, 1, 1, 2, 3)])
+    return sparse.csr_matrix((np.ones(6 * n), (to, of)), shape=(3 * rows**2, 4 * n))
+
+
+class Elements:
+    """The elements of :class:`~skfem_ancf.beam.kernels.tables.StrainTables` t.
+
+    Displacements are (N,), weighted stresses and strains (ns, ne), forces (N,), bands flat.
+    """
+
+    def __init__(self, t: StrainTables) -> None:
+        self.t, self.ne, self.ns, self.m = t, len(t.start), t.rows.shape[1], t.G.shape[2]
+        G, R, D = scaled(t.G[t.at[:, OF_G]] if len(t.G) > 1 else t.G)
+        self.G, self.own, self.even = G, len(G) > 1, len(R) == 1 or len(G) > 1
+        self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
+        self.x = self._last(t.frame, OF_FRAME)
+        self.start = self.measured(self.x)
+        # ends: sample, row, and number of the direction
+        (g, h), n = t.rows, self.ns // 2
+        self.second = second = np.flatnonzero(g != h)
+        self.sample, self.row = np.append(np.arange(self.ns), second), np.append(g, h[second])
+        self.direction = (np.append(np.arange(self.ns), second + n) if t.kind == CABLE else
+                          np.append(h, g[second]))
+        self.G_ends = np.ascontiguousarray(G.transpose(0, 2, 1).take(self.row, axis=2))
+        # relative DOFs (2 m, ne); stresses: modulus and strain of each summand, sorted by stress
+        self.dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
+        self.left = t.start + np.arange(2)[:, None]
+        (s, z), q = t.pairs, np.arange(t.pairs.shape[1])
+        both = np.concatenate([t.pairs, t.pairs[::-1, s != z]], axis=1)
+        order = np.argsort(both[0], kind="stable")
+        self.modulus = np.append(q, q[s != z])[order]
+        self.other, self.begin = both[1, order], np.searchsorted(both[0, order], np.arange(self.ns))
+        self.moduli = self._last(t.H, OF_H)
+
+    def _last(self, x, column):
+        """A table with the elements as last axis, of length 1 if all are equal."""
+        return np.moveaxis(x if len(x) == 1 else x[self.t.at[:, column]], 0, -1).copy()
+
+    @cached_property
+    def C(self) -> Array | None:
+        """The constant stiffness (1 or ne, 2 m, 2 m), or None."""
+        C = self.t.C
+        return None if not len(C) else C if len(C) == 1 else C[self.t.at[:, OF_C]]
+
+    # kinematics
+
+    def relative(self, u: Array) -> Array:
+        """DOFs relative to the left node, (m, 2, ne)."""
+        U, q = _taken(u, self.dofs), self.m // 2 * 2
+        U[q:q + 2] -= _taken(u, self.left)
+        return U.reshape(self.m, 2, -1)
+
+    def rows(self, U: Array) -> Array:
+        """Changes (rows, 2, ne) of the rows by relative DOFs."""
+        if self.own:
+            return np.matmul(self.G, U.transpose(2, 0, 1)).transpose(1, 2, 0)
+        if self.even:
+            return (self.G[0] @ U.reshape(self.m, -1)).reshape(-1, 2, self.ne)
+        d = self.G[0] @ (self.D * U).reshape(self.m, -1)
+        return d.reshape(-1, 2, self.ne) * self.R
+
+    def measured(self, r: Array) -> Any:
+        """What :meth:`directions` needs of rows.
+
+        For cables this is r_X and r_XX as complex numbers, |r_X| and the material curvature.
+        """
+        if self.t.kind != CABLE:
+            return r
+        z, n = r[:, 0] + 1j * r[:, 1], len(r) // 2
+        return z[:n], z[n:], np.abs(z[:n]), (z[n:] / z[:n]).imag
+
+    def at(self, u: Array) -> tuple[Array, Array, Any]:
+        """Relative DOFs, changes of the rows and measures at u."""
+        U = self.relative(u)
+        d = self.rows(U)
+        return U, d, self.measured(self.x + d)
+
+    def directions(self, one: Any, two: Any) -> Array:
+        """Directions (n, 2, ne) whose products with a change of the rows are that of the strain.
+
+        For equal measures these are derivatives.
+        """
+        if self.t.kind != CABLE:
+            return one if one is two else 0.5 * (one + two)
+        (a, b, p, k), (c, d, q, l) = one, two
+        s, square = a + c, p * p + q * q
+        turned = s * (1j / square)
+        X = np.concatenate([s / (p + q), (b + d) * (-1j / square) + (1j * (k + l)) * turned, turned])
+        return X.view(float).reshape(*X.shape, 2).transpose(0, 2, 1)
+
+    def change(self, Y: Array, d: Array) -> Array:
+        """Change (ns, ne) of the strain by a change of the rows in directions Y."""
+        x = _taken(Y, self.direction) * _taken(d, self.row)
+        ends = x[:, 0] + x[:, 1]
+        strain = ends[:self.ns]
+        strain[self.second] += ends[self.ns:]
+        return strain
+
+    def strain(self, d: Array, one: Any) -> Array:
+        """The strain (ns, ne) of changes d of the rows, with their measures."""
+        return self.change(self.directions(self.start, one), d)
+
+    # stress
+
+    def linear_stress(self, strain: Array, moduli: Array | None = None) -> Array:
+        """Weighted stresses (ns, ne) by moduli (nq, ne) between samples."""
+        H = self.moduli if moduli is None else moduli
+        return np.add.reduceat(_taken(H, self.modulus) * _taken(strain, self.other), self.begin)
+
+    @cached_property
+    def _weights(self):
+        """Weights of the integration points of nonlinear laws, (points, ne or 1)."""
+        return self._last(self.t.weights, OF_WEIGHTS)
+
+    def at_points(self, strain: Array) -> Array:
+        """Strains (3, points, ne) at the integration points."""
+        return (self.t.along @ strain).reshape(3, -1, self.ne)
+
+    def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
+               ) -> Array:
+        """Weighted stresses (ns, ne).
+
+        With a ``change``, ``strain`` is its middle and the work of the stresses on the change is
+        the change of energy. With a ``shift`` (3, points, ne) of the strain of a nonlinear law, it
+        is the difference that the shift makes.
+        """
+        if self.t.law.kind == LINEAR:
+            return self.linear_stress(strain)
+        E, C = self.at_points(strain), None if change is None else self.at_points(change)
+        S = self._law_stress(E, C)
+        if shift is not None:
+            S = self._law_stress(E + shift, C) - S
+        return self.t.along.T @ (S * self._weights).reshape(-1, self.ne)
+
+    def _law_stress(self, E, C):
+        S = np.empty_like(E)
+        law_evaluate(self.t.law, E, S)
+        if C is not None:
+            conserve(self.t.law, E, C, S)
+        return S
+
+    @cached_property
+    def _to_moduli(self):
+        """Sparse matrix from moduli at the points (9 points) to those between samples (nq)."""
+        from scipy import sparse
+
+        (s, z), A = self.t.pairs, self.t.along.reshape(3, -1, self.ns)
+        c = np.abs(A).sum(axis=1).argmax(axis=0)  # component of each sample
+        M = np.zeros((len(s), 9, A.shape[1]))
+        M[np.arange(len(s)), 3 * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
+        return sparse.csr_matrix(M.reshape(len(s), -1))
+
+    def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
+        """Moduli (nq, ne) between samples, or their change by a shift as in :meth:`stress`."""
+        if self.t.law.kind == LINEAR:
+            return self.moduli
+        E = self.at_points(strain)
+        D = np.empty((9, *E.shape[1:]))
+        law_evaluate(self.t.law, E, D)
+        if shift is not None:
+            still, D = D, np.empty_like(D)
+            law_evaluate(self.t.law, E + shift, D)
+            D -= still
+        return self._to_moduli @ (D * self._weights).reshape(-1, self.ne)
+
+    # force
+
+    def force(self, Y: Array, T: Array, U: Array | None = None) -> Array:
+        """Element forces (m, 2, ne) of stresses; with U, those of the constant stiffness too."""
+        F = _taken(T, self.sample)[:, None] * _taken(Y, self.direction)
+        if self.own:
+            F = np.matmul(self.G_ends, F.transpose(2, 0, 1)).transpose(1, 2, 0)
+        elif self.even:
+            F = (self.G_ends[0] @ F.reshape(len(F), -1)).reshape(self.m, 2, self.ne)
+        else:
+            F *= self.R[self.row]
+            F = (self.G_ends[0] @ F.reshape(len(F), -1)).reshape(self.m, 2, self.ne) * self.D
+        if U is not None and self.C is not None:
+            U = U.reshape(2 * self.m, -1)
+            CU = self.C[0] @ U if len(self.C) == 1 else np.einsum("eij,je->ie", self.C, U)
+            F = F + CU.reshape(F.shape)
+        return F
+
+    def add(self, F: Array, f: Array) -> None:
+        """Add element forces (m, 2, ne) to f."""
+        q = self.m // 2
+        at, F = self._ends, np.append(F.ravel(), -F[q].ravel())
+        f[self._span] += np.bincount(at, F, self._span.stop - self._span.start)
+
+    @cached_property
+    def _span(self):
+        """The slice of DOFs."""
+        return slice(int(self.t.start.min()), int(self.t.start.max()) + 2 * self.m + 2)
+
+    @cached_property
+    def _ends(self):
+        return np.append(self.dofs.ravel(), self.left.ravel()) - self._span.start
+
+    # tangent
+
+    @cached_property
+    def _terms(self):
+        """Coefficients of the tangent: directions a and b, moduli q, rows k and l, and factors.
+
+        Terms of the products of the samples come first, for the geometric part.
+        """
+        t, ns, second = self.t, self.ns, self.second
+        own = [np.flatnonzero(t.terms[0] == p)[0] for p in t.of]
+        p, a, b, q = t.terms[:, np.append(own, np.setdiff1d(np.arange(t.terms.shape[1]), own))]
+        end = np.zeros(2 * ns, int)
+        end[:ns], end[ns + second] = np.arange(ns), ns + np.arange(len(second))
+        (k, l), (g, h), R = t.products[:, p], t.rows, self.R[:, 0]
+        factor = np.where(a == b, 0.5, 1.0)[:, None] * R[k] * R[l]
+        geometric = np.where(g == h, 0.5, 1.0)[:, None] * R[g] * R[h]
+        return (self.direction[end[a]], self.direction[end[b]], q, k, l, factor[:, None],
+                geometric[:, None])
+
+    @cached_property
+    def _products(self):
+        """P (m (m + 1) / 2, terms) of xx, yy and xy + yx, Q of xy - yx, and its terms."""
+        _, _, _, k, l, _, _ = self._terms
+        (i, j), G = np.tril_indices(self.m), self.G[0].T
+        one, two, skew = G[:, k], G[:, l], np.flatnonzero(k != l)
+        P = one[i] * two[j] + one[j] * two[i]
+        return P, (one[i] * two[j] - one[j] * two[i])[:, skew], skew
+
+    @cached_property
+    def _constant_moduli(self):
+        return (self._terms[5] * self.moduli[self._terms[2]][:, None] if self.t.law.kind == LINEAR
+                else None)
+
+    def geometric(self, one: Any, T: Array) -> Array:
+        """Coefficients (ns, 3, ne) of xx, yy and xy + yx of the geometric part, or of xx = yy.
+
+        Those of cables are ``Im(Z v v)`` for the change v of r_X, and ``Im(z v w)`` for v and the
+        change w of r_XX.
+        """
+        if self.t.kind != CABLE:
+            return T[:, None]
+        (a, b, p, _), n = one, len(T) // 2
+        N, z = 0.5 * T[:n] / p, T[n:] / (-a * a)
+        Z = np.concatenate([(-1j * N * a.conj() - 2.0 * z * b) / a, z])
+        X = np.empty((2 * n, 3, self.ne))
+        X[:, 0], X[:, 1], X[:, 2] = Z.imag, -Z.imag, 2.0 * Z.real
+        X[:n, :2] += N[:, None]
+        return X
+
+    def coefficients(self, Y: Array, Z: Array, moduli: Array | None) -> tuple[Array, Array, Array]:
+        """Coefficients (terms, 3, ne) of xx, yy, xy + yx, and xy and yx, of the material part."""
+        a, b, q, _, _, factor, _ = self._terms
+        c = self._constant_moduli if moduli is self.moduli else factor * _taken(moduli, q)[:, None]
+        X, Z, w = _taken(Y, a) * c, _taken(Z, b), np.empty((len(a), 3, self.ne))
+        np.multiply(X, Z, out=w[:, :2])
+        xy, yx = X[:, 0] * Z[:, 1], X[:, 1] * Z[:, 0]
+        np.add(xy, yx, out=w[:, 2])
+        return w, xy, yx
+
+    def matrices(self, w: Array, xy: Array, yx: Array) -> tuple[Array, Array]:
+        """Element matrices Q of coefficients, in parts for :func:`_entries`."""
+        if self.own:
+            rows, (_, _, _, k, l, _, _) = self.G.shape[1], self._terms
+            to = _to_rows(np.array([k, l], np.int64).tobytes(), rows)
+            W = (to @ np.concatenate([w[:, 0], w[:, 1], xy, yx])).T.reshape(self.ne, -1, rows)
+            WG = np.matmul(W, self.G).reshape(self.ne, 3, rows, self.m)
+            return np.matmul(self.G.transpose(0, 2, 1)[:, None], WG)
+        P, Q, skew = self._products
+        K = (P @ w.reshape(len(w), -1)).reshape(-1, 3, self.ne)
+        Z = Q @ (_taken(xy, skew) - _taken(yx, skew))
+        return np.concatenate([K.reshape(-1, self.ne), 0.5 * (K[:, 2] + Z), 0.5 * (K[:, 2] - Z)])
+
+    def lower(self, K: Array) -> Array:
+        """Entries of the lower half with the left node's position, (entries, ne)."""
+        _, _, sign, k, l, part = _entries(self.m)
+        if self.own:
+            at = (part * self.m + k) * self.m + l
+            return K.reshape(self.ne, -1).take(at, axis=1).T * sign[:, None]
+        return _taken(K, _of_products(self.m)) * self._signs
+
+    @cached_property
+    def _signs(self):
+        _, _, sign, k, l, _ = _entries(self.m)
+        return sign[:, None] * self.D[k, 0] * self.D[l, 0]
+
+    def tangent(self, one: Any, Y: Array, T: Array, moduli: Array | None) -> Array:
+        """Lower halves (entries, ne) of the element tangents, without the constant stiffness.
+
+        ``moduli`` None leaves out the material part; T are the stresses of the geometric part.
+        """
+        n, geometric = self.ns, self.geometric(one, T) * self._terms[6]
+        if moduli is None:
+            terms = len(self._terms[0])
+            w, xy, yx = np.zeros((terms, 3, self.ne)), *np.zeros((2, terms, self.ne))
+        else:
+            w, xy, yx = self.coefficients(Y, Y, moduli)
+        w[:n, :2] += geometric[:, :2]
+        if geometric.shape[1] > 1:
+            w[:n, 2] += geometric[:, 2]
+            xy[:n] += 0.5 * geometric[:, 2]
+            yx[:n] += 0.5 * geometric[:, 2]
+        return self.lower(self.matrices(w, xy, yx))
+
+    @cached_property
+    def constant(self) -> Array | None:
+        """Lower halves (entries, ne or 1) of the constant stiffness, or None."""
+        if self.C is None:
+            return None
+        i, j, *_ = _entries(self.m)
+        K = np.empty((len(self.C), 2 * self.m + 2, 2 * self.m + 2))
+        q = self.m // 2 * 2
+        K[:, 2:, 2:] = self.C
+        K[:, :2, 2:] = -K[:, q + 2:q + 4, 2:]
+        K[:, :, :2] = -K[:, :, q + 2:q + 4]
+        return K[:, i, j].T.copy()
+
+    def add_to_band(self, K: Array, flat: Array, ld: int) -> None:
+        """Add lower halves (entries, ne) to a band, entry (i, j) at ``flat[j * ld + i - j]``."""
+        first, last = self._span.start * ld, min(self._span.stop * ld, len(flat))
+        flat[first:last] += np.bincount(self._positions(ld), K.ravel(), last - first)
+
+    def _positions(self, ld):
+        """Positions of the lower halves in a band, flat."""
+        if ld not in self._at_band:
+            i, j, *_ = _entries(self.m)
+            start = self.t.start - self._span.start
+            self._at_band[ld] = ((start + j[:, None]) * ld + (i - j)[:, None]).ravel()
+        return self._at_band[ld]
+
+    @cached_property
+    def _at_band(self):
+        return {}
+
+    # derivatives
+
+    def derivatives(self, Y: Array) -> Array:
+        """Derivatives of the strain in directions Y by the DOFs of both nodes, (ne, ns, 2 nb)."""
+        R, D = (x[:, 0].T[:, :, None] for x in (self.R[self.row], self.D))
+        G = self.G.take(self.row, axis=1) * R * D.transpose(0, 2, 1)
+        ends = G[..., None] * _taken(Y, self.direction).transpose(2, 0, 1)[:, :, None]
+        B, q = np.empty((self.ne, self.ns, self.m + 1, 2)), self.m // 2
+        B[:, :, 1:] = ends[:, :self.ns]
+        B[:, self.second, 1:] += ends[:, self.ns:]
+        B[:, :, 0] = -B[:, :, q + 1]
+        return B.reshape(self.ne, self.ns, -1)
+
+    def square(self, moduli: Array) -> Array:
+        """Moduli between samples as matrices, (1 or ne, ns, ns)."""
+        H, (s, z) = np.zeros((moduli.shape[1], self.ns, self.ns)), self.t.pairs
+        H[:, s, z] = H[:, z, s] = moduli.T
+        return H
+
+
+def _taken(x, i):
+    """``x[i]``, faster."""
+    return x.take(i, axis=0, mode="clip")
