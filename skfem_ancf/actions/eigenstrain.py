@@ -117,9 +117,9 @@ class EigenStrain(Load):
             bound.eigen_stresses = [_resultants(beam, self)]
             return bound
         bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
-        bound._stresses = list(map(stresses_of, kernel.tables, bound._strains))
+        bound._stresses = list(map(stresses_of, kernel.elements, bound._strains))
         bound.eigen_stresses = list(map(
-            kernel_argument, kernel.tables, bound._strains, bound._stresses))
+            kernel_argument, kernel.elements, bound._strains, bound._stresses))
         bound.grows = not kernel.linear
         bound._size = bound.at_rest if bound.grows else 1.0
         return bound

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from ..beam.beam import Beam
-from ..beam.kernels.arrays import at_points
 from ..beam.kernels.kernel import energy_at, strains, stresses_of
 from ..beam.kernels.law import LINEAR
 from ..core.types import Array
@@ -27,19 +26,19 @@ SECTION, ROUND_OFF = 6, 1e-12
 def energy_difference(beam: Beam, u: Array, eigen: Sequence[Array], factor: float) -> float:
     """The integral of W(E) - W(E - factor E0)."""
     total = 0.0
-    for t, E0 in zip(beam.kernel.tables, eigen):
-        E = strains(t, u)
-        if t.law.kind == LINEAR:
-            total += factor * float(np.sum(stresses_of(t, E0).T * (E - 0.5 * factor * E0)))
+    for e, E0 in zip(beam.kernel.elements, eigen):
+        E = strains(e, u)
+        if e.t.law.kind == LINEAR:
+            total += factor * float(np.sum(stresses_of(e, E0).T * (E - 0.5 * factor * E0)))
         else:
-            total += float(np.sum(energy_at(t, at_points(t, E))
-                                  - energy_at(t, at_points(t, E - factor * E0))))
+            total += float(np.sum(energy_at(e, e.at_points(E))
+                                  - energy_at(e, e.at_points(E - factor * E0))))
     return total
 
 
-def kernel_argument(t: Any, E0: Array, stresses: Array) -> Array:
+def kernel_argument(e: Any, E0: Array, stresses: Array) -> Array:
     """The kernel's argument for an eigenstrain: strains at the points, or linear stresses."""
-    return stresses if t.law.kind == LINEAR else at_points(t, E0)
+    return stresses if e.t.law.kind == LINEAR else e.at_points(E0)
 
 
 def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:

@@ -1,6 +1,7 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,9 +9,10 @@ import numpy as np
 from ..core.band import add_multiple, clear, copy
 from ..core.source import I1, I2, primitive, shaped, source
 from .beam import Beam
-from .kernels.arrays import add_changes, add_transposed
+from .kernels.elements import Elements
 from .kernels.law import LINEAR
-from .kernels.runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
+from .kernels.runs import (add_changes, add_transposed, run_eigen_force, run_eigen_mean,
+                           run_eigen_tangent, run_force, run_given,
                            run_gradients, run_linearised, run_mean, run_mean_mixed, run_mixed,
                            run_stress, run_tangent, run_unsymmetric, run_viscous)
 from .kernels.tables import CABLE, StrainTables, repeated, together
@@ -20,11 +22,16 @@ from .kernels.tables import CABLE, StrainTables, repeated, together
 BEGIN, END, SAMPLES, SPAN, BEGIN_GRADIENTS, END_GRADIENTS, KIND = range(7)
 
 
-class Body(NamedTuple):
+class Body:
     """The beams of a scene: their :class:`StrainTables`, and a table with a row for each."""
 
-    packs: tuple
-    table: I2
+    def __init__(self, packs: Sequence[StrainTables], table: Any) -> None:
+        self.packs, self.table = tuple(packs), table
+
+    @cached_property
+    def elements(self) -> tuple[Elements, ...]:
+        """Their :class:`~skfem_ancf.beam.kernels.elements.Elements`."""
+        return tuple(map(Elements, self.packs))
 
 
 class FlatBody(NamedTuple):
@@ -36,8 +43,8 @@ class FlatBody(NamedTuple):
 
 @primitive("skfem_ancf.equations.loops")
 def tables_of(body, k):
-    """The StrainTables number k."""
-    return body.packs[k]
+    """The Elements number k, or their StrainTables in compiled code."""
+    return body.elements[k]
 
 
 def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = False) -> Body:

@@ -20,7 +20,7 @@ from ...formulations.base import Formulation
 from ...sections import Across
 from .kernel import ElementKernel, strains
 from .law import NO_LAW
-from .tables import CABLE, StrainTables, apart, products_of
+from .tables import CABLE, StrainTables, products_of
 
 #: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
 #: beam; the third point has a quarter of it.
@@ -133,8 +133,7 @@ class CableKernel(ElementKernel):
 
     def strain(self, u: Array) -> Array:
         """Extension and change of curvature at the points, (2, points, ne)."""
-        u_e = self.gather(u).ravel()
-        return strains(apart(self.tables[0]), u_e).reshape(2, self.points_number, -1)
+        return strains(self.elements[0], self._checked(u)).reshape(2, self.points_number, -1)
 
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""

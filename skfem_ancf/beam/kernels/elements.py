@@ -33,15 +33,17 @@ def scaled(G: Array) -> tuple[Array, Array, Array]:
     R, D = np.ones((k, rows)), np.ones((k, m))
     if k == 1:
         return G, R, D
-    size = np.abs(G[0]) / np.abs(G[0]).max(axis=0)
+    used = G[0].any(axis=0)
+    size = np.abs(G[0][:, used]) / np.abs(G[0][:, used]).max(axis=0)
     with np.errstate(all="ignore"):
-        ratio = np.where(size > 1e-9, G / G[0], np.nan)
+        ratio = np.where(size > 1e-9, G[:, :, used] / G[0][:, used], np.nan)
         full = size.min(axis=1).argmax()  # a row with all functions
-        E = ratio[:, full] / ratio[:, full, m // 2, None]  # 1 for the position of the right node
-        S = ratio[:, np.arange(rows), size.argmax(axis=1)] / E[:, size.argmax(axis=1)]
-        same = np.abs(S[:, :, None] * G[0] * E[:, None] - G) <= SAME * np.abs(G).max(
+        right = np.count_nonzero(used[:m // 2])  # 1 for the position of the right node
+        D[:, used] = E = ratio[:, full] / ratio[:, full, right, None]
+        R = ratio[:, np.arange(rows), size.argmax(axis=1)] / E[:, size.argmax(axis=1)]
+        same = np.abs(R[:, :, None] * G[0] * D[:, None] - G) <= SAME * np.abs(G).max(
             axis=1, keepdims=True)
-    return (G[:1], S, E) if same.all() else (G, R, D)
+    return (G[:1], R, D) if same.all() else (G, np.ones((k, rows)), np.ones((k, m)))
 
 
 @lru_cache(64)
@@ -93,7 +95,7 @@ class Elements:
         self.G, self.own, self.even = G, len(G) > 1, len(R) == 1 or len(G) > 1
         self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
         self.x = self._last(t.frame, OF_FRAME)
-        self.start = self.measured(self.x)
+        self.start, self.rest = t.start, self.measured(self.x)
         # ends: sample, row, and number of the direction
         (g, h), n = t.rows, self.ns // 2
         self.second = second = np.flatnonzero(g != h)
@@ -177,7 +179,7 @@ class Elements:
 
     def strain(self, d: Array, one: Any) -> Array:
         """The strain (ns, ne) of changes d of the rows, with their measures."""
-        return self.change(self.directions(self.start, one), d)
+        return self.change(self.directions(self.rest, one), d)
 
     # stress
 
@@ -187,7 +189,7 @@ class Elements:
         return np.add.reduceat(_taken(H, self.modulus) * _taken(strain, self.other), self.begin)
 
     @cached_property
-    def _weights(self):
+    def weights(self) -> Array:
         """Weights of the integration points of nonlinear laws, (points, ne or 1)."""
         return self._last(self.t.weights, OF_WEIGHTS)
 
@@ -209,7 +211,7 @@ class Elements:
         S = self._law_stress(E, C)
         if shift is not None:
             S = self._law_stress(E + shift, C) - S
-        return self.t.along.T @ (S * self._weights).reshape(-1, self.ne)
+        return self.t.along.T @ (S * self.weights).reshape(-1, self.ne)
 
     def _law_stress(self, E, C):
         S = np.empty_like(E)
@@ -240,7 +242,7 @@ class Elements:
             still, D = D, np.empty_like(D)
             law_evaluate(self.t.law, E + shift, D)
             D -= still
-        return self._to_moduli @ (D * self._weights).reshape(-1, self.ne)
+        return self._to_moduli @ (D * self.weights).reshape(-1, self.ne)
 
     # force
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.linear import first_order, step
 from ...core.types import Array
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
-from . import arrays
+from .elements import Elements
 from .law import LINEAR, law_evaluate
 from .runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
                    run_gradients, run_mean, run_stress, run_tangent, run_viscous)
@@ -81,28 +81,40 @@ class ElementKernel:
 
     def _energies(self, u):
         """Energies (k, ne) of displacements (k, N)."""
-        out = np.zeros(u.shape[0] * self.t.shape[1], dtype=u.dtype)
-        for t in self.tables:
-            many = t if len(u) == 1 else repeated(t, len(u), self.N)
-            out += _energies_of(many, u.ravel())
-            arrays.add_constant_energies(many, u.ravel(), out)
-        return out.reshape(len(u), -1)
+        k, out = len(u), np.zeros(u.shape[0] * self.t.shape[1], dtype=u.dtype)
+        many = self.elements if k == 1 else [
+            Elements(repeated(t, k, self.N)) for t in self.tables]
+        for e in many:
+            out += energies_of(e, u.ravel())
+        return out.reshape(k, -1)
+
+    @cached_property
+    def elements(self) -> list[Elements]:
+        """The :class:`~skfem_ancf.beam.kernels.elements.Elements` of :attr:`tables`."""
+        return list(map(Elements, self.tables))
+
+    @cached_property
+    def _apart(self):
+        """The same with separate DOFs for each element."""
+        return [Elements(apart(t)) for t in self.tables]
 
     def force(self, u: Array) -> Array:
         """Internal force of a displacement, shape (N,)."""
         return self.scatter(self.forces(u))
 
     def forces(self, u: Array) -> Array:
-        """Internal forces of the elements."""
-        return self._forces(self.tables, run_force, u)
+        """Internal forces of the elements, linearised for a complex u."""
+        if not np.iscomplexobj(u):
+            return self._forces(self._apart, run_force, u)
+        return self.forces(u.real) + 1j * self._times(self.tangents(u.real), u.imag)
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """The force (N,) whose work from u0 to u1 is the change of the energy."""
-        return self.scatter(self._forces(self.tables, run_mean, u0, u1))
+        return self.scatter(self._forces(self._apart, run_mean, u0, u1))
 
     def forces_of(self, stresses: list[Array], u: Array) -> Array:
         """Element forces of given stresses."""
-        return self._forces(self.tables, run_given, u, given=stresses)
+        return self._forces(self._apart, run_given, u, given=stresses)
 
     def eigenstrain_forces(self, given: list[Array], u: Array, end: Array | None = None) -> Array:
         """Change of :meth:`forces`, or of their mean from u to ``end``, by eigenstrains.
@@ -110,30 +122,45 @@ class ElementKernel:
         ``given`` are stresses for tables of linear laws, and strains at the points of others,
         (3, points, ne).
         """
+        if np.iscomplexobj(u):
+            return self.eigenstrain_forces(given, u.real) + 1j * self._times(
+                self.eigenstrain_tangents(given, u.real), u.imag)
         run = run_eigen_force if end is None else run_eigen_mean
-        return self._forces(self.tables, run, u, end, given)
+        return self._forces(self._apart, run, u, end, given)
 
     def eigenstrain_tangents(self, given: list[Array], u: Array) -> Array:
         """Change of the :meth:`tangents` by eigenstrains, see :meth:`eigenstrain_forces`."""
-        return self._tangents(run_eigen_tangent, u, self.tables, given)
+        return self._tangents(run_eigen_tangent, u, self._apart, given)
 
-    def _forces(self, tables, run, u, v=None, given=None):
+    def _forces(self, elements, run, u, v=None, given=None):
         """Element forces by a kernel of :mod:`.runs`."""
         u = [self.gather(self._checked(x)).ravel() for x in (u, v) if x is not None]
         out = np.zeros_like(u[0])
-        for k, t in enumerate(map(apart, tables)):
-            run(t, *u, *([] if given is None else [given[k].ravel()]), out)
+        for k, e in enumerate(elements):
+            run(e, *u, *([] if given is None else [given[k].ravel()]), out)
         return out.reshape(self.t.shape[1], -1, 2)
+
+    def _times(self, K, u):
+        """Element matrices times a displacement, as element forces."""
+        u_e = self.gather(u)
+        return (K @ u_e.reshape(len(K), -1, 1)).reshape(u_e.shape)
 
     def viscous_forces(self, u: Array, v: Array, time: float) -> Array:
         """Viscous element forces for the rate v of the displacement."""
-        return self._forces(self.viscous_tables(time), run_viscous, u, v)
+        return self._forces([Elements(apart(t)) for t in self.viscous_tables(time)], run_viscous,
+                            u, v)
 
     def small_forces(self, u: Array) -> Array:
-        """Linearised element forces; complex for a :func:`~skfem_ancf.core.linear.step`."""
-        z = self._checked(u if np.iscomplexobj(u) else step(0.0, u))
-        out = 1j * self._forces(map(linearised, self.tables), run_force, z).imag  # without round-off
-        return out if np.iscomplexobj(u) else first_order(out)
+        """Linearised element forces, ``K(0) u`` by the strain, which has less round-off."""
+        if np.iscomplexobj(u):
+            return 1j * self.small_forces(self._checked(u).imag)
+        u_e = self.gather(self._checked(u)).ravel()
+        out = np.zeros_like(u_e)
+        for e in self._apart:
+            U, Y = e.relative(u_e), e.directions(e.rest, e.rest)
+            Y = np.broadcast_to(Y, (*Y.shape[:2], e.ne))
+            e.add(e.force(Y, e.linear_stress(e.change(Y, e.rows(U))), U), out)
+        return out.reshape(self.t.shape[1], -1, 2)
 
     def small_energy(self, u: Array) -> float:
         """The quadratic part of the strain energy."""
@@ -144,7 +171,7 @@ class ElementKernel:
 
     def tangents(self, u: Array) -> Array:
         """Element tangents (ne, 2 nb, 2 nb)."""
-        return self._tangents(_run_tangent, u, self.tables)
+        return self._tangents(_run_tangent, u, self._apart)
 
     def geometric(self, u: Array, stress: Array) -> Array:
         """Geometric element stiffness (ne, 2 nb, 2 nb) for stresses (ne, m).
@@ -152,13 +179,14 @@ class ElementKernel:
         The stresses of all :attr:`tables` are side by side; further columns are ignored.
         """
         given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
-        return self._tangents(run_eigen_tangent, u, map(linearised, self.tables), given)
+        return self._tangents(run_eigen_tangent, u,
+                              [Elements(apart(linearised(t))) for t in self.tables], given)
 
-    def _tangents(self, run, u, tables, given=None):
+    def _tangents(self, run, u, elements, given=None):
         u, n = self.gather(self._checked(u)).ravel(), 2 * self.nd
         flat = np.zeros((self.t.shape[1], n, n + 1))
-        for k, t in enumerate(map(apart, tables)):
-            run(t, u, u[:0] if given is None else given[k].ravel(), flat.reshape(-1), n + 1)
+        for k, e in enumerate(elements):
+            run(e, u, u[:0] if given is None else given[k].ravel(), flat.reshape(-1), n + 1)
         i, j = np.tril_indices(n)
         out = np.empty((len(flat), n, n))
         out[:, i, j] = out[:, j, i] = flat[:, j, i - j]
@@ -177,10 +205,10 @@ class ElementKernel:
         """
         u, ne, n = self._checked(u), self.t.shape[1], 2 * self.nd
         found, stresses = [], []
-        for t in self.tables:
-            both, T = np.empty((2, ne, t.rows.shape[1], n)), np.empty((ne, t.rows.shape[1]))
-            run_gradients(t, u, both.reshape(-1))
-            run_stress(t, u, T.reshape(-1))
+        for e in self.elements:
+            both, T = np.empty((2, ne, e.ns, n)), np.empty((ne, e.ns))
+            run_gradients(e, u, both.reshape(-1))
+            run_stress(e, u, T.reshape(-1))
             found.append(both)
             stresses.append(T)
         if self.constant is not None:
@@ -198,8 +226,8 @@ class ElementKernel:
         return False
 
 
-def _run_tangent(t, u, given, flat, ld):
-    run_tangent(t, u, given, given, np.zeros_like(u), flat, ld)
+def _run_tangent(e, u, given, flat, ld):
+    run_tangent(e, u, given, given, u[:0], flat, ld)
 
 
 def _square_root(K):
@@ -211,29 +239,35 @@ def _square_root(K):
     return (np.sqrt(values[:, None]) * V * size).transpose(0, 2, 1)
 
 
-def strains(t: StrainTables, u: Array) -> Array:
-    """Strains of the samples, (ns, ne)."""
-    d = arrays.displaced(t, 0, len(t.start), u)
-    return arrays.sampled(t, 0, d, np.zeros_like(d))[0]
+def strains(e: Elements, u: Array) -> Array:
+    """Strains of the samples, (ns, ne), linearised for a complex u."""
+    _, d, one = e.at(u.real)
+    strain = e.strain(d, one)
+    if not np.iscomplexobj(u):
+        return strain
+    return strain + 1j * e.change(e.directions(one, one), e.rows(e.relative(u.imag)))
 
 
-def _energies_of(t, u):
+def energies_of(e: Elements, u: Array) -> Array:
     """Energies of the elements, (ne,)."""
-    strain = strains(t, u)
-    if t.law.kind == LINEAR:
-        H = arrays.linear_moduli(t, 0, len(t.start))
-        return 0.5 * np.sum(strain * arrays.weighted(t, H, strain), axis=0)
-    E = arrays.at_points(t, strain)
-    return energy_at(t, E)
+    strain = strains(e, u)
+    if e.t.law.kind == LINEAR:
+        out = 0.5 * np.sum(strain * e.linear_stress(strain), axis=0)
+    else:
+        out = energy_at(e, e.at_points(strain))
+    if e.C is not None:
+        U = e.relative(u).reshape(2 * e.m, -1)
+        out += 0.5 * np.einsum("ie,kij,je->e" if len(e.C) == 1 else "ie,eij,je->e", U, e.C, U)
+    return out
 
 
-def energy_at(t: StrainTables, E: Array) -> Array:
+def energy_at(e: Elements, E: Array) -> Array:
     """Energy (ne,) of strains (3, points, ne) at the integration points."""
     W = np.empty((1, *E.shape[1:]), E.dtype)
-    law_evaluate(t.law, E, W)
-    return np.sum(arrays.weights_of(t) * W[0], axis=0)
+    law_evaluate(e.t.law, E, W)
+    return np.sum(e.weights * W[0], axis=0)
 
 
-def stresses_of(t: StrainTables, strain: Array) -> Array:
+def stresses_of(e: Elements, strain: Array) -> Array:
     """Weighted stresses (ne, ns) of strains (ns, ne) with constant moduli."""
-    return arrays.weighted(t, arrays.linear_moduli(t, 0, len(t.start)), strain).T.copy()
+    return e.linear_stress(strain).T.copy()

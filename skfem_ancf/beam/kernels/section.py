@@ -16,10 +16,9 @@ from ...elements.base import ElementBeam
 from ...formulations.base import Formulation, Term
 from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
-from .arrays import displaced
 from .kernel import ElementKernel
 from .law import LINEAR, law_tables
-from .tables import OF_FRAME, SECTION, StrainTables, products_of
+from .tables import SECTION, StrainTables, products_of
 
 #: Relative size of a modulus between samples that is round-off.
 ORTHOGONAL = 1e-14
@@ -103,11 +102,10 @@ class SectionKernel(ElementKernel):
 
     def _gradients(self, u, component):
         """Rows g and h (n, 2, ne) of the samples of a component, in the first terms."""
-        for one, t in zip(self.integrals, self.tables):
+        for one, e in zip(self.integrals, self.elements):
             if one.first:
-                x = t.frame if len(t.frame) == 1 else t.frame[t.at[:, OF_FRAME]]
-                r = displaced(t, 0, len(t.start), u) + x.transpose(1, 2, 0)
-                yield [r[rows[one.samples.component == component]] for rows in t.rows]
+                r = e.x + e.rows(e.relative(u))
+                yield [r[rows[one.samples.component == component]] for rows in e.t.rows]
 
     def inverted(self, u: Array) -> bool:
         return not all((x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0]).all()
