@@ -12,8 +12,6 @@ MOST_LINES, MOST_ARGUMENTS = 80, 10
 #: Functions that are larger, and why.
 LARGER = {
     "beam/beam.py::Beam.__init__": "options of a user, each with a default, by keyword",
-    "equations/evaluation.py::evaluate":
-        "one function for all that is asked, so that it is compiled once",
     "dynamics/integrate.py::integrate": "options of a user, each with a default, by keyword",
     "results/state.py::State.__init__": "a record: what a solution is, and where it has it from",
     "solvers/continuation.py::continuation": "options of a user, each with a default, by keyword",
@@ -121,7 +119,8 @@ def test_files_and_classes_are_of_a_size_to_be_read():
 #: From the ground up: a folder imports from those below its floor.
 FLOORS = [["core"], ["mesh", "materials", "sweeps"], ["elements"],
           ["sections", "formulations"], ["beam"], ["actions", "recovery"],
-          ["equations", "forms", "io", "visuals"], ["results"], ["solvers", "dynamics"], ["scene"], ["__main__"]]
+          ["equations", "forms", "io", "visuals"], ["results"], ["solvers", "dynamics"], ["scene"],
+          ["__main__"]]
 FLOOR = {folder: height for height, folders in enumerate(FLOORS) for folder in folders}
 
 

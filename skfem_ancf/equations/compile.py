@@ -26,7 +26,7 @@ def compile_all() -> None:
              "tangent": lambda: system.assemble(zero),
              "force": lambda: system.internal_force(zero + 1e-9),
              "linearised": lambda: system.linearised_stress(
-                 zero, *2 * [system.backend.tables.stresses], zero),
+                 zero, system.backend.tables.stresses, zero),
              "steps": lambda: scene.integrate(0.02, 0.01, EnergyMomentum())}
     if on_disk(*COMPILING):
         print(f"all is compiled already, in {folder()}", file=sys.stderr)

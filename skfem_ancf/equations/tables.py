@@ -8,8 +8,8 @@ from weakref import ref
 import numpy as np
 
 from ..core.band import Band
-from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of, eigenstrain_body_of,
-                                  stress_size, viscous_body_of)
+from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
+                                  eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.law import LINEAR
 from ..beam.kernels.moments import MomentPack
@@ -92,7 +92,7 @@ class Tables:
         body = self.plain.body
         if all(t.law.kind == LINEAR for t in body.packs):
             return None
-        body = Body(map(linearised, body.packs), body.table)
+        body = Body([linearised(t) for t in body.packs], body.table)
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
 
     def copied(self, n: int) -> "Tables":

@@ -12,7 +12,7 @@ from ..dynamics.integrator import OF_STEP
 from ..actions.eigenstrain import EigenStrain
 from ..core.errors import NameUnknown, require_option
 from ..core.origin import ours
-from ..solvers.increment import ITERATIONS
+from ..solvers.iteration import ITERATIONS
 from ..equations.system import System
 
 KINDS = ("static", "linear", "dynamic")
@@ -139,7 +139,7 @@ def _solution(s, dynamic, linear):
         yield Item("compiled loop", "skipped", "one solve")
     else:
         way, reason = (s.backend.choose("steps", STEPS * OF_STEP) if dynamic else
-                       s.backend.choose("equilibrium", ITERATIONS))
+                       s.backend.choose("tangent", ITERATIONS))
         yield Item("compiled loop", "skipped" if way == "plain" else "computed", "whole " + (
             f"time steps, in blocks, of {STEPS}" if dynamic else "iterations") + f": {reason}")
     if dynamic:

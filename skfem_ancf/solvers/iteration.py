@@ -97,13 +97,12 @@ class Iterate:
 
     def residual(self) -> Array:
         """The residual at free DOFs; sets ``load``, ``phi`` and ``opening``."""
-        e, target, u, pull = self.e, self.target, self.u, 0.0
+        e, target, u, pull = self.e, self.target, self.u, np.zeros_like(self.u)
         external_force(e.loads, target.factors, target.when, target.scale, u, self.load)
         self.opening = 0.0
         if self.phi.size:
             constraint(e.joints, target.c, target.g, target.at, u, self.phi)
             self.opening = largest(self.phi / e.joints.sizes)
-            pull = np.zeros_like(u)
             add_joint_force(e.joints, target.g, target.at, u, self.multipliers, pull)
         return (self.load - self.force - target.gap - pull) * e.free
 
@@ -113,9 +112,8 @@ class Iterate:
         If ``moving``, the fixed DOFs take their prescribed changes.
         """
         e, target, u = self.e, self.target, self.u
-        du, dm, phi, moved = np.zeros_like(u), np.zeros_like(self.phi), self.phi.copy(), 0.0
+        du, dm, phi, moved = np.zeros_like(u), np.zeros_like(self.phi), self.phi, np.zeros_like(u)
         if moving:  # R - K du of the fixed DOFs
-            moved = np.zeros_like(u)
             moved[e.fixed] = target.prescribed
             multiply(e.K, moved, du)
             R = (R - du) * e.free
@@ -123,7 +121,7 @@ class Iterate:
                 add_constraint_rate(e.joints, target.g, target.at, u, moved, phi)
         if not solver.solve_into(target.at, u, self.multipliers, R, -phi, du, dm):
             return du, dm, np.nan
-        work = np.sqrt(abs(R @ du) + abs(phi @ dm))
+        work = float(np.sqrt(abs(R @ du) + abs(phi @ dm)))
         du += moved
         if e.forces.contacts.number and not moving:
             self._hold_back(target.at, u, R, du, dm)

@@ -92,25 +92,26 @@ class Elements:
     def __init__(self, t: StrainTables) -> None:
         self.t, self.ne, self.ns, self.m = t, len(t.start), t.rows.shape[1], t.G.shape[2]
         G, R, D = scaled(t.G[t.at[:, OF_G]] if len(t.G) > 1 else t.G)
-        self.G, self.own, self.even = G, len(G) > 1, len(R) == 1 or len(G) > 1
+        self.G, self.own, self._even = G, len(G) > 1, len(R) == 1 or len(G) > 1
         self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
         self.x = self._last(t.frame, OF_FRAME)
         self.start, self.rest = t.start, self.measured(self.x)
         # ends: sample, row, and number of the direction
         (g, h), n = t.rows, self.ns // 2
-        self.second = second = np.flatnonzero(g != h)
-        self.sample, self.row = np.append(np.arange(self.ns), second), np.append(g, h[second])
-        self.direction = (np.append(np.arange(self.ns), second + n) if t.kind == CABLE else
+        self._second = second = np.flatnonzero(g != h)
+        self._sample, self._row = np.append(np.arange(self.ns), second), np.append(g, h[second])
+        self._direction = (np.append(np.arange(self.ns), second + n) if t.kind == CABLE else
                           np.append(h, g[second]))
-        self.G_ends = np.ascontiguousarray(G.transpose(0, 2, 1).take(self.row, axis=2))
+        self._G_ends = np.ascontiguousarray(G.transpose(0, 2, 1).take(self._row, axis=2))
         # relative DOFs (2 m, ne); stresses: modulus and strain of each summand, sorted by stress
-        self.dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
-        self.left = t.start + np.arange(2)[:, None]
+        self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
+        self._left = t.start + np.arange(2)[:, None]
         (s, z), q = t.pairs, np.arange(t.pairs.shape[1])
         both = np.concatenate([t.pairs, t.pairs[::-1, s != z]], axis=1)
         order = np.argsort(both[0], kind="stable")
-        self.modulus = np.append(q, q[s != z])[order]
-        self.other, self.begin = both[1, order], np.searchsorted(both[0, order], np.arange(self.ns))
+        self._modulus = np.append(q, q[s != z])[order]
+        self._other = both[1, order]
+        self._begin = np.searchsorted(both[0, order], np.arange(self.ns))
         self.moduli = self._last(t.H, OF_H)
 
     def _last(self, x, column):
@@ -127,15 +128,15 @@ class Elements:
 
     def relative(self, u: Array) -> Array:
         """DOFs relative to the left node, (m, 2, ne)."""
-        U, q = _taken(u, self.dofs), self.m // 2 * 2
-        U[q:q + 2] -= _taken(u, self.left)
+        U, q = _taken(u, self._dofs), self.m // 2 * 2
+        U[q:q + 2] -= _taken(u, self._left)
         return U.reshape(self.m, 2, -1)
 
     def rows(self, U: Array) -> Array:
         """Changes (rows, 2, ne) of the rows by relative DOFs."""
         if self.own:
             return np.matmul(self.G, U.transpose(2, 0, 1)).transpose(1, 2, 0)
-        if self.even:
+        if self._even:
             return (self.G[0] @ U.reshape(self.m, -1)).reshape(-1, 2, self.ne)
         d = self.G[0] @ (self.D * U).reshape(self.m, -1)
         return d.reshape(-1, 2, self.ne) * self.R
@@ -166,15 +167,16 @@ class Elements:
         (a, b, p, k), (c, d, q, l) = one, two
         s, square = a + c, p * p + q * q
         turned = s * (1j / square)
-        X = np.concatenate([s / (p + q), (b + d) * (-1j / square) + (1j * (k + l)) * turned, turned])
+        second = (b + d) * (-1j / square) + (1j * (k + l)) * turned
+        X = np.concatenate([s / (p + q), second, turned])
         return X.view(float).reshape(*X.shape, 2).transpose(0, 2, 1)
 
     def change(self, Y: Array, d: Array) -> Array:
         """Change (ns, ne) of the strain by a change of the rows in directions Y."""
-        x = _taken(Y, self.direction) * _taken(d, self.row)
+        x = _taken(Y, self._direction) * _taken(d, self._row)
         ends = x[:, 0] + x[:, 1]
         strain = ends[:self.ns]
-        strain[self.second] += ends[self.ns:]
+        strain[self._second] += ends[self.ns:]
         return strain
 
     def strain(self, d: Array, one: Any) -> Array:
@@ -186,7 +188,7 @@ class Elements:
     def linear_stress(self, strain: Array, moduli: Array | None = None) -> Array:
         """Weighted stresses (ns, ne) by moduli (nq, ne) between samples."""
         H = self.moduli if moduli is None else moduli
-        return np.add.reduceat(_taken(H, self.modulus) * _taken(strain, self.other), self.begin)
+        return np.add.reduceat(_taken(H, self._modulus) * _taken(strain, self._other), self._begin)
 
     @cached_property
     def weights(self) -> Array:
@@ -248,14 +250,14 @@ class Elements:
 
     def force(self, Y: Array, T: Array, U: Array | None = None) -> Array:
         """Element forces (m, 2, ne) of stresses; with U, those of the constant stiffness too."""
-        F = _taken(T, self.sample)[:, None] * _taken(Y, self.direction)
+        F = _taken(T, self._sample)[:, None] * _taken(Y, self._direction)
         if self.own:
-            F = np.matmul(self.G_ends, F.transpose(2, 0, 1)).transpose(1, 2, 0)
-        elif self.even:
-            F = (self.G_ends[0] @ F.reshape(len(F), -1)).reshape(self.m, 2, self.ne)
+            F = np.matmul(self._G_ends, F.transpose(2, 0, 1)).transpose(1, 2, 0)
+        elif self._even:
+            F = (self._G_ends[0] @ F.reshape(len(F), -1)).reshape(self.m, 2, self.ne)
         else:
-            F *= self.R[self.row]
-            F = (self.G_ends[0] @ F.reshape(len(F), -1)).reshape(self.m, 2, self.ne) * self.D
+            F *= self.R[self._row]
+            F = (self._G_ends[0] @ F.reshape(len(F), -1)).reshape(self.m, 2, self.ne) * self.D
         if U is not None and self.C is not None:
             U = U.reshape(2 * self.m, -1)
             CU = self.C[0] @ U if len(self.C) == 1 else np.einsum("eij,je->ie", self.C, U)
@@ -275,7 +277,7 @@ class Elements:
 
     @cached_property
     def _ends(self):
-        return np.append(self.dofs.ravel(), self.left.ravel()) - self._span.start
+        return np.append(self._dofs.ravel(), self._left.ravel()) - self._span.start
 
     # tangent
 
@@ -285,7 +287,7 @@ class Elements:
 
         Terms of the products of the samples come first, for the geometric part.
         """
-        t, ns, second = self.t, self.ns, self.second
+        t, ns, second = self.t, self.ns, self._second
         own = [np.flatnonzero(t.terms[0] == p)[0] for p in t.of]
         p, a, b, q = t.terms[:, np.append(own, np.setdiff1d(np.arange(t.terms.shape[1]), own))]
         end = np.zeros(2 * ns, int)
@@ -293,7 +295,7 @@ class Elements:
         (k, l), (g, h), R = t.products[:, p], t.rows, self.R[:, 0]
         factor = np.where(a == b, 0.5, 1.0)[:, None] * R[k] * R[l]
         geometric = np.where(g == h, 0.5, 1.0)[:, None] * R[g] * R[h]
-        return (self.direction[end[a]], self.direction[end[b]], q, k, l, factor[:, None],
+        return (self._direction[end[a]], self._direction[end[b]], q, k, l, factor[:, None],
                 geometric[:, None])
 
     @cached_property
@@ -336,7 +338,7 @@ class Elements:
         np.add(xy, yx, out=w[:, 2])
         return w, xy, yx
 
-    def matrices(self, w: Array, xy: Array, yx: Array) -> tuple[Array, Array]:
+    def matrices(self, w: Array, xy: Array, yx: Array) -> Array:
         """Element matrices Q of coefficients, in parts for :func:`_entries`."""
         if self.own:
             rows, (_, _, _, k, l, _, _) = self.G.shape[1], self._terms
@@ -414,12 +416,12 @@ class Elements:
 
     def derivatives(self, Y: Array) -> Array:
         """Derivatives of the strain in directions Y by the DOFs of both nodes, (ne, ns, 2 nb)."""
-        R, D = (x[:, 0].T[:, :, None] for x in (self.R[self.row], self.D))
-        G = self.G.take(self.row, axis=1) * R * D.transpose(0, 2, 1)
-        ends = G[..., None] * _taken(Y, self.direction).transpose(2, 0, 1)[:, :, None]
+        R, D = (x[:, 0].T[:, :, None] for x in (self.R[self._row], self.D))
+        G = self.G.take(self._row, axis=1) * R * D.transpose(0, 2, 1)
+        ends = G[..., None] * _taken(Y, self._direction).transpose(2, 0, 1)[:, :, None]
         B, q = np.empty((self.ne, self.ns, self.m + 1, 2)), self.m // 2
         B[:, :, 1:] = ends[:, :self.ns]
-        B[:, self.second, 1:] += ends[:, self.ns:]
+        B[:, self._second, 1:] += ends[:, self.ns:]
         B[:, :, 0] = -B[:, :, q + 1]
         return B.reshape(self.ne, self.ns, -1)
 

@@ -152,7 +152,7 @@ def _shift(e, given):
 def run_eigen_force(e, u, given, f):
     """Change of the force at u by eigenstrains.
 
-    ``given`` are stresses for a linear law, else strains at the integration points, (3, points, ne).
+    ``given`` are stresses for a linear law, else strains at the points, (3, points, ne).
     """
     _, d, one = e.at(u)
     T, shift = _shift(e, given)
