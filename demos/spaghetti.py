@@ -57,8 +57,8 @@ assert np.allclose(momentum, [push * release, 0], rtol=0, atol=1e-7)
 assert np.ptp(angular) < 1e-6 and np.ptp(energy) < 1e-6
 
 # %%
-# **Place.** A code of its own for the geometrically exact beam, with finer meshes and steps, has the
-# upper end at (22.26, 1.42) at the time 13.
+# **Place.** A code of its own for the geometrically exact beam, with finer meshes and steps, has
+# the upper end at (22.26, 1.42) at the time 13.
 
 tip = history.position(end)[-1]
 print("upper end at t = 13:", tip.round(2))

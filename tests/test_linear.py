@@ -43,7 +43,8 @@ def test_reactions_of_a_propped_beam_do_not_depend_on_the_load(element, q):
     assert_allclose(found.Q, shear, rtol=1e-8, atol=1e-8 * q)
 
 
-@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(2), ElementBeamANCFCubic(2),
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(2),
+                                     ElementBeamANCFCubic(2),
                                      ElementBeamCable(3), ElementBeamCable(5)], ids=repr)
 @pytest.mark.parametrize("L, places", [(1.0, (0.37,)), (10.0, (3.7,)), (1.0, (0.385, 0.46)),
                                        (1.0, (0.01, 0.93)), (1.0, (0.375, 0.37))])

@@ -128,19 +128,19 @@ class Beam(Immutable):
             element = choose_element(mesh, self.material.reference()[0], fields, tolerance)
         if not isinstance(element, ElementBeam):
             raise InputError(f"element must be a ElementBeam, got {shown(element)}")
-        element = self.section.element_for(element)
         if damping is not None and not isinstance(damping, KelvinVoigt):
             raise InputError("damping must be a KelvinVoigt, as KelvinVoigt(1e-4), or None, got "
                              f"{shown(damping)}")
-        self.mesh, self.element, self.damping = element.fitted(mesh), element, damping
+        self.element: ElementBeam = self.section.element_for(element)
+        self.mesh, self.damping = self.element.fitted(mesh), damping
         self.formulation: Formulation = get_formulation(formulation)
         self.name, self.compiled = require_label("name", name), require_flag("compiled", compiled)
         #: Positions off the axis are linear in the DOFs, unlike those of a cable.
-        self.has_sections = element.kinematics == "sections"
-        self.nd = 2 * element.nodal_dofs
+        self.has_sections = self.element.kinematics == "sections"
+        self.nd = 2 * self.element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
         self.width = getattr(self.section, "width", None)
-        self.across = Across(self.mesh, element, self.section, material)
+        self.across = Across(self.mesh, self.element, self.section, material)
         if not self.has_sections:
             kinematics.require_cable(self)
 

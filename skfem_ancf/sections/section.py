@@ -15,7 +15,7 @@ import numpy as np
 from ..core.errors import (CallError, InputError, ask_array, require_flag, require_option,
                            require_positive, shown)
 from ..core.immutable import Immutable
-from ..core.types import Array, HasShear
+from ..core.types import Array
 from ..elements.base import ElementBeam
 from ..materials import Material
 from ..materials.plane_sections import PlaneSections
@@ -168,7 +168,7 @@ class Section(Immutable):
     @staticmethod
     def numbers(EA: float, EI: float, GA: float | None = None, rhoA: float | None = None,
                 rhoI: float | None = None, width: float = 1.0) -> Section:
-        """A section given by stiffnesses and inertias about the axis: the beam of Reissner and Simo.
+        """A section given by stiffnesses and inertias about the axis: the beam of Reissner.
 
         Sections stay plane and keep their size. So an element with sections of a higher order is
         replaced by that of order 1 with the same axis; ``beam.element`` is the one in use. The
@@ -385,7 +385,8 @@ class Numbers(Section):
         own = part if self.rhoI is None or self.rhoA is None else (
             np.sqrt(12.0 * self.rhoI / self.rhoA) / h)
         return [Layer(law, b, Uniform(0.5 - 0.5 * part, 0.5 + 0.5 * part), face=(b, b), outer=b,
-                      density=density, shear=1.2, inertia=Uniform(0.5 - 0.5 * own, 0.5 + 0.5 * own))]
+                      density=density, shear=1.2,
+                      inertia=Uniform(0.5 - 0.5 * own, 0.5 + 0.5 * own))]
 
     def __repr__(self) -> str:
         return f"Section.numbers(EA={self.EA:g}, EI={self.EI:g})"
