@@ -8,25 +8,21 @@ import numpy as np
 from ..actions.contact.kernels import of_contacts
 from ..actions.contact.tables import ContactTables, Question
 from ..actions.forces.kernels import Kinds, of_kinds
-from ..beam.kernels.law import point_of
-from ..beam.kernels.strain import (EIGENSTRAIN, EIGENSTRAIN_MEAN, EIGENSTRAIN_TANGENT, FORCE, GIVEN,
-                                   GRADIENTS, LINEARISED, MEAN, STRESS, TANGENT, UNSYMMETRIC,
-                                   VISCOUS, evaluate)
-from ..beam.kernels.tables import StrainTables
+from ..beam.kernels import loops as kernels
+from ..beam.kernels.compiled import CompiledTables, compiled_tables
+from ..beam.kernels.law import LINEAR, point_of
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
 from ..core.jit import MADE, address, caller, compiled, reader
 from ..core.origin import ours
-from ..core.source import F1, F3, source
+from ..core.source import F1, F2, F3
 from ..core.words import Words
 from .tables import Equations
 
-_STRAIN = StrainTables, int, F1, F1, F1, F1, F1, F1, int
 _KINDS = Annotated[Kinds, MADE], int, F1, F1, float, F1
 _CONTACTS = ContactTables, Annotated[Question, MADE], F1, F1, F1
 _LAW = F1, F3, F3
-_read = reader(StrainTables)
-_call_strain, _call_law = caller(*_STRAIN), caller(*_LAW)
+_read, _call_law = reader(CompiledTables), caller(*_LAW)
 _call_kinds, _call_contacts = caller(*_KINDS), caller(*_CONTACTS)
 
 
@@ -34,65 +30,94 @@ def tables_of(body, k):
     return _read(body.packs[k])
 
 
-@source
-def _run(t, what, u, v, f, given, out, flat, ld):
-    _call_strain(t.address, (t, np.int64(what), u, v, f, given, out, flat, ld))
+#: Compiled kernels of elements with their numbers, by the part that has them.
+KERNELS = {"StrainTables": {kernels.force: 0, kernels.mean: 1, kernels.linearised: 2,
+                            kernels.tangent: 3},
+           "unsymmetric": {kernels.unsymmetric: 4}, "gradients": {kernels.gradients: 5},
+           "eigenstrains": {kernels.eigen_mean: 6, kernels.eigen_tangent: 7},
+           "laws": {kernels.put_law_stresses: 8, kernels.put_law_moduli: 9}}
+_ARRAYS = {kernels.force: 4, kernels.mean: 5, kernels.linearised: 5, kernels.tangent: 5,
+           kernels.unsymmetric: 3, kernels.gradients: 2, kernels.eigen_mean: 4,
+           kernels.eigen_tangent: 3}
+_BANDS = kernels.tangent, kernels.unsymmetric, kernels.eigen_tangent  # with ld
+_HINTS = {kernel: (CompiledTables, *[F1] * n, *[int] * (kernel in _BANDS))
+          for kernel, n in _ARRAYS.items()}
+_HINTS[kernels.put_law_stresses] = CompiledTables, int, F2, F2, F2
+_HINTS[kernels.put_law_moduli] = CompiledTables, int, F2, F2
+#: Addresses of the loaded ones.
+_ADDRESSES = np.zeros(len(_HINTS), np.int64)
+(_call_force, _call_mean, _call_linearised, _call_tangent, _call_unsymmetric, _call_gradients,
+ _call_eigen_mean, _call_eigen_tangent, _call_stresses, _call_moduli) = (caller(*hints) for hints in _HINTS.values())
 
 
 def run_force(t, u, f):
-    _run(t, FORCE, u, u, f, u[:0], u[:0], u[:0], 0)
+    _call_force(t.kernels[0], (t, u, u[:0], u[:0], f))
 
 
 def run_stress(t, u, out):
-    _run(t, STRESS, u, u, u[:0], u[:0], out, u[:0], 0)
-
-
-def run_linearised(t, u, du, given, out):
-    _run(t, LINEARISED, u, du, u[:0], given, out, u[:0], 0)
-
-
-def run_mean(t, u, v, f):
-    _run(t, MEAN, u, v, f, u[:0], u[:0], u[:0], 0)
+    _call_force(t.kernels[0], (t, u, u[:0], out, u[:0]))
 
 
 def run_mixed(t, u, given, out, f):
-    _run(t, FORCE, u, u, f, given, out, u[:0], 0)
-
-
-def run_mean_mixed(t, u, v, given, out, f):
-    _run(t, MEAN, u, v, f, given, out, u[:0], 0)
+    _call_force(t.kernels[0], (t, u, given, out, f))
 
 
 def run_given(t, u, given, f):
-    _run(t, GIVEN, u, u, f, given, u[:0], u[:0], 0)
+    _call_force(t.kernels[0], (t, u, given, u[:0], f))
+
+
+def run_mean(t, u, v, f):
+    _call_mean(t.kernels[1], (t, u, v, u[:0], u[:0], f))
+
+
+def run_mean_mixed(t, u, v, given, out, f):
+    _call_mean(t.kernels[1], (t, u, v, given, out, f))
+
+
+def run_linearised(t, u, du, given, out):
+    _call_linearised(t.kernels[2], (t, u, du, given, out, u[:0]))
 
 
 def run_viscous(t, u, v, f):
-    _run(t, VISCOUS, u, v, f, u[:0], u[:0], u[:0], 0)
+    _call_linearised(t.kernels[2], (t, u, v, u[:0], u[:0], f))
 
 
 def run_tangent(t, u, given, out, f, flat, ld):
-    _run(t, TANGENT, u, u, f, given, out, flat, ld)
-
-
-def run_gradients(t, u, out):
-    _run(t, GRADIENTS, u, u, u[:0], u[:0], out, u[:0], 0)
+    _call_tangent(t.kernels[3], (t, u, given, out, f, flat, ld))
 
 
 def run_unsymmetric(t, u, v, flat, ld):
-    _run(t, UNSYMMETRIC, u, v, u[:0], u[:0], u[:0], flat, ld)
+    _call_unsymmetric(t.kernels[4], (t, u, v, flat, ld))
+
+
+def run_gradients(t, u, out):
+    _call_gradients(t.kernels[5], (t, u, out))
 
 
 def run_eigen_force(t, u, given, f):
-    _run(t, EIGENSTRAIN, u, u, f, given, u[:0], u[:0], 0)
+    if t.law.kind == LINEAR:
+        _call_force(t.kernels[0], (t, u, given, u[:0], f))
+    else:
+        _call_eigen_mean(t.kernels[6], (t, u, u, given, f))
 
 
 def run_eigen_mean(t, u, v, given, f):
-    _run(t, EIGENSTRAIN_MEAN, u, v, f, given, u[:0], u[:0], 0)
+    if t.law.kind == LINEAR:
+        _call_mean(t.kernels[1], (t, u, v, given, u[:0], f))
+    else:
+        _call_eigen_mean(t.kernels[6], (t, u, v, given, f))
 
 
 def run_eigen_tangent(t, u, given, flat, ld):
-    _run(t, EIGENSTRAIN_TANGENT, u, u, u[:0], given, u[:0], flat, ld)
+    _call_eigen_tangent(t.kernels[7], (t, u, given, flat, ld))
+
+
+def law_stresses(t, first, E, change, T):
+    _call_stresses(t.kernels[8], (t, first, E, change, T))
+
+
+def law_moduli(t, first, E, H):
+    _call_moduli(t.kernels[9], (t, first, E, H))
 
 
 def evaluate_points(law, strain, out):
@@ -113,15 +138,16 @@ def run_contacts(tables, asked, u, v, out):
     _call_contacts(tables.address, (tables, asked, u, v, out))
 
 
-#: Separately compiled functions, with annotations of their arguments.
-PARTS = {"StrainTables": (evaluate, _STRAIN), "elements": (of_kinds, _KINDS),
-         "contacts": (of_contacts, _CONTACTS)}
+#: Other separately compiled functions, with annotations of their arguments.
+PARTS = {"elements": (of_kinds, _KINDS), "contacts": (of_contacts, _CONTACTS)}
 
 
 @cache
 def part(name: str) -> int:
-    """The address of one of :data:`PARTS`."""
-    return address(*PARTS[name])
+    """Compile or load a part; the address of one of :data:`PARTS`, else 0."""
+    for kernel, k in KERNELS.get(name, {}).items():
+        _ADDRESSES[k] = address(kernel, _HINTS[kernel])
+    return address(*PARTS[name]) if name in PARTS else 0
 
 
 @cache
@@ -168,13 +194,13 @@ def flat(plain: Equations) -> tuple[Equations, list[Words]]:
 
 
 def _flat_body(body, words):
-    found = [Words(_with_addresses(t)) for t in body.packs]
+    found = [Words(_compiled(t)) for t in body.packs]
     words += found
     return FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table)
 
 
-def _with_addresses(t):
-    t, function = t._replace(address=part("StrainTables")), point_of(t.law)
+def _compiled(t):
+    t, function = compiled_tables(t, _ADDRESSES), point_of(t.law)
     if function is None:
         return t
     try:

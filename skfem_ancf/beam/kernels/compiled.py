@@ -1,0 +1,138 @@
+"""Tables of elements for compiled kernels.
+
+Elements are the last axis of arrays, :data:`W` together, so that loops over them have a constant
+length. Rows, strains and stresses are scaled in each element such that few tables are needed: with
+derivatives ``G[e] = R[e] G D[e]`` and diagonal R and D (graded meshes, arcs), rows are ``R^-1 r``
+and unknowns ``D U``.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.source import F2, F3, I1, I2
+from .law import LawTables
+from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, StrainTables
+
+#: Number of elements together.
+W = 16
+
+
+SAME = 1e-13
+def scaled(G: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One G, and R (k, rows) and D (k, m) with ``G[e] = R[e] G D[e]``; or all G, and ones."""
+    k, rows, m = G.shape
+    R, D = np.ones((k, rows)), np.ones((k, m))
+    if k == 1:
+        return G, R, D
+    size = np.abs(G[0]) / np.abs(G[0]).max(axis=0)
+    with np.errstate(all="ignore"):
+        ratio = np.where(size > 1e-9, G / G[0], np.nan)
+        full = size.min(axis=1).argmax()  # a row with all functions
+        E = ratio[:, full] / ratio[:, full, m // 2, None]  # 1 for the position of the right node
+        S = ratio[:, np.arange(rows), size.argmax(axis=1)] / E[:, size.argmax(axis=1)]
+        same = np.abs(S[:, :, None] * G[0] * E[:, None] - G) <= SAME * np.abs(G).max(
+            axis=1, keepdims=True)
+    return (G[:1], S, E) if same.all() else (G, R, D)
+
+
+class CompiledTables(NamedTuple):
+    """The StrainTables for compiled kernels; n = 1 if all blocks of elements are equal.
+
+    m is the number of functions G, np that of products of rows in tangents. Vectors (2 W) have the
+    components x of all elements, then y. K are lower halves of symmetric matrices (m, m), for xx, yy
+    and the symmetric part of xy; Z those of the skew part of xy, without diagonal.
+    """
+
+    kernels: I1  # addresses of compiled functions
+    kind: int  # SECTION or CABLE
+    start: I1  # first DOF of each element, (ne,)
+    G: F2  # derivatives of the functions but the first, (rows, m)
+    own: F3  # or those of each element, (n, rows m, W), else empty
+    used: I1  # which of these are not zero, (rows m,)
+    D: F3  # factors of the unknowns, (n, m, W), or empty
+    sigma: F3  # factors of the strains, (n, ns, W), or empty
+    x: F3  # rows in the reference configuration, (n, rows, 2 W)
+    rows: I2  # g and h of each sample, (2, ns)
+    ways: I2  # the directions in which they change its strain; -1 if g = h, (2, ns)
+    pairs: I2  # samples s <= t of each modulus, (2, nq)
+    H: F3  # weighted moduli, (n, nq, W)
+    terms: I2  # product, skew product or -1, two directions, modulus, (5, nt)
+    factors: F2  # of the terms, (1, nt)
+    of: I1  # product of each sample, (ns,)
+    products: I2  # rows g <= h, sorted, (2, np)
+    skew: I2  # those with g < h, (2, nz)
+    P: F2  # from coefficients to K, (m (m + 1) / 2, np)
+    Q: F2  # from skew coefficients to Z, (m (m - 1) / 2, nz)
+    K: F3  # constant stiffness, (n, m (m + 1) / 2, 3 W), or empty
+    Z: F3  # (n, m (m - 1) / 2, W), or empty
+    law: LawTables
+    along: F2  # from samples to integration points, (3 points, ns)
+    weights: F3  # of the points, (n, points, W)
+
+
+def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
+    """The CompiledTables of a StrainTables."""
+    ne, ns, m = len(t.start), t.rows.shape[1], t.G.shape[2]
+
+    def each(x, column):  # (1 or ne, ...)
+        return x[t.at[:, column]] if len(x) > 1 else x
+
+    G, R, D = scaled(each(t.G, OF_G))
+    own, (g, h) = len(G) > 1, t.rows
+    section = t.kind == SECTION
+    sigma = R[:, g] * R[:, h] if section else np.concatenate(
+        [R[:, g[:ns // 2]], R[:, h[ns // 2:]] / R[:, g[ns // 2:]]], axis=1)
+    first = h if section else np.arange(ns)
+    second = np.where(g == h, -1, g if section else ns // 2 + np.arange(ns))
+    number, (p, a, b, q) = np.concatenate([first, second]), t.terms
+    k, l = t.products
+    skew = np.cumsum(k != l) - 1
+    skew[k == l] = -1
+    K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
+    return CompiledTables(
+        kernels, t.kind, t.start, *map(np.ascontiguousarray, (
+            G[0], _blocks(G.reshape(ne, -1) if own else G[:0, 0]),
+            G.any(axis=0).ravel().astype(np.int64), _scales(D), _scales(sigma),
+            _blocks(each(t.frame, OF_FRAME) / R[:, :, None]), t.rows, np.array([first, second]),
+            t.pairs, _blocks(each(t.H, OF_H) * sigma[:, t.pairs[0]] * sigma[:, t.pairs[1]]),
+            np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None], t.of,
+            t.products, t.products[:, k != l], *_products(G[0], t.products, own), K, Z)),
+        t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS)))
+
+
+def _blocks(x):
+    """(1, n, ...) or (ne, n, ...) to (1 or blocks, n, ... W); the last element fills the last block."""
+    x = np.repeat(x, W, axis=0) if len(x) == 1 else np.concatenate(
+        [x, np.repeat(x[-1:], -len(x) % W, axis=0)])
+    if x.size == 0:
+        return np.zeros((0, *x.shape[1:2], 0)) if x.ndim > 1 else np.zeros((0, 0, 0))
+    x = np.moveaxis(x.reshape(len(x) // W, W, *x.shape[1:]), 1, -1)
+    return np.ascontiguousarray(x).reshape(*x.shape[:2], -1)
+
+
+def _scales(x):
+    """Blocks of factors (1 or ne, n), empty if all are one."""
+    return np.zeros((0, 0, 0)) if (x == 1.0).all() else _blocks(x)
+
+
+def _products(G, products, own):
+    """P and Q of derivatives (rows, m)."""
+    if own:
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    (i, j), (a, b), (g, h) = np.tril_indices(G.shape[1]), np.tril_indices(G.shape[1], -1), products
+    one, two, skew = G[g].T, G[h].T, g != h
+    return (one[i] * two[j] + one[j] * two[i],
+            one[a][:, skew] * two[b][:, skew] - one[b][:, skew] * two[a][:, skew])
+
+
+def _symmetric_and_skew(C, D):
+    """K and Z of matrices C (k, 2 m, 2 m) for scaled unknowns."""
+    if not len(C):
+        return np.zeros((0, 0, 0)), np.zeros((0, 0, 0))
+    m = D.shape[1]
+    C = C.reshape(len(C), m, 2, m, 2) / (D[:, :, None, None, None] * D[:, None, None, :, None])
+    (i, j), (a, b) = np.tril_indices(m), np.tril_indices(m, -1)
+    one, two = C[:, :, 0, :, 1], C[:, :, 1, :, 0]
+    K = np.stack([C[:, i, 0, j, 0], C[:, i, 1, j, 1], 0.5 * (one + two)[:, i, j]], axis=2)
+    return _blocks(K), _blocks(0.5 * (one - two)[:, a, b])
