@@ -21,10 +21,9 @@ import scipy.sparse.linalg
 #: Modules of NumPy and of compiled code; function in both; what is changed before and after it.
 SEAMS = [
     # rows, forces and tangents of elements
-    ("beam.kernels.arrays", "beam.kernels.loops", "displaced", [], ["out"]),
-    ("beam.kernels.arrays", None, "_add_to_nodes", ["F"], []),
+    (None, "beam.kernels.loops", "to_rows", [], ["d"]),
     (None, "beam.kernels.loops", "add_to_nodes", ["F"], []),
-    ("beam.kernels.arrays", "beam.kernels.loops", "add_to_band", ["K"], []),
+    (None, "beam.kernels.loops", "add_to_band", ["K", "Z"], []),
     # entries of bands, and solutions
     ("core.band", "core.loops", "factorize", ["A.flat"], []),
     ("core.band", "core.loops", "solve", [], ["x"]),
@@ -34,6 +33,8 @@ SEAMS = [
     ("core.band", "core.loops", "factorize_complex", ["A"], []),
     ("core.band", "core.loops", "solve_complex", [], ["x", "y"]),
 ]
+#: Methods in NumPy, and what is changed before and after them.
+METHODS = [("rows", [], ["out"]), ("add", ["F"], []), ("lower", ["K"], [])]
 #: Functions of LAPACK whose matrix, or whose solution, is changed where this module calls them.
 LAPACK = "core.linalg", ["dpbtrf", "dgbtrf"], ["dpbtrs", "dgbtrs"]
 
@@ -46,6 +47,10 @@ def install(seed):
     for arrays, _, name, before, after in SEAMS:
         if arrays is not None:
             _replace(arrays, name, _shaken(shake, before, after))
+    from skfem_ancf.beam.kernels.elements import Elements
+
+    for name, before, after in METHODS:
+        setattr(Elements, name, _shaken(shake, before, after)(getattr(Elements, name)))
     linalg, matrices, solutions = LAPACK
     _replace(linalg, "lapack", lambda lapack: _Lapack(lapack, shake, matrices, solutions))
     solve, splu = np.linalg.solve, scipy.sparse.linalg.splu
@@ -182,6 +187,6 @@ class _Factors:
 
 if __name__ == "__main__":
     install(int(sys.argv[1]))
-    from skfem_ancf.equations.compile import main
+    from skfem_ancf.equations.compile import compile_all
 
-    main()
+    compile_all()

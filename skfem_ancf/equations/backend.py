@@ -22,15 +22,17 @@ logger = logging.getLogger(__name__)
 
 #: Compiled functions and parts of this process by name.
 LOADED: dict[str, Any] = {}
-#: Parts that are called by address.
-PARTS = "StrainTables", "elements", "contacts"
+#: Parts that are called by address and that most scenes use, and those of some functions.
+PARTS = "StrainTables", "elements", "contacts", "unsymmetric"
+NEEDED = {"steps": ["unsymmetric"], "collocate": ["gradients"]}
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
-COMPILING = {"StrainTables": 24.0, "elements": 3.0, "contacts": 12.0,
+COMPILING = {"StrainTables": 12.0, "elements": 3.0, "contacts": 12.0, "unsymmetric": 3.0,
              "tangent": 2.0, "force": 1.0, "linearised": 1.0, "steps": 27.0}
 #: The same for functions that are compiled on first use only.
-WHERE_USED = {"collocate": 25.0, "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}
+WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
+              "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds of compiling that need no reason once the parts are loaded.
@@ -127,8 +129,12 @@ class Backend:
 
     def _missing(self, name):
         """Names of a kernel and its parts that are not loaded."""
-        missing = [part for part in self.tables.parts if part not in LOADED]
+        missing = [part for part in self._parts(name) if part not in LOADED]
         return missing if name in LOADED else [*missing, name]
+
+    def _parts(self, name):
+        """Names of the parts that a kernel needs."""
+        return [*self.tables.parts, *NEEDED.get(name, ())]
 
     def seconds(self, iterations: float) -> float:
         """Approximate seconds of NumPy for a number of iterations."""
@@ -197,7 +203,7 @@ class Backend:
             if not code_cache.on_disk(*missing):
                 _worked = 0.0
             with _LOCK, announced(missing) as update:
-                for part in self.tables.parts:
+                for part in self._parts(name):
                     load_part(part, update)
                 if self._flat is None:
                     self._flat = loops.flat(self.tables.plain)
@@ -209,7 +215,7 @@ class Backend:
 
 
 def load_part(name: str, update: Callable[[str], None]) -> None:
-    """Compile one of :data:`PARTS` or load it; calls ``update(name)``."""
+    """Compile a part or load it; calls ``update(name)``."""
     from . import loops
 
     if name not in LOADED:

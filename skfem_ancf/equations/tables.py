@@ -81,10 +81,13 @@ class Tables:
 
     @cached_property
     def parts(self) -> list[str]:
-        """The parts of :data:`skfem_ancf.equations.loops.PARTS` that the scene uses."""
-        forces = self.plain.forces
-        return [*["StrainTables"] * (len(self.plain.body.packs) > 0),
-                *["elements"] * (forces.number > 0), *["contacts"] * (forces.contacts.number > 0)]
+        """Compiled parts that the scene uses, see :mod:`skfem_ancf.equations.loops`."""
+        forces, packs = self.plain.forces, self.plain.body.packs
+        used = {"StrainTables": len(packs) > 0, "elements": forces.number > 0,
+                "laws": any(t.law.kind != LINEAR for t in packs),
+                "contacts": forces.contacts.number > 0,
+                "eigenstrains": len(self.plain.loads.eigenstrains) > 0}
+        return [name for name, yes in used.items() if yes]
 
     @cached_property
     def linearised(self) -> "Tables | None":

@@ -11,29 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.source import F2, F3, I1, I2
+from .elements import scaled
 from .law import LawTables
 from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, StrainTables
 
 #: Number of elements together.
 W = 16
-
-
-SAME = 1e-13
-def scaled(G: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One G, and R (k, rows) and D (k, m) with ``G[e] = R[e] G D[e]``; or all G, and ones."""
-    k, rows, m = G.shape
-    R, D = np.ones((k, rows)), np.ones((k, m))
-    if k == 1:
-        return G, R, D
-    size = np.abs(G[0]) / np.abs(G[0]).max(axis=0)
-    with np.errstate(all="ignore"):
-        ratio = np.where(size > 1e-9, G / G[0], np.nan)
-        full = size.min(axis=1).argmax()  # a row with all functions
-        E = ratio[:, full] / ratio[:, full, m // 2, None]  # 1 for the position of the right node
-        S = ratio[:, np.arange(rows), size.argmax(axis=1)] / E[:, size.argmax(axis=1)]
-        same = np.abs(S[:, :, None] * G[0] * E[:, None] - G) <= SAME * np.abs(G).max(
-            axis=1, keepdims=True)
-    return (G[:1], S, E) if same.all() else (G, R, D)
 
 
 class CompiledTables(NamedTuple):
