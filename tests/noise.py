@@ -21,9 +21,9 @@ import scipy.sparse.linalg
 #: Modules of NumPy and of compiled code; function in both; what is changed before and after it.
 SEAMS = [
     # rows, forces and tangents of elements
-    (None, "beam.kernels.loops", "to_rows", [], ["d"]),
-    (None, "beam.kernels.loops", "add_to_nodes", ["F"], []),
-    (None, "beam.kernels.loops", "add_to_band", ["K", "Z"], []),
+    (None, "beam.kernels.blocks", "to_rows", [], ["d"]),
+    (None, "beam.kernels.blocks", "add_to_nodes", ["F"], []),
+    (None, "beam.kernels.tangents", "add_to_band", ["K", "Z"], []),
     # entries of bands, and solutions
     ("core.band", "core.loops", "factorize", ["A.flat"], []),
     ("core.band", "core.loops", "solve", [], ["x"]),

@@ -8,7 +8,7 @@ import numpy as np
 from ..actions.contact.kernels import of_contacts
 from ..actions.contact.tables import ContactTables, Question
 from ..actions.forces.kernels import Kinds, of_kinds
-from ..beam.kernels import loops as kernels
+from ..beam.kernels import blocks, loops as kernels
 from ..beam.kernels.compiled import CompiledTables, compiled_tables
 from ..beam.kernels.law import LINEAR, point_of
 from ..beam.strain_energy import FlatBody
@@ -31,23 +31,24 @@ def tables_of(body, k):
 
 
 #: Compiled kernels of elements with their numbers, by the part that has them.
-KERNELS = {"StrainTables": {kernels.force: 0, kernels.mean: 1, kernels.linearised: 2,
-                            kernels.tangent: 3},
-           "unsymmetric": {kernels.unsymmetric: 4}, "gradients": {kernels.gradients: 5},
-           "eigenstrains": {kernels.eigen_mean: 6, kernels.eigen_tangent: 7},
-           "laws": {kernels.put_law_stresses: 8, kernels.put_law_moduli: 9}}
+KERNELS: dict[str, dict[Any, int]] = {
+    "StrainTables": {kernels.force: 0, kernels.mean: 1, kernels.linearised: 2, kernels.tangent: 3},
+    "unsymmetric": {kernels.unsymmetric: 4}, "gradients": {kernels.gradients: 5},
+    "eigenstrains": {kernels.eigen_mean: 6, kernels.eigen_tangent: 7},
+    "laws": {blocks.put_law_stresses: 8, blocks.put_law_moduli: 9}}
 _ARRAYS = {kernels.force: 4, kernels.mean: 5, kernels.linearised: 5, kernels.tangent: 5,
            kernels.unsymmetric: 3, kernels.gradients: 2, kernels.eigen_mean: 4,
            kernels.eigen_tangent: 3}
 _BANDS = kernels.tangent, kernels.unsymmetric, kernels.eigen_tangent  # with ld
 _HINTS = {kernel: (CompiledTables, *[F1] * n, *[int] * (kernel in _BANDS))
           for kernel, n in _ARRAYS.items()}
-_HINTS[kernels.put_law_stresses] = CompiledTables, int, F2, F2, F2
-_HINTS[kernels.put_law_moduli] = CompiledTables, int, F2, F2
+_HINTS[blocks.put_law_stresses] = CompiledTables, int, F2, F2, F2
+_HINTS[blocks.put_law_moduli] = CompiledTables, int, F2, F2
 #: Addresses of the loaded ones.
 _ADDRESSES = np.zeros(len(_HINTS), np.int64)
 (_call_force, _call_mean, _call_linearised, _call_tangent, _call_unsymmetric, _call_gradients,
- _call_eigen_mean, _call_eigen_tangent, _call_stresses, _call_moduli) = (caller(*hints) for hints in _HINTS.values())
+ _call_eigen_mean, _call_eigen_tangent, _call_stresses, _call_moduli) = (
+    caller(*hints) for hints in _HINTS.values())
 
 
 def run_force(t, u, f):

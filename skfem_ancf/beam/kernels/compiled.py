@@ -23,8 +23,8 @@ class CompiledTables(NamedTuple):
     """The StrainTables for compiled kernels; n = 1 if all blocks of elements are equal.
 
     m is the number of functions G, np that of products of rows in tangents. Vectors (2 W) have the
-    components x of all elements, then y. K are lower halves of symmetric matrices (m, m), for xx, yy
-    and the symmetric part of xy; Z those of the skew part of xy, without diagonal.
+    components x of all elements, then y. K are lower halves of symmetric matrices (m, m), for xx,
+    yy and the symmetric part of xy; Z those of the skew part of xy, without diagonal.
     """
 
     kernels: I1  # addresses of compiled functions
@@ -56,7 +56,7 @@ class CompiledTables(NamedTuple):
 
 def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
     """The CompiledTables of a StrainTables."""
-    ne, ns, m = len(t.start), t.rows.shape[1], t.G.shape[2]
+    ne, ns = len(t.start), t.rows.shape[1]
 
     def each(x, column):  # (1 or ne, ...)
         return x[t.at[:, column]] if len(x) > 1 else x
@@ -73,7 +73,7 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
     skew = np.cumsum(k != l) - 1
     skew[k == l] = -1
     K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
-    return CompiledTables(
+    return CompiledTables._make((
         kernels, t.kind, t.start, *map(np.ascontiguousarray, (
             G[0], _blocks(G.reshape(ne, -1) if own else G[:0, 0]),
             G.any(axis=0).ravel().astype(np.int64), _scales(D), _scales(sigma),
@@ -81,11 +81,11 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
             t.pairs, _blocks(each(t.H, OF_H) * sigma[:, t.pairs[0]] * sigma[:, t.pairs[1]]),
             np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None], t.of,
             t.products, t.products[:, k != l], *_products(G[0], t.products, own), K, Z)),
-        t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS)))
+        t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS))))
 
 
 def _blocks(x):
-    """(1, n, ...) or (ne, n, ...) to (1 or blocks, n, ... W); the last element fills the last block."""
+    """(1 or ne, n, ...) to (1 or blocks, n, ... W); the last element fills the last block."""
     x = np.repeat(x, W, axis=0) if len(x) == 1 else np.concatenate(
         [x, np.repeat(x[-1:], -len(x) % W, axis=0)])
     if x.size == 0:
