@@ -20,26 +20,58 @@ def column(x):
 # band matrices
 
 
+# symmetric: four columns at once, since zeros after each column replace entries that it lacks.
+# Unsigned indices: Numba then needs no check for negative ones, which prevents vectorisation.
+
+U = np.uint64
+I, J, K = U(1), U(2), U(3)
+
+
 def multiply(A, x, y):
-    n, top = x.size, max(A.top, 0)
-    columns = A.flat.reshape(n, A.flat.size // n)
-    for i in range(n):
-        y[i] = 0.0
+    if A.top > 0:
+        _multiply_both(A, x, y)
+    else:
+        _multiply_lower(A.flat, A.ld, A.width, x, y)
+
+
+@source
+def _multiply_both(A, x, y):
+    n, top = x.size, A.top
+    columns = A.flat.reshape(n, A.ld)
+    y[:] = 0.0
     for j in range(n):
-        # slices instead of x[j + k]: Numba then needs no check for negative indices
-        column, later, out, m = columns[j][top:], x[j:], y[j:], min(A.width, n - 1 - j) + 1
-        c, s = later[0], column[0] * later[0]
-        for k in range(1, m):
-            out[k] += column[k] * c
-        if A.top > 0:
-            left = min(A.width, j)
-            above, before = columns[j][top - left:], y[j - left:]
-            for k in range(left):
-                before[k] += above[k] * c
-        else:
-            for k in range(1, m):
-                s += column[k] * later[k]
-        out[0] += s
+        left, m = min(A.width, j), min(A.width, n - 1 - j) + 1
+        column, out = columns[j][top - left:], y[j - left:]
+        for k in range(left + m):
+            out[k] += column[k] * x[j]
+
+
+@source
+def _multiply_lower(A, ld, width, x, y):
+    n = x.size
+    last = n - n % 4
+    y[:] = 0.0
+    for j in range(0, last, 4):
+        p, q, r, s, t = U(j * ld), U(j * ld + ld), U(j * ld + 2 * ld), U(j * ld + 3 * ld), U(j + 4)
+        a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
+        e = A[p] * a + A[p + I] * b + A[p + J] * c + A[p + K] * d
+        f = A[p + I] * a + A[q] * b + A[q + I] * c + A[q + J] * d
+        g = A[p + J] * a + A[q + I] * b + A[r] * c + A[r + I] * d
+        h = A[p + K] * a + A[q + J] * b + A[r + I] * c + A[s] * d
+        p, q, r, s = p + U(4), q + K, r + J, s + I
+        for k in range(U(min(width, n - 4 - j))):
+            z = x[t + k]
+            e += A[p + k] * z
+            f += A[q + k] * z
+            g += A[r + k] * z
+            h += A[s + k] * z
+            y[t + k] += A[p + k] * a + A[q + k] * b + A[r + k] * c + A[s + k] * d
+        y[j], y[j + 1], y[j + 2], y[j + 3] = y[j] + e, y[j + 1] + f, y[j + 2] + g, y[j + 3] + h
+    for j in range(last, n):
+        y[j] += A[j * ld] * x[j]
+        for k in range(1, n - j):
+            y[j] += A[j * ld + k] * x[j + k]
+            y[j + k] += A[j * ld + k] * x[j]
 
 
 def add_multiple(c, x, y):
@@ -50,28 +82,62 @@ def add_multiple(c, x, y):
 def factorize(A):
     if A.top > 0:
         return _exchanging(A)
-    n, halves = A.flat.size // A.ld, 2 if A.top < 0 else 1
-    # entry i of half h of column j
-    L = A.flat.reshape(n, halves, A.ld // halves)
+    if A.top < 0:
+        return _factorize_halves(A)
+    return _factorize_lower(A.flat, A.ld, A.width)
+
+
+@source
+def _factorize_lower(A, ld, width):
+    n = A.size // ld
+    for j in range(0, n, 4):
+        m = min(4, n - j)
+        for k in range(1, min(width + 4, n - j)):  # subtract from column j + k
+            b, size = U((j + k) * ld), U(min(width + 4, n - j) - k)
+            p, before = U(j * ld + k), A[b]
+            if k >= m and m == 4:
+                w, y, z = (j + 1) * ld, (j + 2) * ld, (j + 3) * ld
+                q, r, s = U(w + k - 1), U(y + k - 2), U(z + k - 3)
+                c, d, e, f = A[p] / A[U(j * ld)], A[q] / A[U(w)], A[r] / A[U(y)], A[s] / A[U(z)]
+                for i in range(size):
+                    A[b + i] -= c * A[p + i] + d * A[q + i] + e * A[r + i] + f * A[s + i]
+            else:
+                for l in range(min(k, m)):
+                    p = U((j + l) * ld + k - l)
+                    c = A[p] / A[U((j + l) * ld)]
+                    for i in range(size):
+                        A[b + i] -= c * A[p + i]
+            if not abs(A[b]) > LOST * abs(before):
+                return False
+        for l in range(m):
+            p = U((j + l) * ld)
+            if not 0.0 < abs(A[p]) < np.inf:
+                return False
+            c = 1.0 / A[p]
+            for i in range(I, U(width + 1)):
+                A[p + i] *= c
+    return True
+
+
+@source
+def _factorize_halves(A):
+    n = A.flat.size // A.ld
+    L = A.flat.reshape(n, 2, A.ld // 2)  # entry i of half h of column j
     for j in range(n):
         m, d = min(A.width, n - 1 - j), L[j, 0, 0]
-        if not abs(d) > 0.0 or not abs(d) < np.inf:
+        if not 0.0 < abs(d) < np.inf:
             return False
         inverse = 1.0 / d
         for k in range(1, m + 1):
-            before, c = L[j + k, 0, 0], L[j, halves - 1, k] * inverse
+            before, c, d = L[j + k, 0, 0], L[j, 1, k] * inverse, L[j, 0, k] * inverse
             for i in range(m + 1 - k):
                 L[j + k, 0, i] -= c * L[j, 0, k + i]
-            if abs(L[j + k, 0, 0]) < LOST * abs(before):
+                L[j + k, 1, i] -= d * L[j, 1, k + i]
+            if not abs(L[j + k, 0, 0]) > LOST * abs(before):
                 return False
-            if halves > 1:
-                c = L[j, 0, k] * inverse
-                for i in range(m + 1 - k):
-                    L[j + k, 1, i] -= c * L[j, 1, k + i]
         for k in range(1, m + 1):
             L[j, 0, k] *= inverse
-            if halves > 1:
-                L[j, 1, k] *= inverse
+            L[j, 1, k] *= inverse
     return True
 
 
@@ -109,18 +175,47 @@ def _exchanging(A):
 def solve(A, x):
     if A.top > 0:
         _solve_exchanged(A, x)
-        return
-    n, half = x.size, A.ld // 2 if A.top < 0 else 0
-    columns = A.flat.reshape(n, A.ld)
+    else:
+        _solve_lower(A.flat, A.ld, A.width, A.ld // 2 if A.top < 0 else 0, x)
+
+
+@source
+def _solve_lower(A, ld, width, half, x):
+    n = x.size
+    last = n - n % 4
+    for j in range(0, last, 4):
+        p, q, r, s, t = U(j * ld), U(j * ld + ld), U(j * ld + 2 * ld), U(j * ld + 3 * ld), U(j + 4)
+        a = x[j]
+        b = x[j + 1] - A[p + I] * a
+        c = x[j + 2] - A[p + J] * a - A[q + I] * b
+        d = x[j + 3] - A[p + K] * a - A[q + J] * b - A[r + I] * c
+        x[j + 1], x[j + 2], x[j + 3] = b, c, d
+        p, q, r, s = p + U(4), q + K, r + J, s + I
+        for k in range(U(min(width, n - 4 - j))):
+            x[t + k] -= A[p + k] * a + A[q + k] * b + A[r + k] * c + A[s + k] * d
+    for j in range(last, n):
+        for k in range(1, n - j):
+            x[j + k] -= A[j * ld + k] * x[j]
     for j in range(n):
-        column, later, c = columns[j], x[j:], x[j]
-        for k in range(1, min(A.width, n - 1 - j) + 1):
-            later[k] -= column[k] * c
-    for j in range(n - 1, -1, -1):
-        column, later, s = columns[j][half:], x[j:], 0.0
-        for k in range(1, min(A.width, n - 1 - j) + 1):
-            s += column[k] * later[k]
-        later[0] = later[0] / columns[j, 0] - s
+        x[j] /= A[j * ld]
+    for j in range(n - 1, last - 1, -1):
+        for k in range(1, n - j):
+            x[j] -= A[j * ld + half + k] * x[j + k]
+    for j in range(last - 4, -1, -4):
+        at = j * ld + half
+        p, q, r, s, t = U(at), U(at + ld), U(at + 2 * ld), U(at + 3 * ld), U(j + 4)
+        f, g, h, i = p + U(4), q + K, r + J, s + I
+        a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
+        for k in range(U(min(width, n - 4 - j))):
+            y = x[t + k]
+            a -= A[f + k] * y
+            b -= A[g + k] * y
+            c -= A[h + k] * y
+            d -= A[i + k] * y
+        c -= A[r + I] * d
+        b -= A[q + I] * c + A[q + J] * d
+        a -= A[p + I] * b + A[p + J] * c + A[p + K] * d
+        x[j], x[j + 1], x[j + 2], x[j + 3] = a, b, c, d
 
 
 @source
