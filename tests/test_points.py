@@ -158,7 +158,8 @@ def test_points_of_the_exact_curve_are_points_of_a_cable(degree):
     assert reaction.moment == pytest.approx(arm[1] * force[0] - arm[0] * force[1], rel=2e-5)
     Scene(beam).clamp("left").spring(1.0, between=((beam, at), ("ground", (0.5, 1.0)))).system
     with pytest.raises(InputError, match="off the axis"):
-        Scene(beam).clamp("left").point_force(force, tuple(arc(0.546875) + [-1e-4, 1e-4]))
+        Scene(beam).clamp("left").spring(1.0, between=(
+            (beam, tuple(arc(0.546875) + [-1e-4, 1e-4])), ("ground", (0.5, 1.0))))
 
 
 def modules_of(call):

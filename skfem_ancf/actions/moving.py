@@ -16,6 +16,7 @@ from ..core.errors import (InputError, ask, require_finite, require_finite_scala
                            require_positive)
 from ..core.types import Array, TimeFunction
 from .loads import Load
+from .off_axis import OffAxisForce, is_off_axis
 
 _NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
@@ -49,10 +50,12 @@ class TimedLoad(Load):
     def acting(self, t: float | None) -> tuple[float, Load]:
         last, time = self._last, 1.0 if t is None else float(t)
         if last is None or last._time != time:
-            vector, distribution = self.at(time)
-            last = self._last = self._with(_time=time, _vector=vector, _last=None,
-                                           _distribution=distribution)
+            last = self._last = self._now(time)._with(_time=time)
         return self.factor(t), last
+
+    def _now(self, time: float) -> Load:
+        vector, distribution = self.at(time)
+        return self._with(_vector=vector, _last=None, _distribution=distribution)
 
     def force(self, u: Array) -> Array:
         return self.acting(None)[1].force(u) if self._vector is None else self._vector
@@ -109,6 +112,12 @@ class MovingForce(TimedLoad):
             return []
         place = require_finite(f"what at(t={t:g}) returns", place, (2,))
         return [(self.total, *locate(self.beam, place))]
+
+    def _now(self, time: float) -> Load:
+        places = self.places(time)
+        if places and is_off_axis(self.beam, places[0][2]):
+            return OffAxisForce(*places[0], self.beam)
+        return super()._now(time)
 
 
 class Train(TimedLoad):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import on_points
-from ..beam.kinematics import locate, probe
+from ..beam.kinematics import locate
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody, on_body
 from ..core.errors import require_finite
@@ -18,6 +18,7 @@ from ..core.types import TimeFunction
 from .item import Item
 from .loads import DeadLoad, Load, number_at
 from .moving import MovingForce
+from .off_axis import OffAxisForce, is_off_axis
 
 
 class PointForce(Load):
@@ -29,7 +30,8 @@ class PointForce(Load):
         The force, shape (2,).
     at
         The point (x, y) in the reference configuration, shape (2,), or "right" for the axis at that
-        end; None for the centre of mass of a rigid body. For a function of time see
+        end; None for the centre of mass of a rigid body. At a point of a cable beside its axis the
+        force has a couple. For a function of time see
         :class:`~skfem_ancf.actions.moving.MovingForce`.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`; the beam may be a RigidBody.
@@ -55,6 +57,7 @@ class PointForce(Load):
             np.add.at(vector, dofs, self.total[:, None] * weights)
             return DeadLoad(beam, vector, self.amplitude)
         e, X = locate(beam, self.at)
-        probe(beam, self.at, (e, X))  # a point of a cable must be on the axis
+        if is_off_axis(beam, X):
+            return OffAxisForce(self.total, e, X, beam, self.amplitude)
         vector, distribution = on_points(beam, [(self.total, e, X)])
         return DeadLoad(beam, vector, self.amplitude, distribution)

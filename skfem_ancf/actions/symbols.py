@@ -10,7 +10,7 @@ import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.domain import Domain
-from ..beam.kinematics import direction_weights, probe_reference
+from ..beam.kinematics import direction_weights, locate, probe_reference
 from ..beam.layout import Layout
 from ..beam.rigid import RigidBody
 from ..core.errors import AncfError
@@ -209,7 +209,12 @@ def _(load, layout):
 @symbols.register(FollowerForce)
 def _(load, layout):
     turn = [section(layout, load.beam, load.at)[1]] if isinstance(load, FollowerForce) else []
-    yield force_symbol([point(layout, load.beam, load.at)], load.total, turn)
+    beam = layout.beam(load.beam)
+    if isinstance(beam, Beam):
+        e, X = locate(beam, load.at)
+        yield force_symbol([_inside(layout, beam, e, *X)], load.total, turn)
+    else:
+        yield force_symbol([point(layout, load.beam, load.at)], load.total, turn)
 
 
 @symbols.register(LineLoad)
