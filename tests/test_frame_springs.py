@@ -1,5 +1,6 @@
 """Springs of a frame, also between the lines of a joint: closed forms, and beams with joints."""
 
+import copy
 from itertools import permutations, product
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.optimize import brentq
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.actions.loads import Load
-from skfem_ancf.core.errors import InputError
+from skfem_ancf.core.errors import InputError, MeshError
 
 E, H = 2e11, 0.1
 EA, EI = E * H**2, E * H**4 / 12
@@ -135,6 +136,37 @@ def test_a_grid_of_springs():
     for u, v in ((frame.solve_linear(), scene.solve_linear()),
                  (frame.solve_static(), scene.solve_static())):
         assert_allclose(u.displacement((4, 3), "c"), v.displacement((4, 3), 2), rtol=1e-7)
+
+
+@pytest.mark.parametrize("groups", [True, False])
+def test_places_without_the_name_of_a_beam(groups):
+    """At a rigid node the beam does not matter; a force may act between nodes."""
+    def made(hinges=()):
+        named = {"a": [0], "b": [1]} if groups else None
+        return Frame.from_lines(POINTS, [(0, 1), (1, 2)], named, hinges=hinges, material=STEEL,
+                                height=H, width=H).hold(0, ["x", "y"], "angle")
+
+    F, k, c = 1e3, 2e5, 3e5
+    bent = made().point_force((0, F), at=2).torsional_spring(c, (2, 0)).solve_linear()
+    # the spring takes the moment c phi at 2: F (2 4 - 2) / EI = phi (1 + 2 c / EI)
+    phi = F * 6 / EI / (1 + 2 * c / EI)
+    assert_allclose(bent.displacement((4, 0))[1], 64 * F / (3 * EI) - c * phi * 6 / EI, rtol=1e-9)
+    propped = made().point_force((0, F), at=2).spring(k, ((2, 0), ("ground", (2, -1))))
+    R = k * F * (4 * (12 - 2) / 6) / EI / (1 + k * 8 / (3 * EI))
+    assert_allclose(propped.solve_linear().displacement((2, 0), *["a"] * groups)[1], R / k,
+                    rtol=1e-9)
+    between = made().point_force((0, F), at=(1.3, 0)).solve_linear()
+    assert_allclose(between.displacement((4, 0))[1], F * 1.3**2 * (12 - 1.3) / (6 * EI), rtol=1e-9)
+    assert_allclose(between.resultants((0.5, 0), *["a"] * groups).M, F * 0.8, rtol=1e-9)
+    heavy = made().point_mass(50.0, (2, 0))
+    assert heavy.modes(1).frequencies[0] < made().modes(1).frequencies[0]
+    with pytest.raises(MeshError, match="no node of the frame"):
+        made().point_force((0, F), at=(1.3, 0.2))
+    with pytest.raises(InputError, match="each has a rotation of its own"):
+        made([1]).torsional_spring(c, (2, 0))
+    one = made([(1, 1)]).point_force((0, F), at=1).torsional_spring(c, (2, 0)).hold(2, "x", "y")
+    assert one.solve_linear().converged and copy.deepcopy(one).torsional_spring(
+        c, (2, 0)).solve_linear().converged
 
 
 class Ties(Load):

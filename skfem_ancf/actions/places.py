@@ -74,6 +74,8 @@ def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     """
     if is_ground(beam):
         return Vector(np.array(as_point(at)))
+    if beam is None and layout.nodes is not None and is_point(at):
+        beam, at = named_place(layout, at)
     member = layout.beam(beam)
     if isinstance(at, str) and isinstance(member, Beam):
         return section(layout, member, at)[0]
@@ -103,6 +105,8 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
     """
     if is_ground(beam):
         return point(layout, beam, place), Vector(np.array([1.0, 0.0]))
+    if is_point(place) and layout.nodes is not None:
+        beam, place = _section_of_frame(layout, beam, place)
     member = layout.beam(beam)
     if isinstance(member, Domain):
         return _boundary(layout, member, place)
@@ -122,6 +126,24 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
         return point(layout, member, place), direction
     first = layout.offset(member) + node * member.nd
     return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+
+
+def _section_of_frame(layout, beam, at):
+    """Beam and place of the section at a point: at a node that of the lines rigid there."""
+    if beam is not None:
+        beam = layout.number(beam)
+    ends = [end for end in layout.nodes.ends_at(at) if beam in (None, end[0])]
+    if not ends:
+        return named_place(layout, at) if beam is None else (beam, at)
+    rigid = [end for end in ends if not end[2]]
+    if not rigid and len(ends) > 1:
+        k, node, _ = ends[0]
+        name = layout.members[k].name or k
+        raise InputError(f"the lines at {shown(at)} are hinged there, and each has a rotation of "
+                         f"its own: name the beam of one, or its section, as {name!r} and "
+                         f"np.array([{node}])")
+    k, node, _ = (rigid or ends)[0]
+    return k, np.array([node])
 
 
 def _boundary(layout, domain, boundary):
@@ -196,6 +218,8 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
         place = require_finite("a point of a spring or a joint", place, (2,))
         found = members_at(layout, place)
     found = nearest_of(layout, place, found)
+    if len(found) > 1 and layout.nodes is not None:  # they share a node
+        found = [k for k, *_ in layout.nodes.ends_at(place)][:1] or found
     if len(found) > 1:
         names = [layout.members[k].name or k for k in found]
         raise InputError(f"the point {shown(place)} is in several beams, {names}: choose one, "

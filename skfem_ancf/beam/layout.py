@@ -25,8 +25,11 @@ class Layout:
     """Beams, rigid bodies and domains, their names, and the numbers of their DOFs.
 
     Actions are bound to a Layout. The N DOFs are in the order of ``members``: beams, bodies,
-    domains. Raises InputError if there are none, or if members or names are not unique.
+    domains. ``nodes`` are those of a frame, a :class:`~skfem_ancf.actions.joints.nodes.Nodes`.
+    Raises InputError if there are none, or if members or names are not unique.
     """
+
+    nodes: Any = None
 
     def __init__(self, *members: Beam | RigidBody | Domain) -> None:
         for one in members:
@@ -47,7 +50,7 @@ class Layout:
         self._numbers = {id(b): k for k, b in enumerate(self.members)}
 
     def __reduce__(self):
-        return Layout, self.members
+        return Layout, self.members, {"nodes": self.nodes}
 
     def number(self, which: WhichMember = None) -> int:
         """The number of a member (object, name or number); None for the only one."""

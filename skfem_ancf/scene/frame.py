@@ -12,6 +12,7 @@ from ..actions.axial import LineLoad
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import COMPONENTS
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
+from ..actions.places import members_at
 from ..actions.symbols import Symbol, at_node, force_symbol, symbols
 from ..beam.beam import Beam
 from ..beam.kinematics import direction
@@ -27,7 +28,7 @@ from ..materials import Material
 from ..materials.damping import KelvinVoigt
 from ..mesh.frame_files import graph_from_meshio
 from ..mesh.frame_graph import FrameGraph, mapping_of
-from ..mesh.places import as_point
+from ..mesh.places import as_point, is_point
 from ..results.arguments import displacement
 from ..results.state import State
 from ..sections import Section
@@ -132,6 +133,7 @@ class Frame(Scene):
     def _take(self, nodes):
         with self._lock:
             self._entries, self._system = (self._bound(nodes), *self._entries[1:]), None
+            self.layout.nodes = self._nodes
 
     @property
     def _nodes(self) -> Any:
@@ -312,15 +314,16 @@ class Frame(Scene):
 
     # supports
 
-    def hold(self, place: Any, *what: str) -> Frame:
+    def hold(self, place: Any, *what: str | Sequence[str]) -> Frame:
         """Fix the displacement of nodes along x or y, or their rotation.
 
         Parameters
         ----------
         place, *what
-            Nodes, see :meth:`nodes`, and some of "x", "y" and "angle".
+            Nodes, see :meth:`nodes`, and some of "x", "y" and "angle", or a list of these.
         """
-        return self._hold(place, require_names("fixed component", list(what), COMPONENTS))
+        names = [name for one in what for name in require_names("fixed component", one, COMPONENTS)]
+        return self._hold(place, names)
 
     def _hold(self, place, names, settlements=None):
         """Fix nodes, with optional displacements."""
@@ -395,9 +398,10 @@ class Frame(Scene):
                     amplitude: TimeFunction = None) -> Frame:
         """A dead force on each of some nodes, see :meth:`nodes`, or on a material point.
 
-        With ``beam`` the point (x, y) may lie between nodes.
+        A point (x, y) may lie between nodes, with or without ``beam``; or ``at`` is a function of
+        time that returns such points, with ``beam``.
         """
-        if beam is not None:
+        if beam is not None or self._between(at):
             super().point_force(force, at, beam, amplitude)
             return self
         force = require_finite("force", force, (2,))
@@ -449,6 +453,11 @@ class Frame(Scene):
                 loads.append(load._with(chains=np.flatnonzero(some)))
         self._put(*loads)
         return self
+
+    def _between(self, at):
+        """True for a point of a line that is not at a node."""
+        return (is_point(at) and not isinstance(at, list) and not self._nodes.ends_at(at)
+                and bool(members_at(self.layout, at)))
 
     def _ends_at(self, place):
         """Beams (k,) with ends at nodes, and numbers of these ends (k,)."""
