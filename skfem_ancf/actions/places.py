@@ -132,7 +132,7 @@ def _section_of_frame(layout, beam, at):
     """Beam and place of the section at a point: at a node that of the lines rigid there."""
     if beam is not None:
         beam = layout.number(beam)
-    ends = [end for end in layout.nodes.ends_at(at) if beam in (None, end[0])]
+    ends = [end for end in layout.nodes.ends_at(layout, at) if beam in (None, end[0])]
     if not ends:
         return named_place(layout, at) if beam is None else (beam, at)
     rigid = [end for end in ends if not end[2]]
@@ -219,7 +219,7 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
         found = members_at(layout, place)
     found = nearest_of(layout, place, found)
     if len(found) > 1 and layout.nodes is not None:  # they share a node
-        found = [k for k, *_ in layout.nodes.ends_at(place)][:1] or found
+        found = [k for k, *_ in layout.nodes.ends_at(layout, place)][:1] or found
     if len(found) > 1:
         names = [layout.members[k].name or k for k in found]
         raise InputError(f"the point {shown(place)} is in several beams, {names}: choose one, "

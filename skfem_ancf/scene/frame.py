@@ -129,11 +129,11 @@ class Frame(Scene):
         ends = graph.lines[:, lines].T.ravel()
         self._take(Nodes(ends, hinged[:, lines].T.ravel(),
                          np.zeros((graph.points.shape[1], 3), dtype=bool), graph, lines))
+        self.layout.nodes = self._nodes
 
     def _take(self, nodes):
         with self._lock:
             self._entries, self._system = (self._bound(nodes), *self._entries[1:]), None
-            self.layout.nodes = self._nodes
 
     @property
     def _nodes(self) -> Any:
@@ -456,7 +456,8 @@ class Frame(Scene):
 
     def _between(self, at):
         """True for a point of a line that is not at a node."""
-        return (is_point(at) and not isinstance(at, list) and not self._nodes.ends_at(at)
+        return (is_point(at) and not isinstance(at, list)
+                and not self._nodes.ends_at(self.layout, at)
                 and bool(members_at(self.layout, at)))
 
     def _ends_at(self, place):

@@ -82,14 +82,19 @@ class Nodes(Joint):
         """Leading ends of nodes, shape (k,)."""
         return self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
 
-    def ends_at(self, at: Any) -> list[tuple[int, int, bool]]:
+    def ends_at(self, layout: Layout, at: Any) -> list[tuple[int, int, bool]]:
         """Beam, node of its mesh, and whether it is hinged, of each end at a point; or none."""
         try:
             node = self.graph.nodes_at(tuple(map(float, at)))
         except MeshError:
             return []
-        ends = np.flatnonzero(np.isin(self.nodes, node))
-        return list(zip(*self._of_beams[:, ends].tolist(), self.hinged[ends].tolist()))
+        ends, first, out = np.flatnonzero(np.isin(self.nodes, node)), 0, []
+        for k, beam in enumerate(layout.beams):
+            here = chain_ends(beam).ravel()
+            out += [(k, int(here[end - first]), bool(self.hinged[end]))
+                    for end in ends if first <= end < first + len(here)]
+            first += len(here)
+        return out
 
     def bind(self, layout: Layout) -> None:
         positions, directions, weights, start = [], [], [], []
@@ -101,8 +106,6 @@ class Nodes(Joint):
             positions.append(first + at[:, None] * beam.nd + np.arange(2))
             directions.append(first + dofs)
             weights.append(c)
-        self._of_beams = np.concatenate([np.stack(np.broadcast_arrays(k, chain_ends(beam).ravel()))
-                                         for k, beam in enumerate(layout.beams)], axis=1)
         n = max(c.shape[1] for c in weights)
         self.directions = np.concatenate([np.concatenate(
             [d, np.repeat(d[..., :1], n - d.shape[2], axis=2)], axis=2) for d in directions], 1)
