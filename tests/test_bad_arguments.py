@@ -389,7 +389,7 @@ call("scene.integrate, until", of(loaded, "integrate", t_end=0.02, dt=0.01),
 call("scene.integrate, t_end", of(clamped, "integrate", dt=0.5), "t_end=positive", t_end=1.0)
 call("scene.integrate, auto", of(loaded, "integrate", t_end=1e-3, dt="auto"), rtol=1e-2)
 call("scene.modes", of(loaded, "modes"), "k=count state=other?", k=1, state=None)
-call("scene.buckling", of(column, "buckling"), "k=count", k=1)
+call("scene.buckling", of(column, "buckling"), "k=count state=other?", k=1, state=None)
 
 # results, files, pictures
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import brentq, fsolve
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, ModelWarning, Scene, StVenantKirchhoff)
+                        MeshBeam, ModelWarning, PointForce, Scene, StVenantKirchhoff)
 from skfem_ancf.solvers import eigen
 
 # units in which E I = rho A = L = 1 at every slenderness
@@ -163,6 +163,36 @@ def test_pressure_between_clamped_ends_has_a_potential():
     assert buckling.factors[0] == pytest.approx(8.0, rel=2e-3) and not buckling.follower
     with pytest.raises(InputError, match="stiffen the beam"):
         arch("top").buckling()
+
+
+@pytest.mark.parametrize("dead", [0.0, 1.0, 2.2, -3.0])
+def test_a_live_load_on_top_of_a_dead_one(dead):
+    """Cantilever with a constant force below its top: tan(k1 a) tan(k2 b) = k1 / k2."""
+    E, h, a = 12e6, 0.01, 0.6
+    column = Scene(Beam(MeshBeam.init_line([0, 0.3, a, 0.8, 1], h), ElementBeamCable(5),
+                        StVenantKirchhoff(E, 0.0), width=1.0)).clamp("left")
+
+    def balance(P):
+        k1, k2 = np.emath.sqrt(P + dead), np.sqrt(P)
+        return (k2 * np.sin(k1 * a) * np.sin(k2 * (1 - a))
+                - k1 * np.cos(k1 * a) * np.cos(k2 * (1 - a))).real
+
+    exact = brentq(balance, max(0.1, 0.01 - dead), 4.0)
+    state = column.replace(loads=[PointForce((-dead, 0), at=(a, 0))]).solve_static()
+    live = column.replace(loads=[PointForce((-2.0, 0), at=(1, 0))])
+    found = live.buckling(1, state)
+    assert found.factors[0] == pytest.approx(exact / 2, rel=2e-4)
+    # at that sum of loads the whole is critical
+    for part, verdict in ((0.99, "stable"), (1.01, "unstable")):
+        both = column.replace(loads=[PointForce((-dead, 0), at=(a, 0)),
+                                     PointForce((-part * exact, 0), at=(1, 0))])
+        assert both.solve_static(stable=False).stability == verdict
+    with pytest.raises(InputError, match="the state is unstable"):
+        live.buckling(1, column.replace(loads=[PointForce((-3.0, 0), at=(1, 0))]).solve_static(
+            stable=False))
+    with pytest.raises(InputError, match="other supports"):
+        column.replace(loads=[PointForce((-2.0, 0), at=(1, 0))]).fix("right", "r^2").buckling(
+            1, state)
 
 
 def test_buckling_knows_springs_that_act_on_one_side():

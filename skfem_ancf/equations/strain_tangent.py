@@ -101,7 +101,14 @@ class StrainTangent:
         rest = (system.external_force(u)[self.free] - self._element_force()
                 - self.B.T @ (self._rows[1] @ du))
         gap = -system.constraints.constraint(u + du, 1.0)
-        x, multipliers = Inverse(self).solve_both(rest[:, None], gap[:, None])
+        return self._responding(rest, du, gap[:, None])
+
+    def added(self, force: Array) -> tuple[Array, Array, Array]:
+        """As :meth:`response`, to a force (N,) on top of the state."""
+        return self._responding(force[self.free], np.zeros(self.system.N))
+
+    def _responding(self, rest, du, gap=None):
+        x, multipliers = Inverse(self).solve_both(rest[:, None], gap)
         du[self.free] = x[:, 0]
         return du, self._rows[1] @ du, multipliers[:, 0]
 

@@ -782,15 +782,42 @@ class Scene(Model):
             state = self.state(load=0.0) if state is None else state
             return eigen.modes(self.system, configuration(self.system, state), k)
 
-    def buckling(self, k: int = 1) -> Buckling:
+    def buckling(self, k: int = 1, state: State | None = None) -> Buckling:
         """The k lowest buckling load factors and their shapes.
+
+        Parameters
+        ----------
+        k
+            Number of factors.
+        state
+            An equilibrium whose loads are constant, as dead loads: the factors are those on the
+            loads of this scene, added to it. It may be one of a scene with the same beams, supports
+            and joints and other loads. By default the reference configuration.
+
+        Examples
+        --------
+        A cantilever column with a dead load of 40 % of Euler's load carries 60 % more:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, PointForce, Scene
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> column = Scene(Beam(MeshBeam.init_line([0, 1, 2], 0.01), ElementBeamCable(5),
+        ...                     StVenantKirchhoff(12e6, 0.3), width=1.0)).clamp("left")
+        >>> euler = np.pi**2 / 16
+        >>> dead = column.replace(loads=[PointForce((-0.4 * euler, 0), at=(2, 0))]).solve_static()
+        >>> live = column.replace(loads=[PointForce((-euler, 0), at=(2, 0))])
+        >>> live.buckling(1, dead).factors.round(3).tolist()
+        [0.6]
 
         Raises
         ------
         InputError
-            If there is no positive factor, or loads without a potential cause flutter first.
+            If there is no positive factor, or loads without a potential cause flutter first; if the
+            state is unstable or has other supports.
         SupportError
             If a rigid motion is not constrained.
         """
         with self._lock:
-            return eigen.buckling(self.system, k)
+            if state is not None:
+                configuration(self.system, state)
+            return eigen.buckling(self.system, k, state)

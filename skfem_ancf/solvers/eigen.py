@@ -241,7 +241,7 @@ def _unsymmetric(tangent, M, k, shift, small):
     return values, X / np.sqrt(np.sum(X.conj() * (M @ X), axis=0).real)
 
 
-def buckling(system: System, k: int) -> Buckling:
+def buckling(system: System, k: int, state: State | None = None) -> Buckling:
     """The k lowest positive load factors of linear buckling.
 
     ``(K_0 + factor K_s) phi = 0``, with the geometric stiffness K_s of the linear stress under full
@@ -249,17 +249,17 @@ def buckling(system: System, k: int) -> Buckling:
     order one are omitted. If loads have no potential, K_s is unsymmetric, and only real factors
     (divergence) are found.
 
-    Raises InputError if the loads cause no buckling, if the beam touches an obstacle first, or if
-    springs are prestressed or one-sided.
+    With a state, which may have other loads, K_0 is its tangent: its loads are constant, those of
+    the system are added.
+
+    Raises InputError if the loads cause no buckling, if the beam touches an obstacle first, if
+    springs are one-sided, or prestressed without a state, or if the state is not stable.
     """
     system.constraints.require_supports()
-    zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
-    _require_unstressed(system, zero)
-    tangent = StrainTangent(system, zero, 0.0, None, none)
+    tangent, loads, du, stress, multipliers = _linear_response(system, state)
     n, m = tangent.size
     k = _count(k, n - m)
-    du, stress, multipliers = tangent.response()
-    Ks = tangent.geometric(stress, multipliers, 1.0) + _geometric_of_domains(system, tangent, du)
+    Ks = loads.geometric(stress, multipliers, 1.0) + _geometric_of_domains(system, tangent, du)
     if not Ks.nnz or not abs(Ks).max() > 0.0:
         raise InputError("no positive load factor: the loads do not stress the beam")
     symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
@@ -272,14 +272,33 @@ def buckling(system: System, k: int) -> Buckling:
                          if symmetric else _FLUTTER)
     factors = -1.0 / theta[good]
     order = np.argsort(factors)[:k]
-    system.forces.contacts.require_free(factors[order[0]] * du, "buckling()",
+    before = 0.0 * du if state is None else state.u
+    at = before + factors[order[0]] * du
+    system.forces.contacts.require_free(at, "buckling()",
                                         "continuation(): it touches before it buckles")
-    _require_same_springs(system, factors[order[0]] * du)
+    _require_same_springs(system, before, at)
     if not symmetric:
         _require_no_flutter(system, tangent, Ks, factors[order[0]])
     shapes = np.zeros((len(order), system.N))
     shapes[:, tangent.free] = X[:, good].T[order]
     return Buckling(factors[order], shapes, not symmetric)
+
+
+def _linear_response(system, state):
+    """Tangents with the loads before, and with those of the system; the response to these."""
+    if state is None:
+        zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
+        _require_unstressed(system, zero)
+        tangent = StrainTangent(system, zero, 0.0, None, none)
+        return tangent, tangent, *tangent.response()
+    if not np.array_equal(state.system.constraints.fixed, system.constraints.fixed):
+        raise InputError("the state has other supports than the scene: buckling() adds loads to "
+                         "those of the state, and supports and joints stay")
+    if state.stability == "unstable":
+        raise InputError("the state is unstable: its own loads are beyond the buckling load")
+    tangent = StrainTangent(state.system, state.u, state.load, state.t, state.multipliers)
+    loads = StrainTangent(system, state.u, 0.0, None, state.multipliers)
+    return tangent, loads, *tangent.added(system.external_force(state.u))
 
 
 def _geometric_of_domains(system, tangent, du):
@@ -307,14 +326,14 @@ def _require_unstressed(system, zero):
             "scene.solve_static(stable=False), or scene.modes(k, state), for prestressed scenes")
 
 
-def _require_same_springs(system, u):
+def _require_same_springs(system, before, u):
     """Raise InputError for one-sided springs at the buckling state u; warn of changed stiffness."""
     if not len(system.forces.elements):
         return
     kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.constraints.mask
     kick *= system.constraints.coordinate_sizes
     rest, here, up, down = (system.forces.firmnesses(system.backend.tables.plain.forces, x)
-                            for x in (np.zeros(system.N), u, u + kick, u - kick))
+                            for x in (before, u, u + kick, u - kick))
     if np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)):
         raise InputError(
             "at the buckling load springs or foundations are stiffer to one side than to the "
