@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..actions.joints.prescribed import PrescribedDisplacement
 from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
@@ -70,6 +71,7 @@ def check(state: Any) -> Checks:
                        turning(beam, u, base)))
         found += (_findings(beam, values[-1][1], values[-1][3]) if base is None else
                   _linear_findings(beam, u, base))
+    found += pushed_points(state.system)
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))
@@ -81,10 +83,45 @@ def warn_of(state: Any) -> None:
         warn(text, ModelWarning)
     for text in _kinks(state):
         warn(text, ModelWarning)
+    warn_of_points(state.system)
     for beam in state.beams:
         u = state.u_of(beam)
         for text in _findings(beam, kinematics.shortest(beam, u), turning(beam, u)):
             warn(f"{text} (state.checks has the numbers)", ModelWarning)
+
+
+def warn_of_points(system: Any) -> None:
+    """Warn of :func:`pushed_points`."""
+    for text in pushed_points(system):
+        warn(text, ModelWarning)
+
+
+def pushed_points(system: Any) -> list[str]:
+    """Findings of end faces of which a single point is moved along the axis."""
+    c, out = system.constraints, []
+    moved = [dof for dof, value in zip(c.fixed, c.values(1.0)) if value]
+    moved += [dof for joint in c.joints if isinstance(joint, PrescribedDisplacement)
+              for dof in joint.dofs]
+    if not moved:
+        return out
+    known = {*c.fixed.tolist(), *c.jacobian_entries(np.zeros(system.N), 0.0)[1].tolist()}
+    for beam, s in zip(system.beams, system.slices):
+        here = [dof - s.start for dof in moved if s.start <= dof < s.stop]
+        slopes = [k for k, (_, _, y) in enumerate(beam.element.functionals) if y > 0]
+        if not here or not beam.has_sections or beam.element.order < 2:
+            continue
+        for node, c in {divmod(dof, beam.nd) for dof in here if dof % beam.nd < 2}:
+            end = np.sum(beam.mesh.t == node) == 1
+            first, along = s.start + node * beam.nd + c, abs(beam.mesh.p_X[c, node])
+            if end and along > 0.5 and known.isdisjoint(first + 2 * k for k in slopes):
+                who = "" if beam.name is None else f" of beam {beam.name!r}"
+                out.append(
+                    f"a support moves one point of an end face{who} along the axis: sections of "
+                    f"order {beam.element.order} deform there, and the reaction is too small, by "
+                    'up to 17 % if the beam is short. Keep the face plane, by scene.joint("plane", '
+                    'at="right") or "left"; where it has to turn, use a cable or '
+                    "ElementBeamANCF(1), whose faces are rigid")
+    return out
 
 
 def _kinks(state):

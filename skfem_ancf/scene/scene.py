@@ -31,6 +31,7 @@ from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import SceneMatrices, matrices_of
 from ..equations.system import System
 from ..results.arguments import configuration, displacement
+from ..results.checks import warn_of_points
 from ..results.modes import Buckling, Modes
 from ..results.path import CriticalPoint, Path
 from ..results.state import State
@@ -293,6 +294,7 @@ class Scene(Model):
             If the solution penetrates an obstacle.
         """
         with self._lock:
+            warn_of_points(self.system)
             return solve_linear(self.system)
 
     def solve_static(self, start: State | None = None, adapt: float | None = None, *,
@@ -658,6 +660,7 @@ class Scene(Model):
             system.constraints.require_independent_joints()
             if system.constraints.adrift:
                 system.constraints.require_supports()
+            warn_of_points(system)
             return run(system, steps, increments, start, self._located(), tol=tol,
                        max_iterations=max_iterations, min_step=min_step, stable=stable,
                        progress=progress)
