@@ -98,7 +98,7 @@ def warn_of_points(system: Any) -> None:
 
 def pushed_points(system: Any) -> list[str]:
     """Findings of end faces of which a single point is moved along the axis."""
-    c, out = system.constraints, []
+    c, out = system.constraints, list[str]()
     moved = [dof for dof, value in zip(c.fixed, c.values(1.0)) if value]
     moved += [dof for joint in c.joints if isinstance(joint, PrescribedDisplacement)
               for dof in joint.dofs]
