@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from ...beam.kernels.moments import mean_turning
 from ...beam.layout import Layout, WhichBeam
 from ...beam.rigid import RigidBody, on_body
-from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown
+from ...core.errors import (InputError, require_finite_scalar, require_integer,
+                            require_not_negative, shown)
 from ...core.types import Array, Place
 from ...mesh.places import points_of_rows
 from ..places import GROUND, Vector, both_of, named_place, point, section
@@ -83,9 +85,18 @@ class Spring(ForceElement):
         length = max(float(np.hypot(*x[0])), TINY)
         return length, x[0] / length
 
-    def force(self, x: Array, v: Array, t: float) -> Array:
+    def amount(self, x: Array, v: Array) -> float:
+        """The tension."""
         length, n = self._along(x)
-        return -(self.k(length - self._length) + self.damping(v[0] @ n)) * n[None]
+        return float(self.k(length - self._length) + self.damping(v[0] @ n))
+
+    def rate(self, x: Array) -> Array:
+        """Derivative of the tension at rest by the vector, (1, 2)."""
+        length, n = self._along(x)
+        return self.k.slope(length - self._length, self._length) * n[None]
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        return -self.amount(x, v) * self._along(x)[1][None]
 
     def potential(self, x: Array) -> float:
         return self.k.potential(self._along(x)[0] - self._length)
@@ -175,9 +186,16 @@ class TorsionalSpring(ForceElement):
         turning(x.reshape(4, 1), out)
         return out.reshape(2, 2)
 
+    def amount(self, x: Array, v: Array) -> float:
+        """The moment against the rotation."""
+        return float(self.k(self._angle(x)) + self.damping(float(np.sum(self._turning(x) * v))))
+
+    def rate(self, x: Array) -> Array:
+        """Derivative of the moment at rest by both directions, (2, 2)."""
+        return self.k.slope(self._angle(x)) * self._turning(x)
+
     def force(self, x: Array, v: Array, t: float) -> Array:
-        g = self._turning(np.asarray(x))
-        return -(self.k(self._angle(x)) + self.damping(float(np.sum(g * v)))) * g
+        return -self.amount(x, v) * self._turning(np.asarray(x))
 
     def potential(self, x: Array) -> float:
         return self.k.potential(self._angle(x))
@@ -197,3 +215,29 @@ class TorsionalSpring(ForceElement):
 
     def __repr__(self) -> str:
         return f"<TorsionalSpring {self.k!r} at {shown(self.at)}>"
+
+
+def spring_of(elements: Sequence[ForceElement], which: Any) -> Any:
+    """A bound spring, by itself or by its number among the springs and torsional springs."""
+    springs = [one for one in elements if isinstance(one, (Spring, TorsionalSpring))]
+    for one in springs:
+        if one is which:
+            return one
+    if not springs:
+        raise InputError("the scene has no springs")
+    if isinstance(which, (Spring, TorsionalSpring)):
+        raise InputError(f"{which!r} is not one of scene.elements: name it by its number among the "
+                         f"{len(springs)} springs of the scene, in the order they were added")
+    return springs[require_integer("the number of a spring", which, 0, len(springs) - 1)]
+
+
+def spring_force(spring: Any, u: Array, v: Array, base: Array | None = None) -> float:
+    """Tension or moment of a bound spring at u and v (N,); linearised about a base (N,)."""
+    def at(q):
+        return np.array([link(q) for link in spring.links])
+
+    x = at(u)
+    if base is None or not np.any(at(base)[0]):
+        return spring.amount(x, np.array([link(v) - link.start for link in spring.links]))
+    start = at(base)
+    return spring.amount(start, 0.0 * start) + float(np.sum(spring.rate(start) * (x - start)))
