@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.forces.springs import spring_force, spring_of
 from ..actions.forces.turns import Turns
 from ..actions.joints.base import Joint
 from ..beam.layout import WhichBeam, WhichMember
@@ -22,6 +21,7 @@ from ..equations.system import System
 from ..io.tables import to_xarray
 from ..recovery.resultants import Resultants, over_time
 from ..results.points import MaterialPoints
+from ..results.springs import SpringForces
 from ..results.state import Reaction, State
 from ..visuals.animation import animate
 from ..visuals.pyvista import Series
@@ -48,7 +48,7 @@ def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> S
                  origin=(scheme, arrays), memory=y.contacts)
 
 
-class History(MaterialPoints):
+class History(MaterialPoints, SpringForces):
     """A motion at its stored instants.
 
     Parameters
@@ -209,17 +209,6 @@ class History(MaterialPoints):
     def joint_force(self, joint: Joint) -> Array:
         """Multipliers of a joint, its force on the first beam, at all instants, shape (nt, m)."""
         return np.array([state.joint_force(joint) for state in self])
-
-    def spring_force(self, spring: Any = 0) -> Array:
-        """Tension or moment of a spring at all instants, (nt,).
-
-        Parameters
-        ----------
-        spring
-            As for :meth:`State.spring_force <skfem_ancf.results.State.spring_force>`.
-        """
-        found = spring_of(self.system.forces.elements, spring)
-        return np.array([spring_force(found, u, v) for u, v in zip(self.u, self.v)])
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
         """Support reactions at a boundary at all instants.

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..actions.eigenstrain import EigenStrain
-from ..actions.forces.springs import spring_force, spring_of
 from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of
 from ..beam.beam import Beam
@@ -32,6 +31,7 @@ from ..recovery.resultants import Resultants, resultants
 from ..recovery.section_forces import NotRecovered
 from ..visuals import diagrams, html, matplotlib, pyvista
 from .acting import recover, stations
+from .springs import SpringForces
 from .checks import Checks, check
 from .points import MaterialPoints
 
@@ -57,7 +57,7 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State(Immutable, MaterialPoints):
+class State(Immutable, MaterialPoints, SpringForces):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters
@@ -520,30 +520,6 @@ class State(Immutable, MaterialPoints):
         """Force of a joint on its first beam, in the order of ``joint.equations``; (m,)."""
         return self.system.constraints.joint_force(
             joint, self.multipliers, self._support_force(), self._acted, self._time)
-
-    def spring_force(self, spring: Any = 0) -> float:
-        """Tension of a spring, or moment of a torsional spring against its rotation.
-
-        The force of the dashpot is included.
-
-        Parameters
-        ----------
-        spring
-            One of ``scene.elements``, or its number among the springs and torsional springs of the
-            scene, in the order in which they were added.
-
-        Examples
-        --------
-        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5),
-        ...             StVenantKirchhoff(1e9, 0.3), width=0.1)
-        >>> scene = Scene(beam).pin("left").spring(100.0, ((1, 0), (1, 1)), length=0.9)
-        >>> state = scene.line_load((0, -20.0)).solve_static()
-        >>> round(state.spring_force(), 2)
-        10.0
-        """
-        found = spring_of(self.system.forces.elements, spring)
-        return spring_force(found, self.u, self.v, None if self.base is None else self.base.u)
 
     # files and pictures
 
