@@ -76,12 +76,12 @@ frequencies = modes.frequencies / (2 * np.pi)
 # The force at the foot in each mode, for 1 mm at the end of a prong.
 
 fig, axes = plt.subplots(1, 3, figsize=(9.6, 4.8), sharey=True, layout="constrained")
-end, felt = curve(arc + prong), []
+felt = []
 for k, (frequency, ax) in enumerate(zip(frequencies, axes)):
-    unit = np.hypot(*modes.mode(k, 1e-6).displacement(end, beam="fork")) / 1e-6
-    felt.append(np.hypot(*modes.mode(k, 1e-6 / unit).reactions("left", beam="stem").force) * 1e3)
-    modes.mode(k, 8e-3 / unit).plot("displacement", ax=ax, colorbar=False, thickness=1,
-                                    title=f"{frequency:.0f} Hz, foot {felt[-1]:.1f} N")
+    shape = modes.mode(k, displacement=1e-3)
+    felt.append(np.hypot(*shape.reactions("left", beam="stem").force))
+    modes.mode(k, displacement=8e-3).plot("displacement", ax=ax, colorbar=False, thickness=1,
+                                          title=f"{frequency:.0f} Hz, foot {felt[-1]:.1f} N")
     ax.set(xlabel="x (m)", ylabel="y (m)" if k == 0 else "")
 
 # %%
@@ -94,7 +94,7 @@ assert np.isclose(frequencies[singing], free[0], rtol=0.01)
 # %%
 # The motion from this shape, for one period.
 
-start = modes.mode(singing, 2e-3 / unit)
+start = modes.mode(singing, displacement=2e-3)
 history = scene.integrate(1 / frequencies[singing], 1 / 32 / frequencies[singing], start=start)
 history.animate("out/tuning_fork.gif", "eps_xx", thickness=1, undeformed=False, fps=16)
 plt.show()

@@ -103,7 +103,8 @@ WORDS = {
     "at": "place|point|boundary|section|facet|beam|node", "tind": "elements|subdomain|function",
     "boundary": "place|point|facet|function|node", "hinges": "hinge|node|line",
     "groups": "group|lines", "curves": "curve", "facets": "place|point|boundary|function",
-    "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
+    "fields": "field", "dr": "derivative", "factors": "factor|body|nodes",
+    "filename": "file|read|write",
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
     "side": "place|facet|boundary|point", "between": "point of a spring|beam",
@@ -412,7 +413,7 @@ call("history.state", of(history, "state"), "k=index", k=0)
 call("history.states", lambda **k: list(history().states(**k)), "instants=other",
      {"instants": ["[]", "None"]}, instants=[0, -1])
 call("path.state", of(path, "state"), "k=index", k=0)
-call("modes.mode", of(lambda: clamped().modes(1), "mode"), "amplitude=number", i=0, amplitude=0.1)
+call("modes.mode", of(lambda: clamped().modes(1), "mode"), "amplitude=number?", i=0, amplitude=0.1)
 call("Field", lambda **k: state().field(Field(**k), (0.5, 0.0)), "name=label function=other "
      "title=title unit=title components=other frame=title", name="f", function=lambda v: v["S_xx"],
      title="t", unit="Pa", signed=True, components=1, frame="beam", neutral=0.0)

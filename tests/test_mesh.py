@@ -290,7 +290,8 @@ def test_element_finder_of_a_coil():
     ([0.0], "at least two nodes, got 1"), ([], "at least two nodes, got 0"),
     ([0, np.nan], "x has a value that is NaN or infinite: nan"),
     ([0, np.inf], "x has a value that is NaN or infinite: inf"),
-    ([[0, 1]], r"x must have shape \(n\), got \(1, 2\)"), (3, r"x must have shape"),
+    ([[0, 1]], r"x must have shape \(n\), as np.linspace.*, got \(1, 2\)"),
+    (3, r"x must have shape .*, as np.linspace\(0, length, elements \+ 1\), got .*: 3"),
     ("abc", "x must be an array of numbers"), ([0, 1j], "x must be real"),
 ])
 def test_bad_nodes(x, message):
@@ -368,7 +369,7 @@ def test_bad_direct_construction(p, t, message):
     (lambda m: m.scaled((1, 2)), r"one positive factor in all directions, got \(1, 2\)"),
     (lambda m: m.scaled(0.0), "one positive factor"), (lambda m: m.scaled(-1), "one positive"),
     (lambda m: m.scaled(np.nan), "factors has a value"),
-    (lambda m: m.translated((1, 2, 3)), r"the shift must have shape \(2\), got \(3,\)"),
+    (lambda m: m.translated((1, 2, 3)), r"the shift must have shape \(2\), .* got \(3,\)"),
     (lambda m: m.rotated(np.nan), "angle must be finite"),
     (lambda m: m.rotated(1.0, about=3), "about must have shape"),
     (lambda m: m.element_finder()(np.array([np.nan]), np.array([0.0])), "the points has a value"),

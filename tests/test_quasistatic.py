@@ -32,11 +32,11 @@ def test_ramps_take_numbers_vectors_and_many_times():
 
 
 @pytest.mark.parametrize("wrong, error, says", [
-    (lambda: Steps(), InputError, "name at least one step"),
+    (lambda: Steps(), InputError, "durations by name"),
     (lambda: Steps(press=0.0), InputError, "press"),
     (lambda: Steps(press=1.0).ramp(pres=2.0), NameUnknown, "press"),
     (lambda: Steps(press=1.0).ramp(press=np.nan), InputError, "press"),
-    (lambda: Ramp([0, 0], [1, 2]), InputError, "ascend"),
+    (lambda: Ramp([0, 0], [1, 2]), InputError, "increase"),
     (lambda: Ramp([0, 1], [1, 2, 3]), InputError, "as many"),
     (lambda: Ramp([0, 1], ["a", "b"]), InputError, "values"),
     (lambda: Ramp([0], 1.0), InputError, "as many"),
@@ -304,7 +304,7 @@ def test_what_has_converged_is_kept():
 
 
 @pytest.mark.parametrize("steps, options, says", [
-    (-1.0, {}, "not after the start"), ([], {}, "not after the start"),
+    (-1.0, {}, "not after the start"), ([], {}, "at least one"),
     (1.0, {"increments": 0}, "increments"), ("press", {}, "steps"),
     (1.0, {"min_step": 0.0}, "min_step"),
 ])

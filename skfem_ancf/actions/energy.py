@@ -14,14 +14,16 @@ from ..beam.kinematics import element_dofs
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
 from ..beam.surfaces import LEFT, RIGHT, TOP, groups_of, surfaces_of
-from ..core.errors import (InputError, ask, require_finite, require_flag, require_function,
-                           require_slope, shown)
+from ..core.errors import (InputError, NameUnknown, ask, require_finite, require_flag,
+                           require_function, require_slope, shown)
 from ..core.quadrature import gauss, product_rule
 from ..core.types import Array, Place, TimeFunction
 from .density import Density, points_of
 from .derivatives import IMAGINARY, REAL, by_jax, by_loops
 from .item import Item, beside
 
+#: Where an energy acts beside places of the boundary.
+EVERYWHERE = "cells", "axis"
 _LOWER = np.tril_indices(6)
 #: Relative round-off of energies.
 _ROUND_OFF = 1e-15
@@ -47,6 +49,9 @@ class Energy(Density):
     * ``F``: the deformation gradient, ``F[i, j] = d r_i / d X_j``, (2, 2, nelements, npoints),
     * ``X``: the position in the reference configuration, (2, nelements, npoints),
     * ``t``: the time of a motion; 0 in statics.
+
+    The integral over the body, a side or an end includes the width of the beam; a form of
+    scikit-fem, in ``scene.load(form)``, is not multiplied by the width.
 
     Load factors scale it, as they scale gravity, and ``scene.buckling()`` finds the critical
     factor; with ``scaled=False`` it acts in full, as an elastic foundation does. The
@@ -128,9 +133,8 @@ class Energy(Density):
         self.autodiff = require_flag("autodiff", autodiff)
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        everywhere = self.beam is None and isinstance(self.over, str) and (
-            self.over in ("cells", "axis"))
-        which = range(len(layout.beams)) if everywhere else [layout.number(self.beam)]
+        which = range(len(layout.beams)) if self.beam is None and _everywhere(self.over) else [
+            layout.number(self.beam)]
         return [self._with(beam=k) for k in which]
 
     def bind(self, beam: Beam) -> Any:
@@ -173,7 +177,8 @@ class Energy(Density):
         found = self._ask("gradient", y, part)
         if not isinstance(found, (tuple, list)) or len(found) != 2:
             raise InputError("gradient(r, F, X, t) of an Energy must return two arrays, of "
-                             "d psi / d r, (2, ...), and of d psi / d F, (2, 2, ...)")
+                             "d psi / d r, (2, ...), and of d psi / d F, (2, 2, ...), got "
+                             f"{shown(found)}")
         shape = y.shape[1:]
         return np.concatenate([
             _shaped("gradient", found[0], (2, *shape)),
@@ -235,7 +240,7 @@ class Energy(Density):
                 xi, w = rule
                 sampled.append(Sampled(where, elements, xi, -P[:2] * part.weights / w))
         stations: tuple[float, ...] = ()
-        if self.over not in ("cells", "axis"):
+        if not _everywhere(self.over):
             stations = groups_of(self.beam.mesh, surfaces_of(self.beam, self.over, 1))[1]
         return Distribution(sampled=tuple(sampled), stations=stations)
 
@@ -319,32 +324,45 @@ def check_derivatives(energy: Energy, beam: Beam, u: ArrayLike | None = None) ->
 
 def _shaped(name, found, shape):
     try:
-        return np.broadcast_to(np.asarray(found), shape)
+        values = np.broadcast_to(np.asarray(found), shape)
     except ValueError:
         raise InputError(f"{name}(r, F, X, t) of an Energy must return the shape {shape}, got "
                          f"{np.shape(found)}; sums over components are (r**2).sum(axis=0)"
                          ) from None
+    if values.dtype.kind not in "biufc":
+        raise InputError(f"{name}(r, F, X, t) of an Energy must return numbers, got "
+                         f"{shown(found)}")
+    return values
+
+
+def _everywhere(over):
+    return isinstance(over, str) and over in EVERYWHERE
 
 
 def _parts_of(beam, over):
     """Points of the cells, the axis or a place of a beam."""
     mapping, along, out = beam.mesh.mapping(), points_along(beam) + 1, []
     every = np.arange(beam.mesh.nelements)
-    if over == "cells":
+    body = over if _everywhere(over) else None
+    if body == "cells":
         axis = gauss(along)
         for layer, section in beam.across.rules(beam.element.order + 1, inertia=True):
             X, W = product_rule(axis, section)
             weights = np.broadcast_to(beam.across.volume(layer, X, W, every, full=True),
                                       (len(every), len(W)))
             out.append(_points(beam, every, X, weights, _Where(BODY, every, (axis[0], section[0]))))
-    elif over == "axis":
+    elif body == "axis":
         xi, w = gauss(along)
         X = np.array([xi, 0.5 + 0.0 * xi])
         lengths = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))
         out.append(_points(beam, every, X, lengths * w, _Where(AXIS, every, (xi, w))))
     else:
         rule = gauss(beam.element.facet_points + 1)
-        for one in surfaces_of(beam, over, len(rule[0])):
+        try:
+            surfaces = surfaces_of(beam, over, len(rule[0]))
+        except NameUnknown as error:
+            raise NameUnknown("place", error.name, EVERYWHERE + error.known) from None
+        for one in surfaces:
             where = -1 if one.side in (LEFT, RIGHT) else one.side // TOP
             out.append(_points(beam, one.elements, one.X, one.areas,
                                _Where(where, one.elements, rule)))

@@ -20,6 +20,7 @@ from ..beam.domain import Domain
 from ..beam.layout import WhichMember
 from ..core.errors import (CallbackError, InputError, explained, require_flag, require_slope, shown,
                            warnings_as_errors)
+from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
 from .density import Density, points_of
 from .item import beside
@@ -28,6 +29,10 @@ from .loads import DeadLoad
 logger = logging.getLogger(__name__)
 #: Steps of differences, relative to the size of a variable.
 STEP = 1e-6
+#: A derivative is symmetric up to this relative error of differences; a time to find out at.
+SYMMETRIC, OTHER = 1e-6, 0.7310585786
+#: Gauss points for the work from the reference configuration, and in a time step.
+WORK, MEAN = 6, 3
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
@@ -59,9 +64,14 @@ class FormLoad(Density):
 
     It is a dead load if it depends on the place only. If it uses the position ``w.r``, a field with
     ``grad``, the deformation gradient ``w.F``, (2, 2, ...), or the time ``w.t``, 0 in statics, it
-    depends on the deformation; then it has no potential and acts on elements with sections. On a
-    :class:`~skfem_ancf.Domain` it is dead. For conservative loads prefer an
-    :class:`~skfem_ancf.Energy`.
+    depends on the deformation, and acts on elements with sections. If its derivative is symmetric,
+    it is conservative: its potential, the work along a straight path by Gauss quadrature, is in the
+    ``potential_energy`` of a History, or with ``scaled=False`` in the ``strain_energy``. On a
+    :class:`~skfem_ancf.Domain` it is dead.
+
+    As in scikit-fem, the form is integrated over the plane of the body or along the line of a
+    boundary, and not over the width: multiply a force per volume, or per area of a face, by the
+    width. An :class:`~skfem_ancf.Energy` is multiplied by the width.
 
     Parameters
     ----------
@@ -69,7 +79,8 @@ class FormLoad(Density):
         A ``LinearForm`` with the parameters ``w.x``, ``w.h``, on a boundary ``w.n``, and ``w.r``,
         ``w.F``, ``w.t``.
     boundary
-        A place, see :func:`skfem_ancf.mesh.places.facets_of`; None for the body.
+        A place, see :func:`skfem_ancf.mesh.places.facets_of`; None for the body. The second
+        argument, as of tractions and pressures: a tangent is given by its name.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
     tangent
@@ -87,9 +98,10 @@ class FormLoad(Density):
     >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
     >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01, angle=np.pi / 2),
     ...             ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
-    >>> wind = LinearForm(lambda v, w: 10 * w.r[1] * v[0])
+    >>> wind = LinearForm(lambda v, w: 1000 * beam.width * w.r[1] * v[0])
     >>> state = Scene(beam).clamp("left").load(
-    ...     wind, tangent=BilinearForm(lambda u, v, w: 10 * u[1] * v[0])).solve_static()
+    ...     wind, tangent=BilinearForm(
+    ...         lambda u, v, w: 1000 * beam.width * u[1] * v[0])).solve_static()
     >>> bool(0.05 < state.displacement((0, 1))[0] < 0.06)
     True
     """
@@ -106,6 +118,9 @@ class FormLoad(Density):
         if not isinstance(form, LinearForm):
             raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
                              "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
+        if isinstance(boundary, BilinearForm):
+            raise InputError("the second argument of a load is the boundary, got "
+                             f"{shown(boundary)}: give the derivative as tangent=")
         if tangent is not None and not isinstance(tangent, BilinearForm):
             raise InputError("tangent must be a scikit-fem BilinearForm, of u, v and w, got "
                              f"{shown(tangent)}")
@@ -124,7 +139,8 @@ class FormLoad(Density):
                          np.array([f.grad[0] for f in fields]), None)
         bound = self._with(beam=beam, _parts=[part], _basis=basis)
         P, w = bound._evaluated(bound._variables(np.zeros(beam.N), part))
-        if not vars(w).get("asked", set()) & {"r", "F", "t"}:
+        used = vars(w).get("asked", set()) & {"r", "F", "t"}
+        if not used:
             dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._distribution(P))
             return dead._with(scaled=self.scaled)
         if not beam.has_sections:
@@ -134,7 +150,8 @@ class FormLoad(Density):
             logger.info("%r has no tangent=: its derivative is found by differences", self)
         else:
             beside(bound._require_tangent, beam.sizes)
-        return bound
+        times = (0.0, OTHER) if "t" in used else (0.0,)
+        return bound._with(symmetric=bound._is_conservative(times))
 
     def _evaluated(self, y):
         w = self._fields(y)
@@ -180,6 +197,39 @@ class FormLoad(Density):
         steps = STEP * np.array([self.beam.size] * 2 + [1.0] * 4)
         return np.stack([(self._slope(y + d, part) - self._slope(y - d, part)) / (2.0 * step)
                          for step, d in zip(steps, (steps * np.eye(6))[:, :, None, None])], axis=1)
+
+    def _is_conservative(self, times):
+        """True if the derivative is symmetric at some displacements and times."""
+        part, = self._parts
+        sizes = np.array([self.beam.size] * 2 + [1.0] * 4)[:, None, None]
+        for t in times:
+            for scale in (0.0, 1e-2):
+                y = self._variables(scale * self.beam.sizes * np.cos(np.arange(self.beam.N)), part)
+                try:
+                    now = self._with(_time=t)
+                    A, P = now._curvature(y, part) * sizes * sizes[:, None], now._slope(y, part)
+                except CallbackError:
+                    return False
+                off, size = np.abs(A - A.swapaxes(0, 1)).max(), np.abs(A).max()
+                if not off <= SYMMETRIC * (size + STEP * np.abs(P * sizes).max()):
+                    return False
+        return True
+
+    def potential(self, u: Array) -> float | None:
+        if not self.symmetric:
+            return None
+        part, = self._parts
+        rest = self._variables(np.zeros(self.beam.N), part)
+        d = self._variables(u, part) - rest
+        return float(sum(w * np.sum(part.weights * self._slope(rest + s * d, part) * d)
+                         for s, w in zip(*gauss(WORK))))
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        """Mean of the force on a straight path: of exact work for polynomials of degree 5."""
+        if not self.symmetric:
+            return super().mean_force(u0, u1)
+        return sum((w * self.force(u0 + s * (u1 - u0)) for s, w in zip(*gauss(MEAN))),
+                   np.zeros(self.beam.N))
 
     def _require_tangent(self, u, d):
         """Raise InputError unless the tangent is the derivative of the form."""

@@ -12,8 +12,8 @@ from ..beam.beam import Beam
 from ..beam.distribution import Distribution, on_points
 from ..beam.kinematics import locate
 from ..beam.layout import WhichBeam
-from ..core.errors import (InputError, ask, require_finite, require_finite_scalar,
-                           require_positive)
+from ..core.errors import (InputError, ask, require_direction, require_finite,
+                           require_finite_scalar, require_positive)
 from ..core.types import Array, TimeFunction
 from .loads import Load
 from .off_axis import OffAxisForce, is_off_axis
@@ -136,7 +136,7 @@ class Train(TimedLoad):
     start
         Position of the first axle along the axis at time 0.
     direction
-        Direction of the forces, shape (2,).
+        Direction of the forces, of any length, shape (2,).
     amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`.
 
@@ -168,18 +168,18 @@ class Train(TimedLoad):
                              f"first, got {len(self.distances)} distances")
         self.speed = require_positive("speed", speed)
         self.start = require_finite_scalar("start", start)
-        self.direction = require_finite("direction", direction, (2,))
+        self.direction = require_direction("direction", direction)
 
     def bind(self, beam: Beam) -> Load:
         return self._with(beam=beam, _ends=np.cumsum(np.append(0.0, beam.mesh.lengths)))
 
     def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
         s, ends, places = self.start + self.speed * t - self.distances, self._ends, []
-        slack = 1e-12 * ends[-1]
+        slack, along = 1e-12 * ends[-1], self.direction / np.hypot(*self.direction)
         for force, x in zip(self.forces, s):
             if -slack <= x <= ends[-1] + slack:
                 x = min(max(x, 0.0), ends[-1])
                 e = min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
                 xi = (x - ends[e]) / (ends[e + 1] - ends[e])
-                places.append((force * self.direction, e, np.array([xi, 0.5])))
+                places.append((force * along, e, np.array([xi, 0.5])))
         return places

@@ -265,6 +265,17 @@ def several(beams: Any) -> tuple[Any, ...]:
     return tuple(beams)
 
 
+def _nearest_other(layout, at, found):
+    """Where the nearest node of another beam is, for a message."""
+    others = [(x, beam.name or k) for k, beam in enumerate(layout.beams) if k not in found
+              for x in beam.mesh.p.T]
+    if not others:
+        return ""
+    x, name = min(others, key=lambda one: np.hypot(*(one[0] - at)))
+    return (f"; the nearest node of another beam, {name!r}, is at ({x[0]:.6g}, {x[1]:.6g}), "
+            f"{np.hypot(*(x - at)):.6g} away")
+
+
 def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:
     """Beams and places of a joint."""
     if len(places) > 1:
@@ -275,6 +286,6 @@ def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:
     if len(found) < 2:
         names = [layout.members[k].name or k for k in found]
         raise InputError(f"a joint at {shown(places[0])} needs two beams or rigid bodies there, "
-                         f"found {names}: name a place of each, as (beam, (x, y)) or ('ground', "
-                         "(x, y))")
+                         f"found {names}{_nearest_other(layout, at, found)}: name a place of each, "
+                         "as (beam, (x, y)) or ('ground', (x, y))")
     return found, tuple(map(float, at))

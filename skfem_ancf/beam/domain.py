@@ -116,7 +116,11 @@ class Domain(Immutable):
 
     def of_basis(self, u: Array) -> Array:
         """DOFs of the scene (..., N), as of ``state.u_of(domain)``, in the order of the basis."""
-        return np.asarray(u)[..., self._rank]
+        u = require_finite("u", u)
+        if u.shape[-1:] != (self.N,):
+            raise InputError(f"u must hold the {self.N} DOFs of {self!r}, as state.u_of(domain), "
+                             f"got the shape {u.shape}")
+        return u[..., self._rank]
 
     def numbers(self, dofs: Array) -> Array:
         """Numbers in the scene, relative to the first of the domain, of DOFs (...) of the basis."""
@@ -257,8 +261,15 @@ class Domain(Immutable):
         if self.mass is None:
             raise InputError(f"{self!r} has no mass: give its form, Domain(..., mass=BilinearForm("
                              "lambda u, v, w: rho * width * dot(u, v)))")
-        M = self._ask("mass", self.mass.assemble, self.basis)
-        return sparse.csr_array(M)[self._order][:, self._order]
+        M = sparse.csr_array(self._ask("mass", self.mass.assemble, self.basis))
+        require_finite(f"the mass of {self!r}", M.data)
+        low, size = M.diagonal().min(), abs(M).max()
+        if low < -1e-12 * size or abs(M - M.T).max() > 1e-10 * size:
+            raise InputError(
+                f"the mass of {self!r} must be symmetric and not negative, as rho * width * "
+                "dot(u, v), got " + (f"a diagonal with {low:.6g}" if low < 0.0 else
+                                     "a form in which u and v cannot be interchanged"))
+        return M[self._order][:, self._order]
 
     @property
     def total_mass(self) -> float:

@@ -188,15 +188,19 @@ def shown(value: object) -> str:
     return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
 
 
-#: What supports call the components of the position.
-AXES = {"x": "r^1", "y": "r^2"}
+#: Other names of the components of position and displacement, by their numbers.
+AXES = {name: k for k, axis in ((1, "x"), (2, "y")) for name in (
+    axis, f"u{axis}", f"u_{axis}", f"d{axis}", f"r{axis}", f"r{k}", f"u{k}", f"u^{k}", f"u_{k}",
+    f"r^{k}", f"r_{k}")}
 
 
 def _suggested(name, known):
     """The most similar known name as the end of a message, or ""."""
     names = {k.lower(): k for k in known if isinstance(k, str)}
-    if isinstance(name, str) and AXES.get(name) in names:
-        return f"; did you mean {AXES[name]!r}?"
+    if isinstance(name, str) and name.lower() in AXES:
+        for same in (f"r^{AXES[name.lower()]}", f"u^{AXES[name.lower()]}"):
+            if same in names:
+                return f"; did you mean {same!r}?"
     found = difflib.get_close_matches(name.lower() if isinstance(name, str) else "", names, 1, 0.5)
     return f"; did you mean {names[found[0]]!r}?" if found else ""
 
@@ -257,17 +261,53 @@ def require_index(name: str, value: object, n: int) -> int:
     return require_integer(name, value, -n, n - 1) % n
 
 
-def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None) -> Array:
-    """An array of finite real numbers as float64; None in ``shape`` is any extent."""
+def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None,
+                   example: str = "") -> Array:
+    """An array of finite real numbers as float64; None in ``shape`` is any extent.
+
+    The message on a wrong shape ends with the value, and with an ``example`` of what works.
+    """
+    given = array
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
     if shape is not None and (array.ndim != len(shape) or any(
             wanted not in (None, n) for wanted, n in zip(shape, array.shape))):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
-        raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
+        example = example or "(0, 1)" * (tuple(shape) == (2,))
+        raise InputError(f"{name} must have shape {wanted}{example and f', as {example}'}, got "
+                         f"{array.shape}: {shown(given)}")
     finite = np.isfinite(array)
     if not finite.all():
         raise InputError(f"{name} has a value that is NaN or infinite: {array[~finite][0]}")
+    return array
+
+
+#: Largest coordinate, and the inverse of the smallest: their squares must not overflow.
+FARTHEST = 1e100
+
+
+def require_moderate(name: str, array: Array) -> Array:
+    """Coordinates of which squares and products do not overflow."""
+    largest = np.abs(array).max(initial=0.0)
+    if largest > FARTHEST or 0.0 < largest < 1.0 / FARTHEST:
+        raise InputError(f"{name} must have coordinates between {1.0 / FARTHEST:g} and "
+                         f"{FARTHEST:g}, got {largest:g}")
+    return array
+
+
+def require_direction(name: str, value: Any) -> Array:
+    """A vector (2,) that is not zero."""
+    vector = require_finite(name, value, (2,))
+    if not vector.any():
+        raise InputError(f"{name} must not be zero, got {shown(value)}: give a vector, as (0, 1)")
+    return vector
+
+
+def require_increasing(name: str, values: Any) -> Array:
+    """Finite numbers (n,), n >= 1, each larger than the one before."""
+    array = require_finite(name, values, (None,))
+    if not len(array) or (array[1:] <= array[:-1]).any():
+        raise InputError(f"{name} must be numbers that increase, at least one, got {shown(values)}")
     return array
 
 

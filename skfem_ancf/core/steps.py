@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import InputError, NameUnknown, require_finite, require_positive
+from .errors import (InputError, NameUnknown, require_finite, require_increasing, require_positive,
+                     shown)
 from .immutable import Immutable
 from .types import Array
 
@@ -29,10 +30,8 @@ class Ramp(Immutable):
     """
 
     def __init__(self, times: ArrayLike, values: ArrayLike) -> None:
-        self.times = require_finite("times", times, (None,))
+        self.times = require_increasing("times of a Ramp", times)
         self.values = require_finite("values", values)
-        if not len(self.times) or np.any(np.diff(self.times) <= 0.0):
-            raise InputError(f"the times of a Ramp must ascend, got {self.times.tolist()}")
         if self.values.ndim not in (1, 2) or len(self.values) != len(self.times):
             raise InputError(f"a Ramp with {len(self.times)} times has as many numbers or vectors, "
                              f"got values of shape {self.values.shape}")
@@ -54,6 +53,8 @@ class Steps(Immutable):
 
     Parameters
     ----------
+    *unnamed
+        Refused, with a message that says how to write it.
     **durations
         Positive duration of each step by name.
 
@@ -73,11 +74,14 @@ class Steps(Immutable):
     [10.0, 20.0, 20.0, 10.0]
     """
 
-    def __init__(self, **durations: float) -> None:
-        if not durations:
-            raise InputError("Steps(press=1.0, release=1.0): name at least one step")
+    def __init__(self, *unnamed: Any, **durations: float) -> None:
+        if unnamed or not durations:
+            raise InputError("give durations by name, as Steps(press=1.0, release=1.0) or "
+                             f"Steps(**{{'press': 1.0}}), got Steps{shown(unnamed)}")
         self.names = tuple(durations)
-        self.ends = np.cumsum([require_positive(name, x) for name, x in durations.items()])
+        with np.errstate(over="ignore"):
+            self.ends = require_finite("the sum of the durations", np.cumsum(
+                [require_positive(name, x) for name, x in durations.items()]))
 
     def __len__(self) -> int:
         return len(self.names)
@@ -98,13 +102,17 @@ class Steps(Immutable):
 
         Raises
         ------
-        NameUnknown
-            If a step is unknown.
+        NameUnknown, InputError
+            If a step is unknown, or if there is no value.
         """
         for name in values:
             if name not in self.names:
                 raise NameUnknown("step", name, self.names)
-        shape = np.shape(next(iter(values.values()), 0.0))
+        if not values and start is None:
+            raise InputError(f"ramp() has no values: give one at the end of a step, as ramp("
+                             f"{self.names[0]}=1.0)")
+        first: Any = next(iter([*values.values(), start]))
+        shape = np.shape(first)
         last: Any = np.zeros(shape) if start is None else require_finite("start", start, shape)
         rows = [last]
         for name in self.names:

@@ -269,7 +269,8 @@ class History(MaterialPoints, SpringForces):
     def total_energy(self) -> Array:
         """Sum of strain, kinetic and potential energy, shape (nt,).
 
-        The sum with :attr:`dissipated` is constant unless loads depend on time.
+        The sum with :attr:`dissipated` is constant unless loads depend on time or have no
+        potential, as those that follow the body.
         """
         return self.strain_energy + self.kinetic_energy + self.potential_energy
 

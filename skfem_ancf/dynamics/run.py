@@ -11,8 +11,9 @@ import numpy as np
 import scipy
 
 from ..actions.forces.turns import Turns
-from ..core.errors import (AncfError, CheckpointError, InputError, ask_number, require_finite,
-                           require_finite_scalar, require_positive, shown)
+from ..core.errors import (AncfError, CheckpointError, InputError, ModelWarning, ask_number,
+                           require_finite, require_finite_scalar, require_increasing,
+                           require_positive, shown, warn)
 from ..core.types import Array
 from ..equations.system import System
 from ..results.state import State
@@ -66,15 +67,16 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
     auto = isinstance(dt, str)
     if auto and dt != "auto":
         raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
-    dt = None if auto else min(require_positive("dt", dt), span)
-    _require_step(t_start, t_end, 1e-4 * span if auto else dt)
+    dt = None if auto else require_positive("dt", dt)
+    step = 1e-4 * span if auto else min(dt, span)
+    _require_step(t_start, t_end, step)
+    if not auto and dt > 10.0 * span:
+        warn(f"dt = {dt:g} is longer than the motion, from t = {t_start:g} to {t_end:g}, which "
+             "becomes one step: the first argument is t_end, the second is dt", ModelWarning)
     if t_eval is not None:
-        t_eval = require_finite("t_eval", t_eval, (None,))
-        if (not len(t_eval) or len(t_eval) > 1 and (t_eval[1:] <= t_eval[:-1]).any()
-                or t_eval[0] < t_start
-                or t_eval[-1] > t_end * (1 + 1e-12)):
-            raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got "
-                             f"{shown(t_eval)}")
+        t_eval = require_increasing("t_eval", t_eval)
+        if t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12):
+            raise InputError(f"t_eval must lie within [{t_start}, {t_end}], got {shown(t_eval)}")
     tol = None if tol is None else require_positive("tol", tol)
     rtol = require_positive("rtol", rtol)
     if rtol < MIN_RTOL:
@@ -83,7 +85,7 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
     if len(breakpoints):
         breaks = np.unique(require_finite("breakpoints", breakpoints, (None,)))
         inside = breaks[(breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)].tolist()
-    return Task(t_start, t_end, dt, tol, rtol, t_eval, tuple(inside))
+    return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(inside))
 
 
 def _require_step(t_start, t_end, step):

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ..beam.layout import select_member
 from ..core.archive import output_file
-from ..core.errors import InputError, MissingExtra, require_path
+from ..core.errors import InputError, MissingExtra, require_path, shown
 from ..core.types import Array, StrPath
 from ..recovery.arrays import body_of
 from ..recovery.fields import find_fields, unit_of, units_of
@@ -42,7 +43,8 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
         default.
     at, beam, line
         Points of the body as for :meth:`State.displacement <skfem_ancf.State.displacement>`, shape
-        (2,) or (2, n); by default points all over it, as many as ``subdivide`` says.
+        (2,) or (2, n); by default points all over it, or over ``beam`` alone, as many as
+        ``subdivide`` says.
     subdivide, recover
         As for :func:`skfem_ancf.io.vtu.save_vtu`.
 
@@ -68,7 +70,10 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
     if not states:
         raise InputError("the history has no instants")
     if at is None:
-        tables = [_of_body(state, wanted, subdivide, recover, fields is None) for state in states]
+        if line is not None:
+            raise InputError(f"line={shown(line)} is for points: give at=, too")
+        tables = [_of_body(state, wanted, subdivide, recover, fields is None, beam)
+                  for state in states]
     else:
         found = states[0].system.points.find(at, beam, line, ask=True)
         x = found.start.reshape(2, -1)
@@ -93,9 +98,12 @@ def to_xarray(solution: Any, fields: Any = None, at: Any = None, beam: Any = Non
     return xarray.Dataset(arrays, coords | parts | ({"time": solution.t} if motion else {}), facts)
 
 
-def _of_body(state, wanted, subdivide, recover, lenient):
-    """Coordinates of points all over the body, and fields by name."""
-    found = grids(state, subdivide, False, recover)
+def _of_body(state, wanted, subdivide, recover, lenient, beam):
+    """Coordinates of points all over the body, or over one beam, and fields by name."""
+    found, members = grids(state, subdivide, False, recover), state.system.members
+    if beam is not None:
+        one = select_member(state.beams, members[len(state.beams):], beam)
+        found = [grid for grid, member in zip(found, members) if member is one]
     bodies = [body_of(grid, wanted, True, lenient, share=False) for grid in found]
     x = np.concatenate([body.points for body in bodies]).T
     names = np.repeat([grid.name for grid in found], [len(body.points) for body in bodies])

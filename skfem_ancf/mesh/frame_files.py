@@ -20,15 +20,15 @@ LINE = re.compile("line([0-9]*)")
 
 
 def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
-                    tol: float | None = None) -> FrameGraph:
+                    tol: float | None = None, unit: str | None = None) -> FrameGraph:
     """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF.
 
     Cells "line" are straight, "line3", "line4", ... are polynomials through their points, "vertex"
     cells name nodes. ``groups`` are names of the sets of lines that become beams; by default those
     in ``named``, to which other arguments refer, and those that share no line with another set.
-    ``tol`` is as for :class:`FrameGraph`.
+    ``tol`` is as for :class:`FrameGraph`. The coordinates of a drawing are converted to ``unit``.
     """
-    mesh = _mesh_of(mesh)
+    mesh = _mesh_of(mesh, unit)
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
         raise InputError(f"groups are names of sets of lines, got {shown(groups)}")
     points = require_finite("the points of the mesh", mesh.points)
@@ -73,20 +73,23 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
     return FrameGraph(points[used, :2], ends.reshape(-1, 2), sets, nodes, curves, tol, beams, lost)
 
 
-def _mesh_of(mesh):
+def _mesh_of(mesh, unit):
     """A meshio mesh, or the one in a file."""
     import meshio
 
     if isinstance(mesh, (str, Path)):
         path = require_path("mesh", mesh)
         if path.suffix.lower() == ".dxf":
-            return mesh_of_dxf(path)
+            return mesh_of_dxf(path, unit)
         try:
             mesh = meshio.read(path)
         except (Exception, SystemExit) as error:  # meshio exits on an unknown format
             raise FileError(f"{path} cannot be read as a mesh: {error}") from None
         if path.suffix.lower() == ".inp":
             _require_sets_of_abaqus(path)
+    if unit is not None:
+        raise InputError(f"unit={shown(unit)} is for drawings in DXF, which state theirs: other "
+                         "meshes are taken as they are")
     if not isinstance(mesh, meshio.Mesh):
         raise InputError(f"mesh must be a meshio.Mesh or the name of a file, got {shown(mesh)}")
     return mesh

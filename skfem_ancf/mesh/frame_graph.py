@@ -12,8 +12,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..core.errors import (InputError, MeshError, ModelWarning, NameUnknown, ask_field,
-                           require_finite, require_integer, require_label, require_not_negative,
-                           require_unmasked, shown, warn)
+                           require_finite, require_integer, require_label, require_moderate,
+                           require_not_negative, require_unmasked, shown, warn)
 from ..core.types import Array
 from .curve import Curve
 from .members import Axes, MeshLines, heights_of_chains
@@ -67,7 +67,7 @@ class FrameGraph:
                  curves: Mapping[int, Callable[[Array], Any]] | None = None,
                  tol: float | None = None, beams: Sequence[str] | None = None,
                  lost: Mapping[str, int] | None = None) -> None:
-        self.points = _pairs("points", points).astype(float)
+        self.points = require_moderate("points", _pairs("points", points).astype(float))
         self.lines = _numbers("lines", lines)
         n, m = self.points.shape[1], self.lines.shape[1]
         self.groups = _named("group", "lines", groups, m)

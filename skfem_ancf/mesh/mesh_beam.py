@@ -15,8 +15,9 @@ from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
 from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
-                           require_finite_scalar, require_function, require_integer, require_option,
-                           require_options, require_path, require_positive, require_unmasked, shown)
+                           require_finite_scalar, require_function, require_integer,
+                           require_moderate, require_option, require_options, require_path,
+                           require_positive, require_unmasked, shown)
 from ..core.origin import ours
 from ..core.types import Array, StrPath
 from . import files
@@ -134,7 +135,7 @@ class MeshBeam(NumberedMesh):
         >>> MeshBeam.init_line([0, 1, 3], height=lambda x: 0.3 - 0.05 * x).heights[0].tolist()
         [0.3, 0.25]
         """
-        x = require_finite("x", x, (None,))
+        x = require_finite("x", x, (None,), "np.linspace(0, length, elements + 1)")
         origin = require_finite("origin", origin, (2,))
         angle = _radians(angle)
         if len(x) < 2:
@@ -267,7 +268,7 @@ class MeshBeam(NumberedMesh):
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
     def __post_init__(self):
-        p = require_finite("the nodes", self.doflocs, (2, None))
+        p = require_moderate("the nodes", require_finite("the nodes", self.doflocs, (2, None)))
         t = require_finite("t", self.t)
         if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
             raise MeshError(f"t must contain node numbers, got {shown(self.t)}")

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.linalg import spsolve
 
-from ..core.errors import require_finite_scalar, require_index
+from ..core.errors import InputError, require_finite_scalar, require_index
 from ..core.near_misses import NearMisses
 from ..equations.linearised import linear_external_force, linear_force
+from ..equations.stability import position_weights
 from .state import State
 
 #: Round-off of the frequency of a rigid motion, over that of the slowest bending.
@@ -90,7 +91,8 @@ class Modes(NearMisses):
             out[k] = shape @ force / (2.0 * omega.real)
         return out
 
-    def mode(self, i: int, amplitude: float) -> State:
+    def mode(self, i: int, amplitude: float | None = None, *,
+             displacement: float | None = None) -> State:
         """The state displaced along a mode (its real part), to plot or save.
 
         It is linearised about :attr:`state`, in equilibrium with the inertia of the vibration.
@@ -98,10 +100,31 @@ class Modes(NearMisses):
 
         Parameters
         ----------
-        i, amplitude
-            Number of the mode, negative ones from the end; factor.
+        i
+            Number of the mode, negative ones from the end.
+        amplitude
+            Factor of the shape, which has unit modal mass.
+        displacement
+            The largest displacement of a node, instead of the factor; by default a tenth of the
+            size of the scene.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+        >>> state = Scene(beam).clamp("left").modes(1).mode(0, displacement=0.02)
+        >>> round(abs(float(state.displacement("right")[1])), 6)
+        0.02
         """
         i = require_index("i", i, len(self.shapes))
+        if amplitude is not None and displacement is not None:
+            raise InputError("give amplitude or displacement, not both")
+        if amplitude is None:
+            largest = (0.1 * self.state.system.size if displacement is None else
+                       require_finite_scalar("displacement", displacement))
+            at_nodes = self.shapes[i].real[position_weights(self.state.system) > 0.0]
+            amplitude = largest / np.hypot(*at_nodes.reshape(-1, 2).T).max()
         amplitude = require_finite_scalar("amplitude", amplitude)
         system, d = self.state.system, amplitude * self.shapes[i].real
         acceleration = -self.eigenvalues[i].real * d

@@ -219,7 +219,8 @@ class Frame(Scene):
                     width: float | Callable[..., ArrayLike] | None = None,
                     section: Section | None = None, element: ElementBeam = CABLE,
                     formulation: str | Formulation | type[Formulation] = "assumed",
-                    damping: KelvinVoigt | None = None, compiled: bool = True) -> Frame:
+                    damping: KelvinVoigt | None = None, compiled: bool = True,
+                    unit: str | None = None) -> Frame:
         """A frame of the line cells of a mesh: Gmsh's ``.msh``, ``.vtu``, and others.
 
         Parameters
@@ -238,6 +239,10 @@ class Frame(Scene):
             By default those named in ``sections``, and those that share no line with another set.
             In files without sets, where meshio stores names as data called "column-girder", one of
             the names must appear here or in ``sections``.
+        unit
+            Unit of length of the frame, as "m" or "mm": coordinates of a drawing in DXF are
+            converted to it from the unit that the drawing states. By default all coordinates are
+            taken as they are.
 
         Examples
         --------
@@ -253,8 +258,8 @@ class Frame(Scene):
         named = list(mapping_of("sections", sections))
         beam = dict(height=height, material=material, width=width, section=section, element=element,
                     formulation=formulation, damping=damping, compiled=compiled)
-        return cls._made(graph_from_meshio(mesh, groups, named, tol), hinges, elements, sections,
-                         beam)
+        graph = graph_from_meshio(mesh, groups, named, tol, unit)
+        return cls._made(graph, hinges, elements, sections, beam)
 
     @classmethod
     def _made(cls, graph, hinges, elements, sections, options):

@@ -56,6 +56,11 @@ def adds(name: str, item: Callable[P, Item]) -> Callable[Concatenate[M, P], M]:
     return method
 
 
+#: Names of units that are no units of force, or of length.
+OTHER = {"force": ("m", "cm", "mm", "um", "µm", "nm", "km", "in", "ft"),
+         "length": ("N", "kN", "MN", "mN", "uN", "µN", "nN", "lb", "lbf", "kip", "kgf", "dyn")}
+
+
 class Entry(NamedTuple):
     """An unbound item, with beams by number, and its bound parts."""
 
@@ -210,8 +215,10 @@ class Model(NearMisses):
         >>> ax = state.plot("S_xx")                                 # $S_{xx}$ (MPa)
         """
         for name, value in (("force", force), ("length", length)):
-            if not require_text(name, value):
-                raise InputError(f"{name} must be the name of a unit, got {shown(value)}")
+            if not require_text(name, value) or value in OTHER[name]:
+                raise InputError(f"{name} must be the name of a unit of {name}, got "
+                                 f"{shown(value)}: the order is units(force, length), as "
+                                 'units("N", "mm")')
         self._units = (force, length)
         return self
 

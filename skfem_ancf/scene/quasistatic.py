@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..actions.forces.turns import Turns
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, require_finite,
-                           require_flag, require_integer, require_positive)
+from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, require_flag,
+                           require_increasing, require_integer, require_positive, shown)
 from ..core.progress import progress_bar
 from ..core.steps import Steps
 from ..core.types import Array
@@ -82,18 +82,17 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
 
     ``sensors`` are names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
     """
-    ends = steps.ends if isinstance(steps, Steps) else np.unique(
-        require_finite("steps", np.atleast_1d(steps), (None,)))
+    ends = _ends_of(steps)
     increments = require_integer("increments", increments, 1, 100000)
     rules = Rules("auto", require_positive("tol", tol),
                   require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
                   require_positive("min_step", min_step))
     require_flag("stable", stable)
-    t_start = 0.0 if start is None else float(start.t or 0.0)
     u = None if start is None else displacement(system, start)
-    if not len(ends) or ends[-1] <= t_start:
-        raise InputError(f"the steps end at t = {ends[-1] if len(ends) else 0:g}, which is not "
-                         f"after the start at t = {t_start:g}")
+    t_start = 0.0 if start is None else float(start.t or 0.0)
+    if ends[-1] <= t_start:
+        raise InputError(f"the steps end at t = {ends[-1]:g}, which is not after the start at t = "
+                         f"{t_start:g}")
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     made.t = t_start
     try:
@@ -112,6 +111,16 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
         raise Interrupted(f"stopped at t = {made.t:.6g}; the exception's state is the history up "
                           "to there", made.history()) from None
     return made.history()
+
+
+def _ends_of(steps):
+    """Times at which steps end, (n,)."""
+    if isinstance(steps, Steps):
+        return steps.ends
+    if isinstance(steps, dict):
+        raise InputError(f"steps are given by name as Steps(**{shown(steps)}), got a dict")
+    one = not isinstance(steps, (list, tuple)) and np.ndim(steps) == 0
+    return require_increasing("steps", [steps] if one else steps)
 
 
 def _begin(system, t, start, u, rules, stable):

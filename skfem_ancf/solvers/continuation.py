@@ -52,7 +52,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     max_load
         Stop at this absolute load factor; the last point is there.
     until
-        A function of a :class:`Point` that returns True to stop.
+        A function of a :class:`Point` that returns True to stop, as ``lambda p:
+        p.displacement("right")[1] < -0.1``.
     tol
         Relative error of a correction in the energy norm.
     max_iterations
@@ -140,7 +141,8 @@ def _start(tracer, branch, side):
             return tracer.begin(point)
         except Failed as failure:
             raise ConvergenceError(f"the path cannot begin: {failure}", ([point], [])) from None
-    point = Point(branch.u, branch.multipliers, branch.load, branch.force, 0.0, branch.error, 0)
+    point = Point(tracer.system, branch.u, branch.multipliers, branch.load, branch.force, 0.0,
+                  branch.error, 0)
     point.tangent, point.multiplier_rate = side * branch.mode, side * branch.multiplier_mode
     point.rate, point.negative = 0.0, branch.negative
     return point

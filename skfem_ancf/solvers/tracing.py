@@ -10,6 +10,8 @@ from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..equations.stability import position_weights
 from ..equations.system import System
+from ..results.points import MaterialPoints
+from ..results.state import State
 from .increment import rules_of
 from .iteration import CLOSED, reference_work, settled
 
@@ -21,24 +23,36 @@ class Failed(Exception):
     """A step did not converge."""
 
 
-class Point:
+class Point(MaterialPoints):
     """An equilibrium of a path.
 
-    ``u`` (N,), ``multipliers`` (m,), ``load`` and ``force`` (N,) are the state; ``arc`` is the arc
-    length from the start, ``error`` the last correction in the energy norm relative to the work
-    done, ``iterations`` the linear systems solved. ``rate`` and ``tangent`` (N,) are derivatives of
-    load and displacement by the arc length. ``negative`` is the number of negative eigenvalues of
-    the tangent stiffness on the null space of J, None if loads have no potential.
+    ``displacement(point)`` and ``position(point)`` are as those of a State; ``state`` is one, with
+    strain, stress, section forces and reactions. ``u`` (N,), ``multipliers`` (m,), ``load`` and
+    ``force`` (N,) are its data; ``arc`` is the arc length from the start, ``error`` the last
+    correction in the energy norm relative to the work done, ``iterations`` the linear systems
+    solved. ``rate`` and ``tangent`` (N,) are derivatives of load and displacement by the arc
+    length. ``negative`` is the number of negative eigenvalues of the tangent stiffness on the null
+    space of J, None if loads have no potential.
     """
 
-    def __init__(self, u: Array, multipliers: Array, load: float, force: Array, arc: float,
-                 error: float, iterations: int) -> None:
-        self.u, self.multipliers, self.load, self.force = u, multipliers, load, force
+    def __init__(self, system: System, u: Array, multipliers: Array, load: float, force: Array,
+                 arc: float, error: float, iterations: int) -> None:
+        self.system, self.u, self.multipliers, self.load, self.force = (
+            system, u, multipliers, load, force)
         self.arc, self.error, self.iterations = arc, error, iterations
         self.rate: Any = np.nan
         self.tangent: Any = None
         self.multiplier_rate: Any = None
         self.negative: Any = None
+
+    @property
+    def v(self) -> Array:  # type: ignore[override]
+        return np.zeros_like(self.u)
+
+    @property
+    def state(self) -> State:
+        return State(self.system, self.u, self.load, self.force, True, self.iterations,
+                     "a point of a path", (), self.multipliers)
 
     @property
     def stable(self) -> bool | None:
@@ -63,7 +77,7 @@ class Tracer:
     def stress_free(self) -> Point:
         """The reference configuration as a point."""
         zero = np.zeros(self.system.N)
-        return Point(zero, np.zeros(self.system.constraints.m), 0.0, zero, 0.0, 0.0, 0)
+        return Point(self.system, zero, np.zeros(self.system.constraints.m), 0.0, zero, 0.0, 0.0, 0)
 
     def begin(self, point: Point) -> Point:
         """Set the tangent at the reference configuration, and the weight of the load in the arc
@@ -161,7 +175,7 @@ class Tracer:
             reference = max(reference_work(force, load * external, u),
                             np.sqrt(abs(external @ step * dl)))
             if closed and settled(work, reference, rules):
-                return Point(u, m, load, force, start.arc + ds,
+                return Point(self.system, u, m, load, force, start.arc + ds,
                              work / reference if reference > 0 else 0.0, k)
             drive, gap = self._drive(external, u, load)
             try:

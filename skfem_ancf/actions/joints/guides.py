@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout, WhichBeam
-from ...core.errors import InputError, require_finite, require_label, require_positive
+from ...core.errors import (InputError, require_direction, require_finite, require_label,
+                            require_positive)
 from ...core.types import Array
 from ..places import point
 from .base import Joint, gradients
@@ -29,9 +30,7 @@ class OnLine(Joint):
 
     def __init__(self, at: ArrayLike, direction: ArrayLike, beam: WhichBeam = None,
                  through: ArrayLike | None = None, name: str | None = None) -> None:
-        d = require_finite("direction", direction, (2,))
-        if not np.any(d):
-            raise InputError("the direction of the line must not be zero")
+        d = require_direction("direction", direction)
         self.normal = np.array([-d[1], d[0]]) / np.hypot(*d)
         self.through = None if through is None else require_finite("through", through, (2,))
         self.beam, self.at, self.name = beam, at, require_label("name", name)

@@ -11,7 +11,8 @@ from skfem.helpers import dot
 from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
 from ...beam.rigid import RigidBody
 from ...core.caching import array_cache
-from ...core.errors import InputError, require_finite, require_flag, require_label, shown
+from ...core.errors import (InputError, require_direction, require_finite, require_flag,
+                            require_label, shown)
 from ...core.types import Array
 from ...mesh.mapping import cross
 from ..places import GROUND, Vector, is_ground, named_place, point, section
@@ -250,9 +251,7 @@ class Slot(Joint):
     def __init__(self, at: Any, on: WhichMember, direction: ArrayLike,
                  through: ArrayLike | None = None, angle: bool = False,
                  name: str | None = None) -> None:
-        d = require_finite("direction", direction, (2,))
-        if not np.any(d):
-            raise InputError("the direction of the line must not be zero")
+        d = require_direction("direction", direction)
         self.direction = d / np.hypot(*d)
         self.through = None if through is None else require_finite("through", through, (2,))
         self.at, self.on, self.angle = at, on, require_flag("angle", angle)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.errors import (CallbackError, InputError, ask, require_finite, require_flag,
-                            require_function, require_not_negative, require_positive, shown,
-                            warnings_as_errors)
+from ...core.errors import (CallbackError, InputError, ask, require_direction, require_finite,
+                            require_flag, require_function, require_not_negative, require_positive,
+                            shown, warnings_as_errors)
 from ...core.immutable import Immutable
 from ...core.types import Array
 from ..contact.gap import outline
@@ -118,11 +118,8 @@ class Line(Outline):
 
     def __init__(self, point: ArrayLike, normal: ArrayLike = (0.0, 1.0)) -> None:
         self.point = require_finite("point", point, (2,))
-        self.normal = require_finite("normal", normal, (2,))
-        size = np.hypot(*self.normal)
-        if not size > 0.0:
-            raise InputError(f"normal must have a direction, got {shown(normal)}")
-        self._unit, self.pivot = self.normal / size, self.point
+        self.normal = require_direction("normal", normal)
+        self._unit, self.pivot = self.normal / np.hypot(*self.normal), self.point
         p, q = self._unit
         self.numbers = np.array([0.0, -FAR, FAR, *self.point, -q, p, 1.0])
 
