@@ -7,7 +7,7 @@ from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, 
 from skfem.helpers import ddot, dot, sym_grad
 
 from skfem_ancf import (Beam, Domain, ElementBeamANCF, ElementBeamCable, Frame, InputError,
-                        Line, MeshBeam, ModelWarning, NameUnknown, Ramp, Scene, Steps,
+                        Line, Material, MeshBeam, ModelWarning, NameUnknown, Ramp, Scene, Steps,
                         StVenantKirchhoff, Train)
 
 MATERIAL = StVenantKirchhoff(E=2e8, nu=0.0, density=1000.0)
@@ -26,15 +26,38 @@ def pair(gap=0.0):
     return Scene(beam(n=2, name="a"), beam(n=2, origin=(1 + gap, 0), name="b")).clamp("left", "a")
 
 
-def domain(mass=None):
+def domain(mass=None, factor=1.0):
     mesh = MeshQuad.init_tensor(np.linspace(0, 1, 5), np.linspace(-0.05, 0.05, 3)).with_defaults()
     return Domain(Basis(mesh, ElementVector(ElementQuad2())),
                   LinearForm(lambda v, w: 1e5 * ddot(sym_grad(w["u"]), sym_grad(v))),
-                  BilinearForm(lambda u, v, w: 1e5 * ddot(sym_grad(u), sym_grad(v))), mass)
+                  BilinearForm(lambda u, v, w: 1e5 * factor * ddot(sym_grad(u), sym_grad(v))), mass)
 
 
 def of_mass(form):
     return Scene(domain(BilinearForm(form))).clamp("left")
+
+
+class Law(Material):
+    """Linear, with any matrix."""
+
+    def __init__(self, matrix):
+        super().__init__(1e6, 0.0, 1000.0)
+        self.matrix = matrix
+
+    def energy(self, strain):
+        return 0.5 * np.einsum("i...,ij,j...->...", strain, self.matrix, strain)
+
+    def stress(self, strain):
+        return np.einsum("ij,j...->i...", self.matrix, strain)
+
+    def moduli(self, strain):
+        return np.broadcast_to(self.matrix.reshape(3, 3, *[1] * (strain.ndim - 1)),
+                               (3, 3, *strain.shape[1:]))
+
+
+def law(matrix):
+    mesh = MeshBeam.init_line([0, 1], 0.1)
+    return Scene(Beam(mesh, ElementBeamANCF(2), Law(matrix), 0.1)).clamp("left").solve_static()
 
 
 def density(value):
@@ -80,6 +103,16 @@ WRONG = [
      "hessian.* numbers, got 'text'"),
     (lambda: clamped().energy(density(1.0), over=np.array([np.nan, np.nan])), "point.*NaN"),
     (lambda: clamped().energy(density(1.0), over=[np.nan, np.nan]), "point.*NaN"),
+    (lambda: law(np.full((3, 3), np.nan)), "moduli.* of Law is not the derivative.*nan"),
+    (lambda: law(1e6 * np.eye(3) + 5e5 * np.eye(3, k=1)), "moduli.*not the"),
+    (lambda: law(-1e6 * np.eye(3)), "moduli.* of Law .* negative, got the eigenvalue -1e.06"),
+    (lambda: domain(factor=np.nan), "tangent of .* is not the derivative.*nan"),
+    (lambda: domain(factor=2.0), "tangent of .* is not the derivative"),
+    (lambda: clamped().load(LinearForm(lambda v, w: np.nan * v[0])), "force of .*FormLoad.* NaN"),
+    (lambda: clamped().load(LinearForm(lambda v, w: np.nan * w.r[0] * v[0])), "FormLoad.* NaN"),
+    (lambda: clamped().sensor("grows", lambda s: np.zeros(round(1 + 1e3 * s.t))).integrate(
+        0.003, 0.001), r"sensor .grows. must .* the same shape.*got \(2,\), then \(3"),
+    (lambda: clamped().run(1.0, min_step=2), "min_step must be at most 1.*got 2"),
     # the order of arguments
     (lambda: clamped().load(LinearForm(lambda v, w: v[1]), BilinearForm(lambda u, v, w: 0.0)),
      "second argument of a load is the boundary.*tangent="),

@@ -18,8 +18,8 @@ from skfem.element import DiscreteField
 from ..beam.distribution import BODY, Distribution, Sampled, facets_along
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember
-from ..core.errors import (CallbackError, InputError, explained, require_flag, require_slope, shown,
-                           warnings_as_errors)
+from ..core.errors import (CallbackError, InputError, explained, require_finite, require_flag,
+                           require_slope, shown, warnings_as_errors)
 from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
 from .density import Density, points_of
@@ -139,6 +139,7 @@ class FormLoad(Density):
                          np.array([f.grad[0] for f in fields]), None)
         bound = self._with(beam=beam, _parts=[part], _basis=basis)
         P, w = bound._evaluated(bound._variables(np.zeros(beam.N), part))
+        require_finite(f"the force of {bound!r}", P)
         used = vars(w).get("asked", set()) & {"r", "F", "t"}
         if not used:
             dead = DeadLoad(beam, bound._force(-P, part), self.amplitude, bound._distribution(P))

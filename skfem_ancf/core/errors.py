@@ -368,7 +368,7 @@ def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
     """
     change, slope = np.ravel(change), np.ravel(slope)
     off = np.abs(change - slope)
-    if np.max(off, initial=0.0) > SLOPE * np.max(np.abs([change, slope])) + noise:
+    if not np.max(off, initial=0.0) <= SLOPE * np.max(np.abs([change, slope])) + noise:  # or NaN
         k = np.argmax(off)
         raise InputError(f"{what} is not the derivative of {of}: over a small step it gives "
                          f"{slope[k]:.6g}, but the change is {change[k]:.6g}{else_}")

@@ -11,7 +11,8 @@ import numpy as np
 from ..actions.joints.base import Joint
 from ..beam.layout import WhichBeam
 from ..beam.points import Located
-from ..core.errors import CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown
+from ..core.errors import (CallbackError, CheckpointError, InputError, NameUnknown, ask_array,
+                           require_flag, shown)
 from ..core.immutable import Immutable
 from ..core.types import Array, StrPath
 from ..equations.system import System
@@ -116,6 +117,19 @@ def _read(sensor, at, state):
     return state.field(find_field(what), at, recover=sensor.recover)
 
 
+def _stacked(name, values):
+    """Values at several times as one array."""
+    for value in values:
+        if np.shape(value) != np.shape(values[0]):
+            raise _varying(name, np.shape(values[0]), np.shape(value))
+    return np.array(values)
+
+
+def _varying(name, first, other):
+    return CallbackError(f"the function of the sensor {name!r} must return the same shape at all "
+                         f"times, got {first}, then {other}")
+
+
 class Readings(dict[str, "Array"]):
     """Readings of sensors: a mapping from names to arrays (nt, ...).
 
@@ -173,10 +187,12 @@ class Recorder:
         rows = [[_read(sensor, at, state) for sensor, at in others]
                 for state in map(self._state_of, steps)] if others else []
         columns = iter(zip(*rows))
-        found = [_read_steps(sensor, at, steps) if sensor.moving else np.array(next(columns))
-                 for (_, sensor), at in zip(self.sensors, self._located)]
+        found = [_read_steps(sensor, at, steps) if sensor.moving else _stacked(name, next(columns))
+                 for (name, sensor), at in zip(self.sensors, self._located)]
         self._t.append(np.array([y.t for y in steps]))
-        for read, one in zip(self._read, found):
+        for (name, _), read, one in zip(self.sensors, self._read, found):
+            if read and one.shape[1:] != read[0].shape[1:]:
+                raise _varying(name, read[0][0].shape, one[0].shape)
             read.append(one)
 
     def readings(self) -> Readings:

@@ -265,7 +265,7 @@ def _require_derivatives(law, material):
     try:
         stress, *stresses = (np.asarray(law.stress(E + s * d)) for s in (0.0, -1.0, 1.0))
         energies = [np.asarray(law.energy(E + s * d)) for s in (0.0, -1.0, 1.0)]
-        D = np.asarray(law.moduli(E))
+        D, D0 = (np.asarray(law.moduli(strain)) for strain in (E, 0.0 * E))
     except NotImplementedError:
         raise InputError(f"{type(material).__name__} must define energy(strain) and "
                          "stress(strain)") from None
@@ -280,6 +280,10 @@ def _require_derivatives(law, material):
     require_slope(f"stress(strain) of {type(material).__name__}", "energy(strain)",
                   energies[2] - energies[1], 2.0 * np.sum(stress * d, axis=0),
                   1e-13 * np.abs(energies[0]).max())
+    lowest, *_, highest = np.linalg.eigvalsh(D0.reshape(3, 3, -1)[..., 0])
+    if lowest < -1e-6 * abs(highest):
+        raise InputError(f"moduli(strain) of {type(material).__name__} at zero strain must not be "
+                         f"negative, got the eigenvalue {lowest:.6g}")
 
 
 class OverriddenLaw:

@@ -87,6 +87,8 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     rules = Rules("auto", require_positive("tol", tol),
                   require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
                   require_positive("min_step", min_step))
+    if rules.min_step > 1.0:
+        raise InputError(f"min_step must be at most 1, the part of an increment, got {min_step!r}")
     require_flag("stable", stable)
     u = None if start is None else displacement(system, start)
     t_start = 0.0 if start is None else float(start.t or 0.0)
