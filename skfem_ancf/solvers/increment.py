@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.errors import ConvergenceError
+from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..equations import stability
 from ..equations.system import System
@@ -128,8 +130,22 @@ class Increment:
 
         before = self.start.u, options.route.acting(self.start.load)[1]
         return found_touching(contacts, before, self.time, solve,
-                              lambda u: self.system.strain_energy(u, self.time), StepFailed,
-                              options.close)
+                              lambda u: self.system.strain_energy(u, self.time), self._response,
+                              StepFailed, options.close)
+
+    def _response(self, found):
+        """A function of forces (N,): displacements (N,) by the tangent at an equilibrium.
+
+        With a measure of displacements; None if there is no tangent.
+        """
+        system, none = self.system, np.zeros(self.system.constraints.m)
+        try:
+            system.assemble(found.u, self.load)
+            system.solver.factorize(found.u, self.time, found.multipliers)
+        except NO_FACTORS:
+            return lambda force: None
+        return lambda force: (system.solver.solve(force, none)[0],
+                              partial(stability.largest_displacement, system))
 
     def _from_start(self, options):
         """Iterate from the last equilibrium; if that fails, from the equilibrium of the linearised

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.contact.contacts import Contacts
+from ..actions.contact.contacts import FIRMER
 from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
 from ..core.types import Array
 
@@ -34,7 +35,10 @@ RELEASED = 0.1
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
 #: Smallest target of the penetration, relative to the height.
 LEAST = 1e-3
-#: Target of penetration and energy, relative to their limits.
+#: Relative error of the answer above which an obstacle is too soft, and penetration relative to the
+#: height that counts as one of the displacement.
+YIELDS, NOTICED = 0.01, 1e-4
+#: Target of penetration, energy and error, relative to their limits.
 LEFT = 0.5
 #: Largest stiffening factor in one step.
 RUNG = 30.0
@@ -78,14 +82,39 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
         deep = np.maximum(-gap, 0.0)
         if np.any(deep):
             mean = group.areas @ deep / group.areas[deep > 0.0].sum()
-            out[k] = min(group.firmest, (1.0 + out[k]) * mean / (RELEASED * group.height)) - 1.0
+            most = max(1.0, group.firmest / FIRMER)
+            out[k] = min(most, (1.0 + out[k]) * mean / (RELEASED * group.height)) - 1.0
     return out
 
 
-def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
+def yielding(contacts: Contacts, u: Array, t: float, respond: Callable[..., Any]) -> Array:
+    """The relative error of the answer by the penetration, shape (groups,), to first order.
+
+    For obstacles of default stiffness: that of their forces, and if they are touched end-on or
+    deeply that of the largest displacement. ``respond`` returns changes of displacements (N,) for
+    forces (N,), from the tangent, and a measure of displacements; None without a tangent.
+    """
+    out = np.zeros(len(contacts.groups))
+    for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
+        if group.firmest <= 1.0 or not np.any(gap < 0.0):
+            continue
+        force, change, work = contacts.stiffened(k, u, t)
+        found = respond(force)
+        if found is None:
+            return 0.0 * out
+        du, size = found
+        out[k] = (change.sum() - force @ du) / work.sum()
+        if (2.0 * work[-2 * group.points:].sum() > work.sum()
+                or gap.min() < -NOTICED * group.height):
+            out[k] = max(out[k], size(du) / size(u))
+    return out
+
+
+def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -> Array:
     """The required firmness, shape (groups,); at least the present one.
 
-    ``energy`` is the strain energy including that of the penetration.
+    ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
+    :func:`yielding`.
     """
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
@@ -94,21 +123,25 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
         deep, stores = -part * float(gap.min()) / group.height, part * share
         if deep > DEEP or (deep > SEEN and stores > STORED):
             more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
-            out[k] = max(1.0, min(group.firmest, (1.0 + out[k]) * more)) - 1.0
+            most = group.firmest / FIRMER
+            out[k] = max(1.0, min(most, (1.0 + out[k]) * more)) - 1.0
+        if yields[k] > YIELDS:
+            more = min(group.firmest, (1.0 + now[k]) * yields[k] / (LEFT * YIELDS))
+            out[k] = max(out[k], more - 1.0)
     return out
 
 
 def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
-                   failed: type[Exception], close: bool = False) -> Any:
+                   respond: Callable[..., Any], failed: type[Exception], close: bool = False) -> Any:
     """An equilibrium in contact at the time t, from a displacement and its time.
 
     Obstacles have the contact history at the start of the load step. ``solve`` takes the last
     equilibrium (None for the start), whether a rough one suffices, and the number of iterations; it
-    raises ``failed``. If the start is ``close`` to the equilibrium, few iterations are tried.
+    raises ``failed``. ``respond`` is that of :func:`yielding` at an equilibrium. If the start is ``close`` to the equilibrium, few iterations are tried.
     """
     before = contacts.tables.memory.copy()
-    climb = _Climb(contacts, start, t, solve, energy, failed)
+    climb = _Climb(contacts, start, t, solve, energy, respond, failed)
     ways = [_at_once, _soon] if close else [_released, _from_soft, _directly]
     flags = lies_near(contacts, *start)
     for way in ways:
@@ -170,15 +203,18 @@ def _directly(climb, _):
 class _Climb:
     """Stiffens soft obstacles step by step; see :func:`found_touching`."""
 
-    def __init__(self, contacts, start, t, solve, energy, failed):
-        self.contacts, self.start, self.t = contacts, start, t
+    def __init__(self, contacts, start, t, solve, energy, respond, failed):
+        self.contacts, self.start, self.t, self.respond = contacts, start, t, respond
         self.solve, self.energy, self.failed = solve, energy, failed
 
     def up(self, found):
         """The equilibrium on stiff obstacles, or the last one before a failure."""
         contacts = self.contacts
         for _ in range(TIMES):
-            wanted = firm(contacts, found[0], self.t, self.energy(found[0]))
+            u, yields = found[0], np.zeros(len(contacts.groups))
+            if any(group.firmest > 1.0 for _, group in contacts.groups):
+                yields = yielding(contacts, u, self.t, self.respond(found))
+            wanted = firm(contacts, u, self.t, self.energy(u), yields)
             if np.all(wanted == contacts.firmness):
                 break
             found, done = self._to(wanted, found)

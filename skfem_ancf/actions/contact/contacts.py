@@ -16,17 +16,22 @@ from ...core.types import Array
 from .active_set import project
 from .crossing import CrossingGuard, middle_of
 from .gap import places
-from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts, push,
-                      resist, states, way)
+from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts,
+                      of_pair, push, resist, states, way)
+from .laws import mean_pressure, pressure_slope
 from .poses import taken_back
-from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, GAP, HEADER, LARGEST, NOW, POSE,
-                     POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, WIDTH,
-                     ContactTables, Pair, Question, pair_of)
+from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
+                     POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, ContactTables,
+                     Pair, Question, pair_of, transition)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
 #: suggested.
 SUNK, FIRM = 0.5, 0.1
+#: Largest factor of hardening beyond that for deep penetration.
+FIRMER = 1e5
+#: Relative change of the stiffness for derivatives.
+CHANGE = 1e-4
 #: Factor on the stiffness for difficult equilibria.
 EASED = 1e-2
 #: Collocation cannot correct multipliers within a step: constraints at its points cause rebound.
@@ -229,6 +234,27 @@ class Contacts:
             memory[3] *= part
         self.firmness[:] = firmness
 
+    def stiffened(self, k: int, u: Array, t: float) -> tuple[Array, Array, Array]:
+        """Derivatives by the logarithm of the stiffness of group k, and forces, of the pressure.
+
+        Those of the force on the degrees of freedom (N,); then by point the derivative, and the
+        force, times the penetration, (n,).
+        """
+        (which, group), _, gap = self.look(u, t)[k]
+        memory, pair, firm = self.tables.memory, self.pair(k), 1.0 + self.firmness[k]
+        width, a = transition(pair), np.maximum(-gap, 0.0)
+        push = firm * group.numbers[STIFFNESS] * group.areas * a
+        out, sticks = np.zeros((2, len(u))), memory[ANCHORED]
+        try:
+            memory[ANCHORED] = 0.0
+            for change, force in zip((-CHANGE, CHANGE), out):
+                self.firmness[k] = firm * (1.0 + change) - 1.0
+                of_pair(pair, Question(FORCE, t, 0.0, 0.0, 0, 0), u, u, force)
+        finally:
+            memory[ANCHORED], self.firmness[k] = sticks, firm - 1.0
+        return ((out[0] - out[1]) / (2.0 * CHANGE), push * pressure_slope(a, width) * a,
+                push * mean_pressure(a, a, width))
+
     def settle(self, u: Array, t: float) -> float:
         """Update anchors of slipped points; returns the work of friction."""
         return float(self._ask(SETTLE, u, t)) if self.anchored else 0.0
@@ -318,10 +344,10 @@ class Contacts:
     def potential(self, u: Array, t: float) -> float:
         """Penalty energy; zero for the augmented Lagrangian."""
         total = 0.0
-        for firmness, ((which, group), _, gap) in zip(self.firmness, self.look(u, t)):
+        for k, ((which, group), _, gap) in enumerate(self.look(u, t)):
             if self.obstacles[which].method == "augmented":
                 continue
-            width = group.numbers[WIDTH]
+            firmness, width = self.firmness[k], transition(self.pair(k))
             S = (np.maximum(-gap, 0.0) ** 3 - np.maximum(-gap - width, 0.0) ** 3) / (6.0 * width)
             total += (1.0 + firmness) * group.numbers[STIFFNESS] * float(group.areas @ S)
         return total

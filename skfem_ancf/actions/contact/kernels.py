@@ -21,7 +21,7 @@ from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_sl
 from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, BILATERAL,
                      DAMPED_TANGENT, DAMPING, END, FORCE, FRICTION, GAP, LARGEST, MULTIPLIER, NOW,
                      OFFSET, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING, STIFFNESS, TOLERANCE,
-                     WIDTH, hardening, pair_of)
+                     hardening, pair_of, transition)
 
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
@@ -38,7 +38,7 @@ NX, NY = FOUND + 1, FOUND + 2
 def of_contacts(tables, asked, u, v, out):
     """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     for k in range(tables.number):
-        _of_pair(pair_of(tables, k), asked, u, v, out)
+        of_pair(pair_of(tables, k), asked, u, v, out)
 
 
 @primitive("skfem_ancf.equations.loops")
@@ -48,7 +48,7 @@ def run_contacts(tables, asked, u, v, out):
 
 
 @source
-def _of_pair(pair, asked, u, v, out):
+def of_pair(pair, asked, u, v, out):
     """Add the answer of the active points of a pair."""
     what, same = asked.what, asked.span == 0.0
     if what == ALONG:
@@ -149,7 +149,7 @@ def way(w):
 @source
 def push(pair, at, w):
     """Force of the pressure, and its derivative."""
-    area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], pair.numbers[WIDTH]
+    area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], transition(pair)
     part = hardening(pair)
     stiffness, holds = pair.numbers[STIFFNESS] * part, pair.common[BILATERAL] / part
     for i in indices(at.size):
@@ -215,7 +215,7 @@ def add_friction(pair, same, at, w):
 def resist(pair, factor, at, w):
     """Damping force proportional to the pressure, and its derivative."""
     area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
-    stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), pair.numbers[WIDTH]
+    stiffness, width = pair.numbers[STIFFNESS] * hardening(pair), transition(pair)
     for i in indices(at.size):
         k, a, nx, ny = stiffness * area[at[i]], w[DEPTH, i], w[NX, i], w[NY, i]
         loss = damping_loss(pose, damping, nx, ny, w[PLACE, i], w[PLACE + 1, i], w[WAY, i],

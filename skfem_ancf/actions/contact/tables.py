@@ -133,6 +133,12 @@ def pair_of(tables, k):
 
 
 @source
+def transition(pair):
+    """Width of the transition; shorter in proportion if the obstacle is stiffened."""
+    return pair.numbers[WIDTH] / np.maximum(1.0, 1.0 + pair.common[LARGEST + pair.number + pair.k])
+
+
+@source
 def hardening(pair):
     """Factor on the given stiffness, from loads or time steps."""
     return (1.0 + pair.common[LARGEST + pair.number + pair.k]

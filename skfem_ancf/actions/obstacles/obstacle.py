@@ -14,7 +14,7 @@ from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, requ
                             shown, warn)
 from ...core.quadrature import gauss_lobatto
 from ...core.types import Array
-from ..contact.contacts import Contacts, Group
+from ..contact.contacts import FIRMER, Contacts, Group
 from ..contact.poses import carried, taken_back
 from ..forces.base import ForceElement, Part
 from ..places import Vector
@@ -229,7 +229,7 @@ class Obstacle(ForceElement):
         radius = np.hypot(*(places - places.mean(axis=2, keepdims=True))).ravel() + np.abs(offsets)
         E, density = _stiffest(beam.across, np.arange(mesh.nelements))
         k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
-        firmest = 1.0 if self.penalty or augmented else max(1.0, E / (h * k))
+        firmest = 1.0 if self.penalty or augmented else FIRMER * max(1.0, E / (h * k))
         numbers = np.array([k, self.width or WIDTH * h, self.friction, k, self.damping,
                             HARDER * density * h * augmented, radius.max(),
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
