@@ -436,8 +436,40 @@ def test_shapes_that_are_none_say_so(make, message):
     (Circle((0.5, 0.0), 0.4, hollow=True), "cuts the body"),
 ])
 def test_an_obstacle_that_cuts_the_body_at_the_start_is_refused(shape, message):
-    with pytest.raises(InputError, match=message):
-        Scene(beam()).obstacle(shape)
+    scene = Scene(beam()).clamp("left").obstacle(shape)
+    for solve in (scene.solve_static, lambda: scene.integrate(0.01, 0.01), lambda: scene.run(1.0),
+                  scene.continuation, lambda: scene.modes(1)):
+        with pytest.raises(InputError, match=message):
+            solve()
+
+
+def hooked(element):
+    """A clamped strip bent down around an obstacle that lies where it was straight, in two scenes."""
+    strip = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), element, StVenantKirchhoff(2e8, 0.3),
+                 width=0.02)
+    return (Scene(strip).clamp("left").point_force((0, -1.5), at=(1, 0)),
+            Scene(strip).clamp("left"))
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(3)])
+@pytest.mark.parametrize("shape", [Circle((0.9, 0.05), 0.1), Circle((0.9, 0.0), 0.003)])
+def test_an_obstacle_is_judged_at_the_start_of_an_assembly(element, shape):
+    """Let go under the obstacle, the strip rests against it, with the force of beam theory."""
+    bent, free = hooked(element)
+    start = bent.solve_static()
+    assert start.displacement((1, 0))[1] < -0.15
+    free.obstacle(shape)
+    with pytest.raises(InputError, match="cuts the body at the start"):
+        free.solve_static()
+    held = free.solve_static(start=start)
+    assert held.stability == "stable"
+    far, turn = shape.radius + 0.01, 0.0
+    for _ in range(20):  # the axis at the contact, turned by 3 w / (2 a) there
+        a, w = shape.center[0] - far * np.sin(turn), far * np.cos(turn) - shape.center[1]
+        turn = 1.5 * w / a
+    force = 3.0 * 2e8 * 0.02**4 / 12.0 * w / a**3
+    for state in (held, free.run(1.0, increments=2, start=start).state(-1)):
+        assert abs(np.hypot(*state.contact().total) / force - 1) < 0.02
 
 
 @pytest.mark.parametrize("f, message", [

@@ -94,6 +94,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         rest = np.zeros(system.N)
         displacement = u if u is not None else rest if start is None else start.u
         velocity = v if motion is None else motion.v
+        if motion is None:
+            system.forces.contacts.require_clear(displacement, t_start)
         run.begin(displacement, rest if velocity is None else velocity,
                   system.forces.contacts.of_state(start), None if motion is None else motion.turns)
         return run

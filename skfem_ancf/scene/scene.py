@@ -496,6 +496,7 @@ class Scene(Model):
             system = self.system
             system.constraints.require_supports()
             system.forces.contacts.require_path()
+            system.forces.contacts.require_clear(np.zeros(system.N), 0.0)
             critical = None if branch is None else critical_of(branch, system)
             try:
                 return Path(system, *continuation(
@@ -782,7 +783,9 @@ class Scene(Model):
         True
         """
         with self._lock:
-            state = self.state(load=0.0) if state is None else state
+            if state is None:
+                state = self.state(load=0.0)
+                self.system.forces.contacts.require_clear(np.array(state.u), 0.0)
             return eigen.modes(self.system, configuration(self.system, state), k)
 
     def buckling(self, k: int = 1, state: State | None = None) -> Buckling:

@@ -139,6 +139,8 @@ class Search:
         self._spent, self._unstabilised, self._unstable = 0, 0, False
         contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
+        if memory is None:
+            contacts.require_clear(np.zeros(system.N) if u is None else u, times[u is not None])
         memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
                                 memory)
         self.route = Route(np.zeros(system.N), times=times)

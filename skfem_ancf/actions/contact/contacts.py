@@ -11,15 +11,15 @@ import numpy as np
 
 from ...core.band import Band
 from ...core.callbacks import handle_of
-from ...core.errors import InputError
+from ...core.errors import InputError, shown
 from ...core.types import Array
 from .active_set import project
 from .crossing import CrossingGuard, middle_of
-from .gap import places
+from .gap import TINY, places
 from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts,
                       of_pair, push, resist, states, way)
 from .laws import mean_pressure, pressure_slope
-from .poses import taken_back
+from .poses import carried, taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
                      POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, ContactTables,
                      Pair, Question, pair_of, transition)
@@ -30,6 +30,12 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HE
 SUNK, FIRM = 0.5, 0.1
 #: Largest factor of hardening beyond that for deep penetration.
 FIRMER = 1e5
+#: Penetration of the reference configuration allowed, relative to the height, as meshes of curves
+#: are approximate.
+CUT = 1e-2
+#: Depth of an obstacle between the surface points of a body that counts as inside, relative to the
+#: height.
+HIDDEN = 0.25
 #: Relative change of the stiffness for derivatives.
 CHANGE = 1e-4
 #: Factor on the stiffness for difficult equilibria.
@@ -271,6 +277,33 @@ class Contacts:
 
     # restrictions of solvers
 
+    def require_clear(self, u: Array, t: float) -> None:
+        """Raise InputError if an obstacle cuts a body at the start.
+
+        ``u`` (N,) is the displacement there. Unless it is zero the start may be in contact, and is
+        refused from a penetration of its height on.
+        """
+        cut = 1.0 if np.any(u) else CUT
+        for (which, group), x, gap in self.look(u, t):
+            one, deepest = self.obstacles[which], int(np.argmin(gap))
+            if not gap[deepest] >= -cut * group.height:
+                place = (x[:, deepest] + self.origin).tolist()
+                raise InputError(
+                    f"{one!r} cuts the body at the start: the point {shown(place)} of its surface "
+                    f"is {-gap[deepest]:.4g} deep in it. Move the obstacle, or the body to where "
+                    "it is, or give a start= that is clear of it")
+            landmarks = self._landmarks(which, t)
+            inside = _inside(group, x, landmarks, cut * group.height)
+            if inside is not None:
+                place = (landmarks[:, inside] + self.origin).tolist()
+                raise InputError(f"{one!r} cuts the body at the start: its point {shown(place)} is "
+                                 "inside of it")
+
+    def _landmarks(self, which, t):
+        """Points of an obstacle that no beam may contain (2, k), relative to the origin."""
+        points = self.obstacles[which].shape.landmarks() - self.origin[:, None]
+        return carried(self.pose(which, t, False), points)
+
     def require_path(self) -> None:
         """Raise InputError if the obstacles do not allow arc-length continuation."""
         for one in self.obstacles:
@@ -382,7 +415,12 @@ class Contacts:
         if not self.obstacles:
             return None
         done, text = self.sweep.first(np.array([a[0], b[0]]), None, np.array([a[1], b[1]]))
-        return None if done else f"a body has passed through {text}"
+        if not done:
+            return f"a body has passed through {text}"
+        for (which, group), x, _ in self.look(*b):
+            if _inside(group, x, self._landmarks(which, b[1]), HIDDEN * group.height) is not None:
+                return f"{self.obstacles[which]!r} is inside of a body"
+        return None
 
     def sunk(self, u: Array, t: float) -> list[str]:
         """Text about bodies deep inside obstacles of default stiffness, or ""."""
@@ -398,3 +436,28 @@ class Contacts:
                     f"stiffness, {k:.3g}, is too small for this pressure. Give "
                     f"stiffness={firm:.2g}, with a penetration of a tenth of the height")
         return out
+
+
+def _inside(group, x, places, depth):
+    """The number of the first place (2, k) that is deeper than ``depth`` in a body, or None.
+
+    ``x`` (2, n) are the points of its surface.
+    """
+    m, half = group.points, group.points // 2
+    sides = x[:, :-2 * m].reshape(2, -1, 2, half)
+    loops = np.concatenate([sides[:, :, 0], sides[:, :, 1, ::-1]], axis=2)  # around each element
+    low, high = loops.min(axis=2), loops.max(axis=2)
+    for k, place in enumerate(places.T[:, :, None]):
+        near, = np.nonzero(np.all((low <= place) & (place <= high), axis=0))
+        a = loops[:, near] - place[..., None]
+        b = np.roll(a, -1, axis=2)
+        crosses = (a[1] > 0.0) != (b[1] > 0.0)
+        right = a[0] * (b[1] - a[1]) - a[1] * (b[0] - a[0])
+        odd = np.sum(crosses & ((right > 0.0) == (b[1] > a[1])), axis=1) % 2 == 1
+        way = b - a
+        s = np.clip(-np.sum(a * way, axis=0) / np.maximum(np.sum(way * way, axis=0), TINY), 0, 1)
+        far = np.hypot(*(a + s * way))
+        far[:, [half - 1, -1]] = np.inf  # between elements
+        if np.any(odd & (far.min(axis=1) > depth)):
+            return k
+    return None

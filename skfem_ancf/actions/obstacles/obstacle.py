@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ...beam.kinematics import locate
 from ...beam.kernels.section import beam_gradients
 from ...beam.layout import Layout, WhichBeam, select_beam
-from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
-                            require_integer, require_not_negative, require_option, require_positive,
-                            shown, warn)
+from ...core.errors import (InputError, ModelWarning, ask_array, require_function, require_integer,
+                            require_not_negative, require_option, require_positive, shown, warn)
 from ...core.quadrature import gauss_lobatto
 from ...core.types import Array
-from ..contact.contacts import FIRMER, Contacts, Group
+from ..contact.contacts import FIRMER, Group
 from ..contact.poses import carried, taken_back
 from ..forces.base import ForceElement, Part
 from ..places import Vector
@@ -26,8 +24,6 @@ METHODS = ("penalty", "augmented")
 SPREAD = 1.0 / 200.0
 #: Width of the transition from no pressure to proportional pressure, relative to the height.
 WIDTH = 1e-3
-#: Initial penetration allowed, relative to the height, as meshes of curves are approximate.
-CUT = 1e-2
 #: Tolerance of the augmented Lagrangian: penetration relative to the height.
 TOLERANCE = 1e-5
 #: Addition to the stiffness in a time step with the augmented Lagrangian, relative to the mass per
@@ -182,30 +178,7 @@ class Obstacle(ForceElement):
         places = np.concatenate([group.starts[:2] for group in groups], axis=1)
         self.shape = self.shape.fitted(places, height)
         self.groups = tuple(groups)
-        contacts = Contacts([self])
-        for _, x, gap in contacts.look(np.zeros(layout.N), 0.0):
-            deepest = int(np.argmin(gap))
-            place = x[:, deepest] + contacts.origin
-            if not gap[deepest] >= -CUT * height:
-                raise InputError(
-                    f"{self!r} cuts the body at the start: the point "
-                    f"{shown(place.tolist())} of its surface is {-gap[deepest]:.4g} "
-                    "deep in it. Move the obstacle, or the body to where it is")
-        self._require_outside(beams)
         return [Vector(np.zeros(2))]
-
-    def _require_outside(self, beams):
-        """Raise InputError if the surface of the shape is inside a beam."""
-        landmarks = carried(self.pose(0.0), self.shape.landmarks()).T
-        for beam in beams:
-            for at in landmarks:
-                try:
-                    Y = locate(beam, at)[1][1]
-                except MeshError:
-                    continue
-                if min(Y, 1.0 - Y) > CUT:
-                    raise InputError(f"{self!r} cuts the body at the start: its point "
-                                     f"{shown(at.tolist())} is inside of {beam!r}")
 
     def parts(self) -> list[Part]:
         return []
