@@ -265,7 +265,8 @@ def test_checks_of_a_uniform_stretch():
     checks = scene.solve_static().checks
     assert np.allclose([checks.smallest_det, checks.smallest_stretch, checks.largest_stretch],
                        [stretch, 1.0, stretch], rtol=0, atol=1e-8)
-    assert checks.turning < 1e-12 and checks.findings == ()
+    assert checks.turning < 1e-12
+    assert len(checks.findings) == 1 and "the strain is 0.2: Hooke's" in checks.findings[0]
     # a cable bent to a circle: fibres of 1 +- h kappa / 2, and sections that get thicker
     h, kappa, nu = 0.1, 2.0, 0.3
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), h), ElementBeamCable(5),
@@ -289,11 +290,41 @@ def test_fibres_compressed_beyond_the_law_are_said():
 
     svk = StVenantKirchhoff(E, 0.0)
     state, warned = quietly(cantilever(svk, 3.0))
-    assert state.checks.smallest_stretch > 0.65 and state.checks.findings == () and not warned
+    assert state.checks.smallest_stretch > 0.65 and not warned
+    assert not any("resists less" in text for text in state.checks.findings)
     state, warned = quietly(cantilever(svk, 4.2))
     assert state.checks.smallest_stretch < 1 / np.sqrt(3) and ModelWarning in warned
     assert "St. Venant-Kirchhoff resists less" in state.checks.findings[0]
     assert ModelWarning not in quietly(cantilever(NeoHookean(E, 0.0), 4.2))[1]
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(3)])
+def test_strains_outside_of_the_law_ask_for_the_units(element):
+    """Steel with E in MPa and lengths in m is a million times too soft."""
+    def pulled(E, force, law=StVenantKirchhoff):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.1), element, law(E, 0.3), width=0.1,
+                    name="tie")
+        return Scene(beam).clamp("left").point_force((force, 0.0), at=(1, 0)).solve_static()
+
+    steel = pulled(210e9, 1e5)
+    assert steel.checks.findings == () and "strain" not in str(steel)
+    yielding = pulled(210e9, 1.15e8)  # 5 %
+    assert len(yielding.checks.findings) == 1
+    assert "the strain of beam 'tie' is 0.05" in str(yielding) and "metals" in str(yielding)
+    mixed = pulled(210e3, 1e8)
+    for words in ("Are E and the lengths in the same units", "recovery failed"):
+        assert any(words in text for text in mixed.checks.findings) and words in str(mixed)
+    if element.order:
+        rubber = pulled(1e6, 6e3, NeoHookean)
+        assert rubber.checks.largest_stretch > 1.3 and rubber.checks.findings == ()
+        assert any("units" in text for text in pulled(1e3, 1e5, NeoHookean).checks.findings)
+
+
+def test_eigenstrains_are_not_strains_of_the_law():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), ElementBeamANCF(2),
+                StVenantKirchhoff(1e6, 0.0, thermal_expansion=1e-3), width=0.1)
+    state = Scene(beam).clamp("left", thickness="free").temperature(100.0).solve_static()
+    assert state.checks.largest_stretch > 1.05 and state.checks.findings == ()
 
 
 def test_a_mesh_too_coarse_for_the_curvature_is_said():

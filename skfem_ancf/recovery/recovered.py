@@ -40,7 +40,7 @@ from ..materials import LinearLaw
 from ..mesh.refinement import by_element
 from ..sections import Layer
 from ..sections.across import EDGE
-from .section_forces import ALONG, NotRecovered, SectionForces
+from .section_forces import ALONG, NotFound, NotRecovered, SectionForces
 from .segments import Segment
 
 #: Largest relative change of the strain in the last round, and strain that is round-off.
@@ -245,7 +245,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
             D = np.moveaxis(law.moduli(strain)[np.ix_(k, k)], (0, 1), (-2, -1))
             change = np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0]
             strain[k] += np.moveaxis(change, -1, 0)
-    raise NotRecovered("no strain has the stress of the section under this law")
+    raise NotFound("no strain has the stress of the section under this law")
 
 
 def _axial(law, strain):
@@ -260,7 +260,8 @@ def _axial(law, strain):
 class Recovery:
     """The recovered fields of one beam, a :class:`~.segments.Segment` between consecutive cuts.
 
-    ``why`` is the reason for section forces without fields, or "".
+    ``why`` is the reason for section forces without fields, or "", and ``failed`` is True if that is
+    an iteration which failed.
     """
 
     def __init__(self, forces: SectionForces, u: Array) -> None:
@@ -283,9 +284,11 @@ class Recovery:
                            and beam.element.carries_shear_parabola
                            and not isinstance(beam.formulation, EnhancedContinuum))
         self.segments: list[Segment] = []
+        self.failed = False
         try:
             self.segments = self._solved()
         except NotRecovered as why:
+            self.failed = isinstance(why, NotFound)
             self.why = self.why or str(why)
 
     def _solved(self):
@@ -293,8 +296,8 @@ class Recovery:
         strain = max(largest(segment.stretch - 1.0) for segment in found)
         change = max(segment.change for segment in found) / max(strain, TINY)
         if change > UNSETTLED:
-            raise NotRecovered("the iteration does not converge: the last change of the strain is "
-                               f"{change:.0%} of its largest value")
+            raise NotFound("the iteration does not converge: the last change of the strain is "
+                           f"{change:.0%} of its largest value")
         return found
 
     def _heights(self, e, xi):

@@ -39,6 +39,10 @@ class NotRecovered(AncfError):
     """Section forces or fields cannot be recovered; the message says why."""
 
 
+class NotFound(NotRecovered):
+    """An iteration of the recovery failed, mostly because of too large a strain."""
+
+
 class Sections:
     """Points ``eta`` across sections at ``xi`` (n,) of elements ``e`` (n,), with shape functions.
 

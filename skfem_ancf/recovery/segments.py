@@ -14,7 +14,7 @@ from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array
 from ..mesh.mapping import cross
 from ..sections.jumps import beside
-from .section_forces import NotRecovered, Sections
+from .section_forces import NotFound, Sections
 
 #: Rounds of steps 2 and 3, and their tolerance; largest number and tolerance if they converge
 #: slowly.
@@ -235,7 +235,7 @@ class Segment:
         self.rate = (self.d_ds(total[0][:, None])[:, 0]
                      - with_faces @ (intervals.top - intervals.bottom)) / total[1]
         if not np.all(np.isfinite(self.rate)):
-            raise NotRecovered(DIVERGED)
+            raise NotFound(DIVERGED)
         dt, dn = self.d_ds(self.rY)
         normal = (self.slope_from_axis(self.rY[1], dn)
                   + self.from_axis(self.rate[:, None] * self.rY[0]))
@@ -321,7 +321,7 @@ class Segment:
         self.strain = self._fibres(self.S / self.grade)[0] if self.rigid else (
             self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0))
         if not np.all(np.isfinite(self.strain)):
-            raise NotRecovered(DIVERGED)
+            raise NotFound(DIVERGED)
 
     # step 4
 

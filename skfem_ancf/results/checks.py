@@ -22,6 +22,9 @@ COMPRESSED = 1.0 / sqrt(3.0)
 #: in pure bending are then about 1 % of the length, and 1e-5.
 TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
 TURNING_SMOOTH = 2.5
+#: Largest strain of Hooke's law, where laws that agree for small strains differ by 5 % in stress;
+#: largest strain of any law that is not asked for its units.
+HOOKE, UNITS = 0.03, 10.0
 #: Largest rotation in linear theory, in radians, with an error of about 1 %.
 SMALL = 0.1
 TINY = 1e-300
@@ -69,9 +72,10 @@ def check(state: Any) -> Checks:
         ratio, stretches = kinematics.deformation(beam, state._places[state.system.of(beam)])
         values.append((np.min(ratio), np.min(stretches), np.max(stretches),
                        turning(beam, u, base)))
-        found += (_findings(beam, values[-1][1], values[-1][3]) if base is None else
+        found += (_findings(beam, values[-1][1], values[-1][3])
+                  + _strained(state, beam, *values[-1][1:3]) if base is None else
                   _linear_findings(beam, u, base))
-    found += pushed_points(state.system)
+    found += pushed_points(state.system) + state.not_recovered
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))
@@ -185,6 +189,18 @@ def _findings(beam, stretch, turn):
                    f"{turn:.3g} rad over one element, where {limit:g} is the limit: use more "
                    "elements there, or solve_static(adapt=...); in a Frame, elements=")
     return out
+
+
+def _strained(state, beam, low, high):
+    """Findings of strains outside of the law; eigenstrains are not the law's."""
+    strain, hooke = max(high - 1.0, 1.0 - low), beam.kernel.linear
+    if strain <= (HOOKE if hooke else UNITS) or state._eigenstrains(beam):
+        return []
+    who = "" if beam.name is None else f" of beam {beam.name!r}"
+    law = (f": Hooke's law, as in St. Venant-Kirchhoff, is meant for at most {HOOKE:g}, and metals "
+           "yield before; for rubber use NeoHookean" if hooke else "")
+    return [f"the strain{who} is {strain:.3g}{law}. Are E and the lengths in the same units, as Pa "
+            "and m, or MPa and mm?"]
 
 
 def _linear_findings(beam, u, base):

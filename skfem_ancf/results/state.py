@@ -28,7 +28,7 @@ from ..io import tables, vtu
 from ..recovery.fields import Values, find_field
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import Resultants, resultants
-from ..recovery.section_forces import NotRecovered
+from ..recovery.section_forces import NotFound, NotRecovered
 from ..visuals import diagrams, html, matplotlib, pyvista
 from .acting import recover, stations
 from .springs import SpringForces
@@ -377,6 +377,18 @@ class State(Immutable, MaterialPoints, SpringForces):
             self._recovery_of(k)
             out[k if beam.name is None else beam.name] = self._why(k)
         return out
+
+    @property
+    def not_recovered(self) -> list[str]:
+        """Findings about beams of an equilibrium whose recovery failed."""
+        if not self.converged or self.t is not None or self.base is not None:
+            return []
+        for k in range(len(self.beams)):
+            self._recovery_of(k)
+        return [f"strain and stress{'' if beam.name is None else f' of beam {beam.name!r}'} are "
+                f"those of the elements, recovery failed: {self._why(k)}"
+                for k, beam in enumerate(self.beams) if isinstance(self._recoveries[k], NotFound)
+                or getattr(self._recoveries[k], "failed", False)]
 
     @cached_property
     def _recoveries(self):

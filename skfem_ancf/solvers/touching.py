@@ -35,9 +35,9 @@ RELEASED = 0.1
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
 #: Smallest target of the penetration, relative to the height.
 LEAST = 1e-3
-#: Relative error of the answer above which an obstacle is too soft, and penetration relative to the
-#: height that counts as one of the displacement.
-YIELDS, NOTICED = 0.01, 1e-4
+#: Relative error of the answer above which an obstacle is too soft; largest extent of a stout body,
+#: relative to its height.
+YIELDS, STOUT = 0.01, 5.0
 #: Target of penetration, energy and error, relative to their limits.
 LEFT = 0.5
 #: Largest stiffening factor in one step.
@@ -90,23 +90,24 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
 def yielding(contacts: Contacts, u: Array, t: float, respond: Callable[..., Any]) -> Array:
     """The relative error of the answer by the penetration, shape (groups,), to first order.
 
-    For obstacles of default stiffness: that of their forces, and if they are touched end-on or
-    deeply that of the largest displacement. ``respond`` returns changes of displacements (N,) for
-    forces (N,), from the tangent, and a measure of displacements; None without a tangent.
+    For obstacles of default stiffness that the ends of a beam or a stout body touch: that of their
+    forces, or of the largest displacement. A slender beam yields more in bending. ``respond``
+    returns changes of displacements (N,) for forces (N,), from the tangent, and a measure of
+    displacements; None without a tangent.
     """
     out = np.zeros(len(contacts.groups))
     for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
         if group.firmest <= 1.0 or not np.any(gap < 0.0):
             continue
         force, change, work = contacts.stiffened(k, u, t)
+        slender = np.ptp(group.starts[:2], axis=1).max() > STOUT * group.height
+        if slender and 2.0 * work[-2 * group.points:].sum() < work.sum():
+            continue
         found = respond(force)
         if found is None:
             return 0.0 * out
         du, size = found
-        out[k] = (change.sum() - force @ du) / work.sum()
-        if (2.0 * work[-2 * group.points:].sum() > work.sum()
-                or gap.min() < -NOTICED * group.height):
-            out[k] = max(out[k], size(du) / size(u))
+        out[k] = max((change.sum() - force @ du) / work.sum(), size(du) / size(u))
     return out
 
 
