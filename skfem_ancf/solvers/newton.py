@@ -112,6 +112,9 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     if u is not None:
         u = require_finite("u", u, (system.N,))
     rules = Steps(method, tol, max_iterations, float(first_step), min_step)
+    if memory is None:
+        start = (np.zeros(system.N), 0.0) if u is None else (u, 1.0)
+        system.forces.contacts.require_clear(*start)
     with system.forces.contacts.lent():
         return Search(system, u, memory, rules, stable, progress).find()
 
@@ -139,8 +142,6 @@ class Search:
         self._spent, self._unstabilised, self._unstable = 0, 0, False
         contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
-        if memory is None:
-            contacts.require_clear(np.zeros(system.N) if u is None else u, times[u is not None])
         memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
                                 memory)
         self.route = Route(np.zeros(system.N), times=times)

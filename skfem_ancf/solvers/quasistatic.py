@@ -51,6 +51,8 @@ def first(system: System, t: float, u: Array | None, memory: Array | None, rules
     The residual at the displacement is reduced to zero in load steps; ``memory`` is the contact
     history there. A scene that only loads and obstacles stabilise may be at rest before they act.
     """
+    if memory is None:
+        system.forces.contacts.require_clear(np.zeros(system.N) if u is None else u, t)
     with system.stopped_at(t):
         search = Search(system, u, memory, rules, stable, False)
         if search.stabilised_by_loads:

@@ -281,11 +281,14 @@ class Contacts:
         """Raise InputError if an obstacle cuts a body at the start.
 
         ``u`` (N,) is the displacement there. Unless it is zero the start may be in contact, and is
-        refused from a penetration of its height on.
+        refused from a penetration of its height on; obstacles that move may push it.
         """
-        cut = 1.0 if np.any(u) else CUT
+        given = bool(np.any(u))
+        cut = 1.0 if given else CUT
         for (which, group), x, gap in self.look(u, t):
             one, deepest = self.obstacles[which], int(np.argmin(gap))
+            if given and one.moves:
+                continue
             if not gap[deepest] >= -cut * group.height:
                 place = (x[:, deepest] + self.origin).tolist()
                 raise InputError(
