@@ -444,9 +444,9 @@ def test_an_obstacle_that_cuts_the_body_at_the_start_is_refused(shape, message):
 
 
 def hooked(element):
-    """A clamped strip bent down around an obstacle that lies where it was straight, in two scenes."""
-    strip = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), element, StVenantKirchhoff(2e8, 0.3),
-                 width=0.02)
+    """A clamped strip, bent down and free, in two scenes."""
+    strip = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), element,
+                 StVenantKirchhoff(2e8, 0.3), width=0.02)
     return (Scene(strip).clamp("left").point_force((0, -1.5), at=(1, 0)),
             Scene(strip).clamp("left"))
 

@@ -11,7 +11,10 @@ elements = pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamAN
                                                ElementBeamCable(3)], ids=str)
 
 
-def bar(length, element=ElementBeamANCF(2), law=StVenantKirchhoff, turn=0.0):
+SECTIONS = ElementBeamANCF(2)
+
+
+def bar(length, element=SECTIONS, law=StVenantKirchhoff, turn=0.0):
     c, s = np.cos(turn), np.sin(turn)
     x = np.linspace(0.0, length, 5)
     mesh = MeshBeam.init_line(x, H) if turn == 0.0 else MeshBeam.from_points(

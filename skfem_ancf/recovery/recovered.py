@@ -260,8 +260,8 @@ def _axial(law, strain):
 class Recovery:
     """The recovered fields of one beam, a :class:`~.segments.Segment` between consecutive cuts.
 
-    ``why`` is the reason for section forces without fields, or "", and ``failed`` is True if that is
-    an iteration which failed.
+    ``why`` is the reason for section forces without fields, or "", and ``failed`` is True if an
+    iteration failed.
     """
 
     def __init__(self, forces: SectionForces, u: Array) -> None:

@@ -134,12 +134,14 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -
 
 def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
-                   respond: Callable[..., Any], failed: type[Exception], close: bool = False) -> Any:
+                   respond: Callable[..., Any], failed: type[Exception],
+                   close: bool = False) -> Any:
     """An equilibrium in contact at the time t, from a displacement and its time.
 
     Obstacles have the contact history at the start of the load step. ``solve`` takes the last
     equilibrium (None for the start), whether a rough one suffices, and the number of iterations; it
-    raises ``failed``. ``respond`` is that of :func:`yielding` at an equilibrium. If the start is ``close`` to the equilibrium, few iterations are tried.
+    raises ``failed``. ``respond`` is that of :func:`yielding` at an equilibrium. If the start
+    is ``close`` to the equilibrium, few iterations are tried.
     """
     before = contacts.tables.memory.copy()
     climb = _Climb(contacts, start, t, solve, energy, respond, failed)

@@ -246,7 +246,7 @@ class Contacts:
         Those of the force on the degrees of freedom (N,); then by point the derivative, and the
         force, times the penetration, (n,).
         """
-        (which, group), _, gap = self.look(u, t)[k]
+        (_, group), _, gap = self.look(u, t)[k]
         memory, pair, firm = self.tables.memory, self.pair(k), 1.0 + self.firmness[k]
         width, a = transition(pair), np.maximum(-gap, 0.0)
         push = firm * group.numbers[STIFFNESS] * group.areas * a
