@@ -75,7 +75,7 @@ def check(state: Any) -> Checks:
         found += (_findings(beam, values[-1][1], values[-1][3])
                   + _strained(state, beam, *values[-1][1:3]) if base is None else
                   _linear_findings(beam, u, base))
-    found += pushed_points(state.system) + state.not_recovered
+    found += pushed_points(state.system) + state._not_recovered
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))

@@ -379,7 +379,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         return out
 
     @property
-    def not_recovered(self) -> list[str]:
+    def _not_recovered(self) -> list[str]:
         """Findings about beams of an equilibrium whose recovery failed."""
         if not self.converged or self.t is not None or self.base is not None:
             return []
