@@ -2,8 +2,9 @@
 
 Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each
 column; L D L^T factors replace it. In two halves (``top`` < 0): each column of the lower half, then
-that of the transpose; L D R^T factors replace it. Otherwise entry (i, j) is at ``j * ld + top + i -
-j``, the storage of LAPACK's ``gbtrf``, whose factors replace it.
+that of the transpose; L D R^T factors of compiled code replace it, or the pivoted ones of LAPACK's
+``gbtrf``. Otherwise entry (i, j) is at ``j * ld + top + i - j``, the storage of ``gbtrf``, whose
+factors replace it.
 """
 
 from __future__ import annotations
@@ -43,10 +44,19 @@ def as_lapack(A: Band) -> Array:
     return ab if A.top > 0 else ab[:A.width + 1]
 
 
-def _transposed(A):
-    """:func:`as_lapack` of the transpose, for a matrix without pivoting."""
-    first = A.ld // 2 if A.top < 0 else 0
-    return A.flat.reshape(-1, A.ld).T[first:first + A.width + 1]
+def _pivoted(A):
+    """Storage of ``gbtrf``, in which NumPy's factors of two halves are left."""
+    return A.flat.reshape(-1, A.ld).T[:3 * A.width + 1]
+
+
+def _whole(A):
+    """A matrix of two halves in the storage of ``gbtrf``."""
+    n, w = len(A.flat) // A.ld, A.width
+    columns, out = A.flat.reshape(n, A.ld), np.zeros((3 * w + 1, n))
+    out[2 * w:] = columns[:, :w + 1].T
+    for k in range(1, min(w + 1, n)):
+        out[2 * w - k, k:] = columns[:n - k, A.ld // 2 + k]
+    return out
 
 
 @primitive("skfem_ancf.core.loops")
@@ -78,13 +88,11 @@ def factorize(A):
     Only LAPACK's storage is pivoted. An indefinite symmetric matrix has L D L^T factors unless a
     leading submatrix is singular.
     """
+    if A.top != 0:
+        ab, whole = (_pivoted(A), _whole(A)) if A.top < 0 else 2 * (as_lapack(A),)
+        ab[:], A.pivots[:], info = lapack.dgbtrf(whole, A.width, A.width)
+        return bool(info == 0 and np.all(np.isfinite(ab[2 * A.width])))
     ab = as_lapack(A)
-    if A.top < 0:
-        return _eliminate(A)
-    if A.top > 0:
-        lu, A.pivots[:], info = lapack.dgbtrf(ab, A.width, A.width)
-        ab[:] = lu
-        return bool(info == 0 and np.all(np.isfinite(lu[A.top])))
     c, info = lapack.dpbtrf(ab, lower=1)
     if info != 0:
         return _eliminate(A)
@@ -94,41 +102,33 @@ def factorize(A):
 
 
 def _eliminate(A):
-    """L D L^T, or L D R^T of two halves.
+    """L D L^T of an indefinite symmetric matrix.
 
     Entries of a row are ld - 1 apart, so that the next columns form a strided square, whose upper
     triangle belongs to other entries.
     """
-    columns, rows = (x.T for x in (as_lapack(A), _transposed(A)))
+    columns = as_lapack(A).T
     n, stride = len(columns), columns.itemsize
     lower = np.tri(min(A.width, n - 1)).T  # rows are columns
-    both = ((columns, rows), (rows, columns))[:1 if A.top == 0 else 2]
     for j in range(n):
         m, d = min(A.width, n - 1 - j), columns[j, 0]
         if not abs(d) > 0.0:
             return False
         if m:
-            diagonal = columns[j + 1:j + 1 + m, 0]
+            diagonal, below = columns[j + 1:j + 1 + m, 0], columns[j, 1:m + 1]
             before = np.abs(diagonal)
-            for x, y in both:
-                left = as_strided(x[j + 1:], (m, m), (stride * (A.ld - 1), stride))
-                left -= lower[:m, :m] * (y[j, 1:m + 1] / d)[:, None] * x[j, 1:m + 1]
+            left = as_strided(columns[j + 1:], (m, m), (stride * (A.ld - 1), stride))
+            left -= lower[:m, :m] * (below / d)[:, None] * below
             if (np.abs(diagonal) < LOST * before).any():
                 return False
-            for x, _ in both:
-                x[j, 1:m + 1] /= d
+            below /= d
     return bool(np.all(np.isfinite(columns[:, 0])))
 
 
 @primitive("skfem_ancf.core.loops")
 def solve(A, x):
     """Solve in place with the factors; x is (n,)."""
-    ab = as_lapack(A)
-    if A.top > 0:
-        x[:] = lapack.dgbtrs(ab, A.width, A.width, x, A.pivots)[0]
-        return
-    y = lapack.dtbtrs(ab, x, uplo="L", diag="U")[0].ravel() / ab[0]
-    x[:] = lapack.dtbtrs(_transposed(A), y, uplo="L", trans="T", diag="U")[0].ravel()
+    solve_many(A, x[None], x[None])
 
 
 @primitive("skfem_ancf.core.loops")
@@ -203,12 +203,14 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
 
 def solve_many(A: Band, B: Array, X: Array) -> None:
     """X[k] = A^-1 B[k] for all k, with factors of A; B and X are (m, N)."""
-    ab = as_lapack(A)
-    if A.top > 0:
+    if A.top > 0 or A.pivots[-1:].any():
+        ab = _pivoted(A) if A.top < 0 else as_lapack(A)
         X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T
         return
+    ab, first = as_lapack(A), A.ld // 2 if A.top < 0 else 0
+    rows = A.flat.reshape(-1, A.ld).T[first:first + A.width + 1]
     y = lapack.dtbtrs(ab, B.T, uplo="L", diag="U")[0] / ab[0][:, None]
-    X[:] = lapack.dtbtrs(_transposed(A), y, uplo="L", trans="T", diag="U")[0].T
+    X[:] = lapack.dtbtrs(rows, y, uplo="L", trans="T", diag="U")[0].T
 
 
 @primitive("skfem_ancf.core.loops")
@@ -296,24 +298,19 @@ def fix(A, fixed):
     fix_stored(A.flat, A.ld, A.width, A.top, fixed)
 
 
-@source
+@primitive("skfem_ancf.core.loops")
 def fix_stored(flat, ld, width, top, fixed):
     """:func:`fix` for stored entries."""
-    n, step = flat.size // ld, max(1, ld - 1)
-    for i in fixed:
-        at = i * ld + max(top, 0)
-        for k in indices(i * ld, (i + 1) * ld):
-            flat[k] = 0.0
-        for k in indices(at - step * min(width, i), at, step):
-            flat[k] = 0.0
-        if top > 0:
-            for k in indices(at + step, at + step * min(width, n - 1 - i) + 1, step):
-                flat[k] = 0.0
-        if top < 0:
-            back = at + ld // 2
-            for k in indices(back - step * min(width, i), back, step):
-                flat[k] = 0.0
-        flat[at] = 1.0
+    n, k = flat.size // ld, np.arange(1, width + 1)
+    at, back = fixed[:, None] * ld + max(top, 0), k * (ld - 1)
+    before, after = k <= fixed[:, None], k < n - fixed[:, None]
+    flat.reshape(n, ld)[fixed] = 0.0
+    flat[(at - back)[before]] = 0.0
+    if top > 0:
+        flat[(at + back)[after]] = 0.0
+    if top < 0:
+        flat[(at + ld // 2 - back)[before]] = 0.0
+    flat[at] = 1.0
 
 
 @source

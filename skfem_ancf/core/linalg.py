@@ -46,8 +46,8 @@ class Inertia(NamedTuple):
 
 def halves(n: int, bandwidth: int) -> Band:
     """A zero unsymmetric :class:`~skfem_ancf.core.band.Band` of n rows, stored in two halves."""
-    ld = 2 * (bandwidth + 1 + SPARE)
-    return Band(np.zeros(n * ld), np.zeros(0, np.int64), ld, bandwidth, HALVES)
+    ld = 2 * max(bandwidth + 1 + SPARE, (3 * bandwidth + 2) // 2)  # space for gbtrf too
+    return Band(np.zeros(n * ld), np.zeros(n, np.int64), ld, bandwidth, HALVES)
 
 
 def beside_zero(negative: Callable[[float], int]) -> Inertia:

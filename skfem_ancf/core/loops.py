@@ -515,3 +515,20 @@ def log1p(x):
 
 def everywhere(condition):
     return condition
+
+
+def fix_stored(flat, ld, width, top, fixed):
+    n, step = flat.size // ld, max(1, ld - 1)
+    for i in fixed:
+        at = i * ld + max(top, 0)
+        flat[i * ld:(i + 1) * ld] = 0.0
+        for k in range(at - step * min(width, i), at, step):
+            flat[k] = 0.0
+        if top > 0:
+            for k in range(at + step, at + step * min(width, n - 1 - i) + 1, step):
+                flat[k] = 0.0
+        if top < 0:
+            back = at + ld // 2
+            for k in range(back - step * min(width, i), back, step):
+                flat[k] = 0.0
+        flat[at] = 1.0

@@ -231,9 +231,13 @@ class Integrator:
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
+        call = self._backend.of(function, OF_STEP * len(rows))
+        pivots = self._matrices.U.pivots
+        if pivots.any() and not getattr(call, "plain", False):  # compiled code has none
+            pivots[:], state.factors[0] = 0, 0
         try:
             with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
-                done = self._backend.of(function, OF_STEP * len(rows))(self._matrices, *args)
+                done = call(self._matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may continue from y
             self._load_state(before)
             self.forget()

@@ -189,6 +189,7 @@ class Backend:
             with np.errstate(all="ignore"):  # overflow shows in the residual
                 return kernel(self.tables.plain, *args)
 
+        run.plain = True
         return run
 
     def _load(self, kernel, args):

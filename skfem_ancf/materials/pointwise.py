@@ -68,19 +68,20 @@ class PointwiseMaterial(Material):
         return found.reshape((3, 3) + found.shape[1:])
 
     def evaluated(self, strain: Array, number: int) -> Array:
-        """Energy, stress or moduli, shape (number, ...).
+        """Energy, stress or moduli, or stress and moduli, shape (number, ...).
 
         Parameters
         ----------
         strain
             Shape (3, ...).
         number
-            1 (energy), 3 (stress) or 9 (moduli, row by row).
+            1 (energy), 3 (stress), 9 (moduli, row by row) or 12 (stress, then moduli).
         """
         strain = np.asarray(strain)
         strain = strain.astype(np.result_type(strain, float), copy=False)
         energy, stress, moduli = getattr(self.point, "py_func", self.point)(self.constants, *strain)
-        found = [energy] if number == 1 else stress if number == 3 else [moduli[k] for k in MODULI]
+        found = [energy] if number == 1 else [*stress, *(moduli[k] for k in MODULI)]
+        found = found[3:] if number == 9 else found[:number]
         out = np.empty((number, *strain.shape[1:]), strain.dtype)
         for k, x in enumerate(found):
             out[k] = x

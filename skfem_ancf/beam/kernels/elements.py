@@ -233,6 +233,16 @@ class Elements:
         M[np.arange(len(s)), 3 * c[s] + c[z]] = A[c[s], :, s] * A[c[z], :, z]
         return sparse.csr_matrix(M.reshape(len(s), -1))
 
+    def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
+        """Weighted stresses (ns, ne), and moduli (nq, ne) between samples."""
+        if self.t.law.kind == LINEAR:
+            return self.linear_stress(strain), self.moduli
+        both = np.empty((12, len(self.t.along) // 3, self.ne))
+        law_evaluate(self.t.law, self.at_points(strain), both)
+        both *= self.weights
+        return (self.t.along.T @ both[:3].reshape(-1, self.ne),
+                self._to_moduli @ both[3:].reshape(-1, self.ne))
+
     def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
         """Moduli (nq, ne) between samples, or their change by a shift as in :meth:`stress`."""
         if self.t.law.kind == LINEAR:

@@ -31,8 +31,11 @@ class LawTables(NamedTuple):
 
 @primitive("skfem_ancf.equations.loops")
 def custom_evaluate(handle, strain, out):
-    """Stress (3, n, elements), moduli (9, ...) or energy (1, ...) of a law in Python."""
+    """Stress (3, n, elements), moduli (9, ...), both (12, ...) or energy (1, ...) in Python."""
     law = _LAWS[handle]
+    if len(out) == 12:
+        out[:3], out[3:] = law.stress(strain), np.reshape(law.moduli(strain), out[3:].shape)
+        return
     found = {1: law.energy, 3: law.stress, 9: law.moduli}[len(out)](strain)
     out[...] = np.reshape(found, out.shape)
 
@@ -53,7 +56,8 @@ def law_evaluate(law, strain, out):
     """Second Piola-Kirchhoff stress, moduli or energy per volume of a nonlinear law.
 
     ``strain`` is (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements). The shape of ``out`` selects
-    the result: (3, n, elements) stress, (9, ...) moduli (c, d) at 3 c + d, (1, ...) energy.
+    the result: (3, n, elements) stress, (9, ...) moduli (c, d) at 3 c + d, (12, ...) both in NumPy,
+    (1, ...) energy.
     """
     n, size = strain.shape[1], strain.shape[2]
     x = np.empty(strain.shape, strain.dtype)
@@ -66,9 +70,13 @@ def law_evaluate(law, strain, out):
         evaluate_points(law, x, out)
     else:
         custom_evaluate(law.handle, x, out)
+    stresses = 3 if len(out) == 3 or len(out) == 12 else 0
     for k in range(len(out)):
-        y = 1.0 if len(out) == 1 else law.scale[k // (len(out) // 3)]
-        y *= law.scale[k % 3] if len(out) == 9 else 1.0
+        y = 1.0
+        if k < stresses:
+            y = law.scale[k]
+        elif len(out) > 1:
+            y = law.scale[(k - stresses) // 3] * law.scale[k % 3]
         for p in indices(n):
             for e in indices(size):
                 out[k, p, e] *= y

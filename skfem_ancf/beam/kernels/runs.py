@@ -108,13 +108,12 @@ def run_tangent(e, u, given, out, f, flat, ld):
     """
     U, d, one = e.at(u)
     Y, strain = e.directions(one, one), e.strain(d, one)
-    if f.size or out.size or not given.size:
-        T = e.stress(strain)
+    T, moduli = e.stress_and_moduli(strain)
     if f.size:
         e.add(e.force(Y, T, U), f)
     if out.size:
         _put(e, T, out)
-    K = e.tangent(one, Y, _given(e, given) if given.size else T, e.moduli_at(strain))
+    K = e.tangent(one, Y, _given(e, given) if given.size else T, moduli)
     if e.constant is not None:
         K += e.constant
     e.add_to_band(K, flat, ld)
