@@ -1,6 +1,8 @@
 """Fixtures: every element of the registry, and meshes of every kind."""
 
+import doctest
 import os
+from importlib.util import find_spec
 
 # compiled from the first call on: what a test does must not depend on the time that others took
 os.environ.setdefault("SKFEM_ANCF_COMPILED", "1")
@@ -37,6 +39,38 @@ def pytest_collection_modifyitems(config, items):
         some = [x for x in items if isinstance(x, pytest.DoctestItem)]
         config.hook.pytest_deselected(items=some)
         items[:] = [x for x in items if x not in some]
+
+
+def _skip_without_extra(error):
+    """Skip the test if an error says that an extra is missing, and it is."""
+    if isinstance(error, doctest.UnexpectedException):
+        error = error.exc_info[1]
+    if isinstance(error, ImportError):
+        missing = getattr(error, "module", error.name)
+        if missing and find_spec(_IMPORTED.get(missing, missing.partition(".")[0])) is None:
+            pytest.skip(f"{missing} is not installed")
+
+
+#: Names of modules, where they are not those of the packages.
+_IMPORTED = {"pillow": "PIL"}
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item):
+    try:
+        return (yield)
+    except Exception as error:
+        _skip_without_extra(error)
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    try:
+        return (yield)
+    except Exception as error:
+        _skip_without_extra(error)
+        raise
 
 
 def quarter_arc(n=3, height=0.3, radius=1.0):

@@ -185,6 +185,11 @@ class _Factors:
         return self._shake(self._factors.solve(*args, **options))
 
 
+def alike(a, b):
+    """True if two counts of iterations or factorisations differ by a factor of three at most."""
+    return max(a, b) <= 3 * max(min(a, b), 1)
+
+
 if __name__ == "__main__":
     install(int(sys.argv[1]))
     from skfem_ancf.equations.compile import compile_all

@@ -397,7 +397,7 @@ def test_a_body_that_is_held_by_all_of_its_coordinates():
     body = RigidBody(mass=2.0, inertia=0.5)
     scene = Scene(body).clamp(body).gravity((0, -G))
     state = scene.solve_static()
-    assert state.iterations <= 1 and state.stability == "stable"
+    assert state.iterations <= 3 and state.stability == "stable"
     assert_allclose(state.reactions(None, body).force, (0.0, 2.0 * G))
     with pytest.raises(InputError, match="no modes: supports and joints fix all"):
         scene.modes(1)

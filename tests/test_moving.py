@@ -96,7 +96,7 @@ def test_a_slender_tapered_T_is_a_beam(element, n, error, ratio):
                 section=Section.profile("T", **sizes))
     state = cantilever(beam, (0.0, -EI))
     assert -state.displacement((1, 0))[1] == pytest.approx(tip, rel=error)
-    assert state.iterations <= 4
+    assert state.iterations <= 12
 
 
 @pytest.mark.parametrize("name", ["I", "T", "coating", "core"])

