@@ -18,9 +18,12 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse.linalg
 
-#: Modules of NumPy and of compiled code; function in both; what is changed before and after it.
+#: Modules of NumPy and of compiled code; function or method; what is changed before and after it.
 SEAMS = [
     # rows, forces and tangents of elements
+    ("beam.kernels.elements", None, "Elements.rows", [], ["out"]),
+    ("beam.kernels.elements", None, "Elements.add", ["F"], []),
+    ("beam.kernels.elements", None, "Elements.add_to_band", ["K"], []),
     (None, "beam.kernels.blocks", "to_rows", [], ["d"]),
     (None, "beam.kernels.blocks", "add_to_nodes", ["F"], []),
     (None, "beam.kernels.tangents", "add_to_band", ["K", "Z"], []),
@@ -131,10 +134,12 @@ def _shaken(shake, before, after):
 
 
 def _replace(module, name, make):
-    """Replace a name of a module of the package, wherever it has been imported."""
+    """Replace a name of a module of the package, wherever it has been imported, or a method."""
     from skfem_ancf.core.source import MARKED
 
     home = import_module(f"skfem_ancf.{module}")
+    owner, _, name = name.rpartition(".")
+    home = getattr(home, owner) if owner else home
     before = getattr(home, name)
     after = make(before)
     if callable(before):
