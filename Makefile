@@ -59,14 +59,15 @@ test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 SEEDS := 1 2 3
 QUIET := bad_arguments basis bench docstrings elements forms io items mapping mesh mutation near_misses \
   package paper prose pyvista readme reference rooms search typing verification visuals
+# without Numba ten minutes
+LONG := stepsize sweep
 
 test-noise: $(VENV)/test.stamp
 	set -e; for seed in $(SEEDS); do \
 	  $(PY) tests/noise.py $$seed; \
-	  for compiled in 1 0; do \
-	    SKFEM_ANCF_COMPILED=$$compiled $(PY) -m pytest -n 2 --noise $$seed $(ARGS) tests \
-	      $(QUIET:%=--ignore=tests/test_%.py); \
-	  done; \
+	  $(PY) -m pytest -n 2 --noise $$seed $(ARGS) tests $(QUIET:%=--ignore=tests/test_%.py); \
+	  SKFEM_ANCF_COMPILED=0 $(PY) -m pytest -n 2 --noise $$seed $(ARGS) tests \
+	    $(QUIET:%=--ignore=tests/test_%.py) $(LONG:%=--ignore=tests/test_%.py); \
 	done
 
 margins: $(VENV)/test.stamp
