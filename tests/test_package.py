@@ -160,7 +160,7 @@ def test_workflows_call_targets_of_the_makefile():
         for job in read_yaml(file.relative_to(ROOT))["jobs"].values():
             for step in job["steps"]:
                 called |= set(re.findall(r"make ([\w-]+)", step.get("run", "")))
-    assert called == {"test", "test-settings", "test-least", "lint", "docs", "dist"}
+    assert called == {"test", "test-settings", "test-noise", "test-least", "lint", "docs", "dist"}
     assert all(f"\n{target}:" in makefile for target in called)
     tested = read_yaml(".github/workflows/tests.yml")["jobs"]["test"]["strategy"]["matrix"]
     assert tested["python"] == ["3.10", "3.11", "3.12", "3.13", "3.14"]
