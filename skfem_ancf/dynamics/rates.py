@@ -62,7 +62,10 @@ def acceleration_of_joints(joints, motion, t, dt, u, v, out):
 
 @source
 def _add_differences(joints, t, dt, u, v, first, second, along, out):
-    """Custom joints: out += first Phi' + second Phi'' + along (J v)', by differences."""
+    """Custom joints: out += first Phi' + second Phi'' + along (J v)', by differences.
+
+    Joints that do not move have none.
+    """
     values = np.empty(out.size)
     for part in range(PARTS + 1):
         time = t - part * dt / PARTS
@@ -71,6 +74,6 @@ def _add_differences(joints, t, dt, u, v, first, second, along, out):
             if c != 0.0:
                 for i in indices(out.size):
                     values[i] = 0.0
-                custom_joints(joints.custom, k, time, u, v, values)
+                custom_joints(joints.custom, 7 + k, time, u, v, values)
                 for i in indices(out.size):
                     out[i] += c * values[i]

@@ -212,6 +212,18 @@ class Constraints:
         return (self._offset(t) + np.bincount(rows, values * u[columns], self.m)
                 + 0.5 * np.bincount(k, v * u[i] * u[j], self.m))
 
+    def add_moving(self, slopes: bool, u: Array, v: Array, t: float, out: Array) -> None:
+        """Add Phi, or with ``slopes`` J v, of joints that depend on time to ``out`` (m,)."""
+        first = 0
+        for joint in self.joints:
+            part = out[first:first + len(joint.equations)]
+            first += len(part)
+            if joint.moving and slopes:
+                rows, columns, values = joint.entries(u, t)
+                part += np.bincount(rows, values * v[columns], len(part))
+            elif joint.moving:
+                part += joint.value(u, t)
+
     @cached_property
     def seconds(self) -> tuple[Array, ...]:
         """Second derivatives of Phi in the reference configuration: equation, i, j, value."""

@@ -59,7 +59,8 @@ class UserDefined:
 
         ``what`` is 0: Phi, 1: J v, 2: J^T v with v (m,), 3: J, 4: v^T Phi'' v. For the
         energy-momentum scheme, 5: the discrete gradient from v to u, 6: the force of impulses, with
-        u at the end of the step and v = (v0, v1, u0, impulses).
+        u at the end of the step and v = (v0, v1, u0, impulses). 7 and 8 are 0 and 1 of the joints
+        that depend on time, with zeros for the others.
         """
         c, N = self._system.constraints, self._system.N
         if what == 0:
@@ -74,6 +75,8 @@ class UserDefined:
             out += c.quadratic(u, t, v)
         elif what == 5:
             out += c.mean_jacobian(v, u, t).ravel()
+        elif what >= 7:
+            c.add_moving(what == 8, u, v, t, out)
         else:
             v0, v1, u0 = v[:3 * N].reshape(3, N)
             out += c.mean_turning(u0, u, v0, v1, t, v[3 * N:])
