@@ -66,6 +66,22 @@ def test_forces_inside_elements(element, L, places):
     assert_allclose(found.N, 0, atol=1e-9 * np.abs(Q).max())
 
 
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(2),
+                                     ElementBeamANCFCubic(2), ElementBeamCable(3),
+                                     ElementBeamCable(5)], ids=repr)
+def test_a_moment_inside_an_element(element):
+    """A torsional spring there: M jumps by its moment, and Q does not."""
+    F, a, x = 1e3, 0.37, np.array([0.1, 0.255, 0.3, 0.36, 0.369, 0.371, 0.374, 0.376, 0.6])
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.1)
+    scene = Scene(Beam(mesh, element, STEEL, width=0.1)).clamp("left")
+    scene.torsional_spring(1e6, (a, 0)).point_force((0, -F), at=(1, 0))
+    for state, exact in ((scene.solve_linear(), 1e-9), (scene.solve_static(), 1e-5)):
+        found, moment = state.resultants([(s, 0) for s in x]), state.spring_force()
+        assert found.recovered and abs(moment) > 50.0
+        assert_allclose(found.M, -F * (1 - x) - moment * (x < a), atol=exact * F)
+        assert_allclose(found.Q, -F, rtol=exact)
+
+
 @pytest.mark.parametrize("recover", [True, False])
 def test_strain_and_stress_of_a_cantilever_are_those_of_bending(recover):
     """sigma = M y / I, eps_yy = - nu eps_xx, whatever the load; no normal force."""

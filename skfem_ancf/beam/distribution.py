@@ -16,13 +16,16 @@ from ..elements.base import ElementBeam
 from ..mesh.mesh_beam import MeshBeam
 from ..sections.jumps import jumps
 from .beam import Beam
-from .kinematics import probe_reference
+from .kinematics import direction_weights, probe_reference
 
 #: Points closer to a node than this fraction of an element are at the node.
 SNAP = 1e-5
 
 #: Tolerance of a shape function of ``r``, which is flat at the nodes.
 FLAT = 1e-11
+
+#: Number of sections at which the search for one by its direction begins.
+TRIES = 33
 
 
 #: Where a :class:`Sampled` density acts; the first two are numbers of faces.
@@ -149,7 +152,12 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
     if len(loaded) == 2 and np.any(beam.mesh.t[0] == loaded[0]) and loaded[1] == loaded[0] + 1:
         a, b = rows[loaded, :2]
         total = a + b
-        if total @ total > 0:
+        if total @ total <= FLAT * np.max(rows[loaded] ** 2):
+            xi = _where_turned(beam, int(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]),
+                               rows[loaded])
+            if xi is not None:
+                return (float(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]) + xi,)
+        elif total @ total > 0:
             value = float(b @ total / (total @ total))
             xi = _where(beam.element, value)
             if xi is not None:
@@ -157,6 +165,23 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
     if np.any(np.diff(loaded) == 1):
         return None
     return tuple(station_of_node(beam.mesh, int(k)) for k in loaded)
+
+
+def _where_turned(beam: Beam, e: int, rows: Array) -> float | None:
+    """The section of element e with a direction of these weights (2, nd), in both components."""
+    parts = rows.reshape(2, -1, 2)
+    v = parts[..., np.argmax(np.sum(parts**2, axis=(0, 1)))].ravel()
+
+    def gap(xi: float) -> float:
+        w = direction_weights(beam, e, xi)
+        return float(1.0 - (v @ w) ** 2 / ((v @ v) * (w @ w)))
+
+    tries = np.linspace(0.0, 1.0, TRIES)
+    best = tries[int(np.argmin([gap(x) for x in tries]))]
+    found = scipy.optimize.minimize_scalar(
+        gap, bounds=(max(best - 1.0 / TRIES, 0.0), min(best + 1.0 / TRIES, 1.0)), method="bounded",
+        options={"xatol": 1e-10})
+    return float(found.x) if found.fun < FLAT else None
 
 
 def _where(element: ElementBeam, value: float) -> float | None:
