@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 class Item(Immutable):
     """Base class of loads, supports, joints, force elements and user-defined items.
 
-    An item is described without a mesh. :meth:`skfem_ancf.Scene.add` stores a copy and binds
-    another to the degrees of freedom (DOFs) of the scene, again for every other mesh, as in
-    ``solve_static(adapt=...)``. A user-defined class defines some of
+    An item is described without a mesh. :meth:`skfem_ancf.Scene.add` binds a copy to the degrees of
+    freedom (DOFs) of the scene, again for every other mesh, as in ``solve_static(adapt=...)``. A
+    user-defined class defines some of
 
     * ``energy(u, t)``: potential energy, a number,
     * ``force(u, v, t)``: force on the DOFs, shape (N,); by default minus the gradient of the

@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -338,13 +339,21 @@ def _real_array(name, value):
     raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
 
 
+_PLAIN = {int, float, str, bool, np.float64, np.int64, type(None)}
+
+
 def is_masked(value: object) -> bool:
     """True for an array with masked values, or a list or dict with one."""
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
     if isinstance(value, dict):
         value = tuple(value.values())
-    return isinstance(value, (list, tuple)) and any(map(is_masked, value))
+    if not isinstance(value, (list, tuple)):
+        return False
+    kinds = set(map(type, value))
+    if kinds <= {list, tuple}:  # all levels at once
+        return bool(kinds) and is_masked([*chain.from_iterable(value)])
+    return not kinds <= _PLAIN and any(map(is_masked, value))
 
 
 def require_unmasked(name: str, value: Any) -> None:

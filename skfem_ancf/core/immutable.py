@@ -26,6 +26,12 @@ def read_only(value: T) -> T:
 class _Freezing(type):
     """Freezes an object after the constructor, also of a user's subclass."""
 
+    def __init__(cls, *arguments):
+        super().__init__(*arguments)
+        #: names of cached properties
+        cls._derived = {name for one in cls.__mro__ for name, value in vars(one).items()
+                        if isinstance(value, cached_property)}
+
     def __call__(cls, *args, **kwargs):
         try:
             made = super().__call__(*args, **kwargs)
@@ -60,9 +66,9 @@ class Immutable(metaclass=_Freezing):
     def _freeze(self):
         attributes = vars(self)
         for name, value in attributes.items():
-            if isinstance(value, np.ndarray):
+            if np.ndarray in type(value).__mro__ and value.flags.writeable:
                 attributes[name] = read_only(value)
-        self._frozen = True
+        attributes["_frozen"] = True
 
     def _thawed(self):
         """A copy whose attributes can be set until ``_freeze``."""
@@ -88,8 +94,8 @@ class Immutable(metaclass=_Freezing):
         object.__delattr__(self, name)
 
     def __getstate__(self):
-        return {name: value for name, value in vars(self).items()
-                if not isinstance(getattr(type(self), name, None), cached_property)}
+        derived = type(self)._derived
+        return {name: value for name, value in vars(self).items() if name not in derived}
 
     def __setstate__(self, state):
         vars(self).update(state)

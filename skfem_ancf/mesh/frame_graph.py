@@ -129,7 +129,7 @@ class FrameGraph:
         used = np.unique(self.lines[:, self.distinct])
         found = scipy.spatial.cKDTree(self.points[:, used].T).query_ball_point(
             0.5 * (a + b), half * (1.0 - 1e-6))
-        k = np.repeat(np.arange(len(some)), [len(one) for one in found])
+        k = np.repeat(np.arange(len(some)), [*map(len, found)])
         node = used[np.concatenate([*found, []]).astype(int)]
         x, along = self.points[:, node].T - a[k], (b - a)[k] / (2.0 * half[k, None])
         on = np.abs(along[:, 0] * x[:, 1] - along[:, 1] * x[:, 0]) <= max(self.tol,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..actions.axial import LineLoad
+from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import COMPONENTS
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
@@ -32,6 +33,7 @@ from ..mesh.places import as_point, is_point
 from ..results.arguments import displacement
 from ..results.state import State
 from ..sections import Section
+from .model import Entry
 from .scene import Scene
 
 #: Arguments for all lines, or for those of a group.
@@ -133,11 +135,19 @@ class Frame(Scene):
 
     def _take(self, nodes):
         with self._lock:
-            self._entries, self._system = (self._bound(nodes), *self._entries[1:]), None
+            self._entries, self._system = (Entry(nodes, ()), *self._entries[1:]), None
 
     @property
     def _nodes(self) -> Any:
-        return self._entries[0].bound[0]
+        return self._entries[0].given
+
+    def _all(self, kind):
+        with self._lock:
+            nodes, *others = self._entries
+            if issubclass(Nodes, kind) and not nodes.bound:  # after the last support
+                nodes = nodes._replace(bound=(bind_joint(nodes.given, self.layout),))
+                self._entries = nodes, *others
+        return super()._all(kind)
 
     @classmethod
     def from_lines(cls, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
@@ -332,13 +342,13 @@ class Frame(Scene):
 
     def _hold(self, place, names, settlements=None):
         """Fix nodes, with optional displacements."""
-        nodes, fixed, known = self.nodes(place), self._nodes.fixed.copy(), self._nodes
+        known, nodes = self._nodes, self.nodes(place)
+        fixed = known.fixed.copy()
         for name in names:
             fixed[nodes, COMPONENTS.index(name)] = True
         if "angle" in names:
             self._require_rigid(nodes, "it has no rotation to hold, pin it")
-        self._take(Nodes(known.nodes, known.hinged, fixed, self.graph, self._lines,
-                         known.settlements if settlements is None else settlements))
+        self._take(known.holding(fixed, settlements or known.settlements))
         return self
 
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
@@ -378,7 +388,7 @@ class Frame(Scene):
         return self._hold(place, list(given), settlements)
 
     def _require_rigid(self, nodes, advice):
-        loose = np.setdiff1d(nodes, self._nodes.nodes[~self._nodes.hinged])
+        loose = nodes[~self._nodes.rigid[nodes]]
         if len(loose):
             raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
 
@@ -484,7 +494,7 @@ class Frame(Scene):
         state
             A State of this frame.
         """
-        joint, u = self._nodes, displacement(self.system, state, "state")
+        joint, u = self.joints[0], displacement(self.system, state, "state")
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
         if state.base is None:

@@ -144,10 +144,12 @@ class Model(NearMisses):
             raise InputError(f"the item must be an Item, as a Spring, a Load or a Joint, got "
                              f"{shown(item)}: derive yours from skfem_ancf.Item")
         bound = [part for one in item.expand(self.layout) for part in bind_item(one, self.layout)]
-        given = item._with(**{name: self._numbered(value) for name, value in vars(item).items()
-                              if not name.startswith("_")})
-        given._freeze()
-        return Entry(given, tuple(bound))
+        numbers = {name: number for name, value in vars(item).items() if name[0] != "_"
+                   and (number := self._numbered(value)) is not value}
+        if numbers:
+            item = item._with(**numbers)
+            item._freeze()
+        return Entry(item, tuple(bound))
 
     def _numbered(self, value):
         """Replace Beams by numbers, in tuples and lists too."""
@@ -179,8 +181,8 @@ class Model(NearMisses):
         Parameters
         ----------
         item
-            An :class:`~skfem_ancf.Item`. The scene stores a copy and binds another to its beams,
-            again for every other mesh, as in ``solve_static(adapt=...)``.
+            An :class:`~skfem_ancf.Item`. The scene binds a copy to its beams, again for every other
+            mesh, as in ``solve_static(adapt=...)``.
 
         Examples
         --------

@@ -57,13 +57,9 @@ class Nodes(Joint):
         follows = self.leader != np.arange(len(nodes))
         self.followers = np.flatnonzero(follows)
         self.turned = np.flatnonzero(follows & ~hinged)
-        self.fixed_x, self.fixed_y, self.fixed_angle = (
-            self.leaders[fixed[nodes[self.leaders], k]] for k in range(3))
-        self.fixed_angle = self.fixed_angle[~hinged[self.fixed_angle]]
-        n, k = len(self.followers), len(self.turned)
-        self.equations = ((FORCE_X,) * n + (FORCE_Y,) * n + (MOMENT,) * k
-                          + (FORCE_X,) * len(self.fixed_x) + (FORCE_Y,) * len(self.fixed_y)
-                          + (MOMENT,) * len(self.fixed_angle))
+        #: whether a node has a rigid end, (number,)
+        self.rigid = np.zeros(len(fixed), dtype=bool)
+        self.rigid[nodes[~hinged]] = True
 
     @property
     def moving(self) -> bool:  # type: ignore[override]
@@ -96,7 +92,18 @@ class Nodes(Joint):
             first += len(here)
         return out
 
+    def holding(self, fixed: Array, settlements: Settlements) -> Nodes:
+        """A copy with other supports."""
+        return self._with(fixed=fixed, settlements=settlements, functions=settlements.functions)
+
     def bind(self, layout: Layout) -> None:
+        self.fixed_x, self.fixed_y, self.fixed_angle = (
+            self.leaders[self.fixed[self.nodes[self.leaders], k]] for k in range(3))
+        self.fixed_angle = self.fixed_angle[~self.hinged[self.fixed_angle]]
+        force_x, force_y = ((force,) * len(self.followers) for force in (FORCE_X, FORCE_Y))
+        self.equations = (*force_x, *force_y, *(MOMENT,) * len(self.turned),
+                          *(FORCE_X,) * len(self.fixed_x), *(FORCE_Y,) * len(self.fixed_y),
+                          *(MOMENT,) * len(self.fixed_angle))
         positions, directions, weights, start = [], [], [], []
         for k, beam in enumerate(layout.beams):
             at, first = chain_ends(beam).ravel(), layout.offset(k)
