@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from os import urandom
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,12 +84,12 @@ class Item(Immutable):
     moving = True
     dofs: Any = None
     name: str | None = None
-    _key: str
+    _key: bytes
 
     def __new__(cls, *args: Any, **options: Any) -> Self:
         made = super().__new__(cls)
         #: identifies copies: bound ones, on another mesh, in another process
-        vars(made)["_key"] = uuid4().hex
+        vars(made)["_key"] = urandom(16)
         return made
 
     def expand(self, layout: Layout) -> Sequence[Item]:

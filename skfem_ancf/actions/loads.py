@@ -287,12 +287,13 @@ class Weight(Load):
         self.g = require_finite("g", g, (2,))
 
     def expand(self, layout: Layout) -> Sequence[Item]:
-        which = range(len(layout.members)) if self.beam is None else [layout.number(self.beam)]
-        return [self._with(beam=k) for k in which]
+        if self.beam is not None or len(layout.members) == 1:
+            return (self,)
+        return [self._with(beam=k) for k in range(len(layout.members))]
 
     def bind(self, beam: Beam | RigidBody) -> Load:
         distribution = Distribution(gravity=self.g) if isinstance(beam, Beam) else None
-        return DeadLoad(beam, beam.weight(self.g), self.amplitude, distribution)._with(g=self.g)
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude, distribution, self.g)
 
 
 def number_at(layout: Layout, at: Any, beam: Any) -> int:
@@ -370,19 +371,20 @@ class DeadLoad(Load):
         As for :class:`Load`.
     distribution
         A :class:`~skfem_ancf.beam.distribution.Distribution`; None to determine it.
+    g
+        Of a weight the acceleration, which acts on point masses too.
     """
 
     for_bodies = for_domains = True
-    #: Of a weight the acceleration, which acts on point masses too.
-    g: Any = None
 
     def __init__(self, beam: Beam | RigidBody | Domain, vector: ArrayLike,
-                 amplitude: TimeFunction = None, distribution: Distribution | None = None) -> None:
+                 amplitude: TimeFunction = None, distribution: Distribution | None = None,
+                 g: Array | None = None) -> None:
         if not isinstance(beam, (Beam, RigidBody, Domain)):
             raise InputError(f"this load acts on a Beam, got {shown(beam)}")
         super().__init__(beam, amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))
-        self._of, self._distribution = beam, distribution
+        self._of, self._distribution, self.g = beam, distribution, g
 
     def distribution(self, u: Array) -> Distribution | None:
         if self._distribution is None:

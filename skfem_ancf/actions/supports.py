@@ -38,9 +38,9 @@ class Support(Item):
         Beam, name or number, in a scene of several.
     """
 
-    # of a bound one: numbers of the degrees of freedom in the scene, and their names
+    #: Of a bound one: numbers of the degrees of freedom in the scene.
     dofs: Any
-    _words: Any
+    _member: Any
 
     def __init__(self, boundary: Place, names: str | Sequence[str] | None = None,
                  displacement: float | Callable[[float], float] = 0.0,
@@ -58,17 +58,18 @@ class Support(Item):
 
     def bind(self, layout: Layout) -> Support:
         beam = layout.beam(self.beam)
-        dofs = beam.dofs(self.boundary, self.names)
-        words = [f"{beam.dofnames[d % beam.nd]} of node {d // beam.nd}" for d in dofs]
-        return self._with(dofs=dofs + layout.offset(beam), _words=words)
+        return self._with(dofs=beam.dofs(self.boundary, self.names) + layout.offset(beam),
+                          _member=(beam, layout.offset(beam)))
 
     def hold(self, fixed: dict[int, float]) -> None:
         """Add its prescribed DOFs to ``fixed``; SupportError where two displacements conflict."""
         value: Any = self.displacement  # a number: functions are joints
-        for d, words in zip(self.dofs.tolist(), self._words):
+        for d in self.dofs.tolist():
             if fixed.setdefault(d, value) != value:
-                raise SupportError(f"degree of freedom {words} is fixed twice, with displacements "
-                                   f"{fixed[d]!r} and {value!r}")
+                beam, first = self._member
+                node, k = divmod(d - first, beam.nd)
+                raise SupportError(f"degree of freedom {beam.dofnames[k]} of node {node} is fixed "
+                                   f"twice, with displacements {fixed[d]!r} and {value!r}")
 
     def __repr__(self) -> str:
         names = "all" if self.names is None else self.names

@@ -271,7 +271,7 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     given = array
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
-    if shape is not None and (array.ndim != len(shape) or any(
+    if shape is not None and array.shape != shape and (array.ndim != len(shape) or any(
             wanted not in (None, n) for wanted, n in zip(shape, array.shape))):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         example = example or "(0, 1)" * (tuple(shape) == (2,))

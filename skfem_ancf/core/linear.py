@@ -43,7 +43,7 @@ def first_order(z: Any) -> Any:
 
 def largest(z: Array) -> Any:
     """Largest modulus; of a result at a :func:`step` that of its change, without round-off."""
-    return np.max(np.abs(z.imag / STEP if np.iscomplexobj(z) else z))
+    return np.abs(z.imag / STEP if np.iscomplexobj(z) else z).max()
 
 
 def angle_of(x: Any, y: Any) -> Any:

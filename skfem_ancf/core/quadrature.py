@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from .caching import array_cache
 from .errors import InputError, require_finite, require_integer, shown
+from .immutable import read_only
 from .types import Array, Rule
 
 #: Largest number of points.
@@ -18,15 +18,19 @@ MAX_POINTS = 1000
 
 
 def gauss(n: int) -> Rule:
-    """n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
-    x, w = _gauss(require_integer("the number of Gauss points n", n, 1, MAX_POINTS))
-    return x.copy(), w.copy()
+    """n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,).
+
+    The arrays are read-only.
+    """
+    if type(n) is not int or not 1 <= n <= MAX_POINTS:
+        n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
+    return _gauss(n)
 
 
 @lru_cache(64)
 def _gauss(n: int) -> Rule:
     x, w = np.polynomial.legendre.leggauss(n)
-    return 0.5 * (x + 1.0), 0.5 * w
+    return read_only(0.5 * (x + 1.0)), read_only(0.5 * w)
 
 
 def gauss_lobatto(n: int) -> Array:
@@ -67,13 +71,8 @@ def _rule(name: str, rule: Any) -> Rule:
 
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     """Lagrange polynomials of nodes (n,) at points (m,), shape (m, n)."""
-    nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
-    return _lagrange(nodes, x).copy()
-
-
-@array_cache(64)
-def _lagrange(nodes: Array, x: Array) -> Array:
-    if len(np.unique(nodes)) < len(nodes):
+    nodes, x = np.asarray(nodes, dtype=float), np.asarray(x, dtype=float)
+    if len(set(nodes.tolist())) < len(nodes):
         raise InputError(f"nodes must be different, got {shown(nodes)}")
     out = np.ones((len(x), len(nodes)))
     for i, a in enumerate(nodes):

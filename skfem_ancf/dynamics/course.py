@@ -7,6 +7,7 @@ not used, so that a kink at the end of a step does not spoil the rates of its ne
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -65,8 +66,11 @@ class Course:
 
     def __init__(self, system: System, at: Array, samples: Array) -> None:
         self._system, self._at, self._samples = system, np.array(at), np.array(samples)
-        self._rates = rate_weights(self._at, self._samples)
         self._block: tuple[tuple[float, ...], Given] | None = None
+
+    @cached_property
+    def _rates(self):
+        return rate_weights(self._at, self._samples)
 
     def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
            block: tuple[int, int] | None = None) -> Given:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -121,11 +120,6 @@ class Integrator:
 
     # the start
 
-    @cached_property
-    def _instants(self):
-        """Sampling of functions of time at the start and at the end of a step."""
-        return [Course(self.system, np.array([x]), SAMPLES) for x in (0.0, 1.0)]
-
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
               contacts: Array | None = None) -> Motion:
         """The initial Motion, with consistent velocity, acceleration and multipliers.
@@ -133,7 +127,8 @@ class Integrator:
         Rates of functions of time are those in a step dt after t, or before t unless ``ahead``.
         """
         s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
-        given = self._instants[not ahead].of(t if ahead else t - dt, dt, (0, 1), self.limit)
+        instant = Course(s, np.array([0.0 if ahead else 1.0]), SAMPLES)
+        given = instant.of(t if ahead else t - dt, dt, (0, 1), self.limit)
         u_fixed, v_fixed, a_fixed = given.supports[0, 0]
         y = Motion(t, np.where(free, u, u_fixed), np.where(free, v, v_fixed), a_fixed.copy(),
                    np.zeros(s.N), np.zeros(m), np.zeros(m))
@@ -218,12 +213,11 @@ class Integrator:
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
         done = self._call(steps, y, dt, rows, self._rule, _step_data(given, dt, s), self._state,
                           work, memories, rows, multipliers, works)
-        return [replace(y, t=begun + dt * (first + k + 1), u=rows[k, 0], v=rows[k, 1],
-                        acceleration=rows[k, 2], algorithmic=rows[k, 3],
-                        multipliers=multipliers[k, 0], force=multipliers[k, 1], before=dt,
-                        dissipated=float(works[k]), memory=None,
-                        contacts=memories[k] if contacts.lasting else y.contacts)
-                for k in range(done)]
+        lasting = contacts.lasting
+        return [Motion(begun + dt * (first + k + 1), *row, *forces, dt, work,
+                       memory if lasting else y.contacts, y.turns)
+                for k, row, forces, work, memory in zip(
+                    range(done), rows, multipliers, works.tolist(), memories)]
 
     def _call(self, function: Callable, y: Motion, dt: float, rows: Array, *args: Any) -> int:
         """Call a compiled function that takes steps; returns how many succeeded."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, ulp
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ MAX_STEPS = 10**9
 #: The smallest tolerance of the automatic step size.
 MIN_RTOL = 1e-12
 EPS = np.finfo(float).eps
+#: The columns of a motion, and the place of those of contact, which may be missing.
+_columns, CONTACTS, NONE = attrgetter(*COLUMNS), COLUMNS.index("contacts"), np.zeros(0)
 #: Fraction of a step below which an instant is interpolated; so short a step is all round-off.
 CLOSE = 1e-6
 #: Degrees of freedom times steps of a block, so that progress bars and Ctrl-C react in time.
@@ -348,12 +351,12 @@ class Run:
             self._append(new)
 
     def _append(self, y):
-        row = [getattr(y, name) for name in COLUMNS]
+        row = _columns(y)
         if y.contacts is None:
-            row[COLUMNS.index("contacts")] = np.zeros(0)
+            row = *row[:CONTACTS], NONE, *row[CONTACTS + 1:]
         if self.task.t_eval is not None:  # copy, to free the rest of the block
-            row = [np.array(x) for x in row]
-        self._stored.append(tuple(row))
+            row = tuple(map(np.array, row))
+        self._stored.append(row)
 
     def _between(self, old, new, t):
         """The motion within a step, by a shorter step from the same start.

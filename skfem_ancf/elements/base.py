@@ -42,13 +42,21 @@ class SectionFunctions:
     """
 
     def __init__(self, derivatives: ArrayLike) -> None:
-        self._dP = require_finite("derivatives", derivatives, (None, None))
-        self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2.0
-        self.degree, self.number = self._dP.shape
+        dP = require_finite("derivatives", derivatives, (None, None))
+        self.degree, self.number = dP.shape
+        #: coefficients (degree + 1, 2, n) of P_k and its derivative
+        self._both = np.zeros((self.degree + 1, 2, self.number))
+        self._both[:-1, 1] = dP
+        part = dP / (4.0 * np.arange(self.degree)[:, None] + 2.0)  # of (L_m+1 - L_m-1) / (2 m + 1)
+        self._both[1:, 0] += part
+        self._both[:-2, 0] -= part[1:]
+        self._both[0, 0] = 0.0
+        self._both[0, 0] = -legendre.legval(0.0, self._both[:, 0])
 
     def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
         """P_k and its derivative at eta in [-1/2, 1/2], shape (n,) + eta.shape."""
-        return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])
+        value, slope = legendre.legval(2 * eta, self._both[:, :, k])
+        return value, slope
 
 
 class ElementBeam(Immutable, Element):

@@ -219,7 +219,8 @@ def null_space(H: Array | sparse.csr_array) -> Array:
     if not H.shape[0]:
         return np.eye(n)[:n if n <= DENSE else MOST]
     if n <= DENSE:
-        _, sigma, V = np.linalg.svd(np.linalg.qr(dense(H), mode="r"))
+        H = dense(H)
+        _, sigma, V = np.linalg.svd(H if len(H) <= 4 * n else np.linalg.qr(H, mode="r"))
         return V[int(np.sum(sigma > FREE * sigma[0])):]
     # inverse iteration with H^T H + small^2, in a form with the root of its condition number
     small = 0.1 * FREE

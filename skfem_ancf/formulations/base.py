@@ -69,7 +69,8 @@ class Term:
         xi = self.axis[0]
         along = lagrange(self.samples[component], xi) if sampled else np.eye(len(xi))
         across = self.section_samples[1] if self.section_samples else np.eye(len(self.section[0]))
-        return np.kron(along, across)
+        both = along[:, None, :, None] * across[:, None]
+        return both.reshape(len(along) * len(across), -1)
 
 
 class Formulation(Immutable):

@@ -309,6 +309,7 @@ class LinearLaw:
 
     def __init__(self, D: ArrayLike) -> None:
         self.D = np.asarray(D)
+        self._compliances: dict[tuple[int, ...], Array] = {}
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
@@ -316,8 +317,11 @@ class LinearLaw:
         return tuple(k for k, column in enumerate(self.D.T) if np.any(column))
 
     def compliance(self, rows: tuple[int, ...]) -> Array:
-        """Inverse (n, n) of the moduli of some components."""
-        return np.linalg.inv(self.D[np.ix_(rows, rows)])
+        """Inverse (n, n) of the moduli of consecutive components."""
+        if rows not in self._compliances:
+            part = slice(rows[0], rows[-1] + 1)
+            self._compliances[rows] = np.linalg.inv(self.D[part, part])
+        return self._compliances[rows]
 
     def energy(self, strain: Array) -> Array:
         return 0.5 * np.sum(strain * self.stress(strain), axis=0)

@@ -86,6 +86,24 @@ def _cross(a, b):
     return a[0] * b[1] - a[1] * b[0]
 
 
+class InverseOfLines(Inverse):
+    """The same for a mesh of straight elements, with the coordinates of a point on the chord."""
+
+    def __init__(self, mesh: Any, heights: Array | None) -> None:
+        left, right = mesh.t
+        self.start = mesh.p[:, left]
+        self.chord = mesh.p[:, right] - self.start
+        self.square = self.chord[0] * self.chord[0] + self.chord[1] * self.chord[1]
+        self.largest, self.heights = mesh.height, heights
+
+    def __call__(self, x: Array, e: Any) -> Array:
+        gap, chord, square = x - self.start[:, e, None], self.chord[:, e, None], self.square[e, None]
+        X = np.empty(x.shape)
+        X[0] = (chord[0] * gap[0] + chord[1] * gap[1]) / square
+        X[1] = 0.5 + _cross(chord, gap) / (np.sqrt(square) * self.height(e, X[0]))
+        return X
+
+
 class Finder:
     """Finds the elements of a :class:`~skfem_ancf.MeshBeam` that contain points, vectorised."""
 

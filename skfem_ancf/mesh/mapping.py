@@ -10,7 +10,7 @@ from skfem.mapping import Mapping
 
 from ..core.errors import MeshError
 from ..core.types import Array
-from .location import Inverse, with_slope
+from .location import Inverse, InverseOfLines, with_slope
 from .nodal import nodal_derivatives, turned
 from .reference_cell import SECTIONS, hermite_basis
 from .taper import powers
@@ -97,15 +97,17 @@ class MappingBeam(Mapping):
     # heights
 
     @cached_property
-    def heights(self) -> Array:
-        """Coefficients (4, ne) of powers of xi in the height over the largest height."""
+    def heights(self) -> Array | None:
+        """Coefficients (4, ne) of powers of xi in the height over the largest; None if constant."""
+        if self.mesh.heights is None:
+            return None
         c = powers(self.mesh.heights) / self.mesh.height
         c[np.abs(c) <= NOTHING] = 0.0  # for a linear height
         return c
 
     def _relative(self, xi, tind):
         """Height over the largest height, and its derivative, (ne, np); 1 and 0 if constant."""
-        if self.mesh.heights is None:
+        if self.heights is None:
             return 1.0, 0.0
         return with_slope((self.heights if tind is None else self.heights[:, tind])[..., None],
                            np.asarray(xi))
@@ -118,7 +120,7 @@ class MappingBeam(Mapping):
     @cached_property
     def height_degree(self) -> int:
         """Degree of the height in xi: 0 if it is constant."""
-        if self.mesh.heights is None:
+        if self.heights is None:
             return 0
         return int(np.max(np.nonzero(np.any(self.heights, axis=1))))
 
@@ -149,6 +151,10 @@ class MappingBeam(Mapping):
 
     def detDF(self, X: Array, tind: Array | None = None) -> Array:
         """The determinant of :meth:`DF`, (nelements, npoints)."""
+        m = self.mesh
+        if m.is_straight:
+            return (m.lengths if tind is None else m.lengths[tind])[:, None] * (
+                self.height(X[0], tind)[0] + 0.0 * X[0])
         return cross(*self.DF(X, tind).swapaxes(0, 1))
 
     def invDF(self, X: Array, tind: Array | None = None) -> Array:
@@ -195,9 +201,10 @@ class MappingBeam(Mapping):
     @cached_property
     def inverse(self) -> Inverse:
         """The map from points of the body to reference points."""
+        if self.mesh.is_straight:
+            return InverseOfLines(self.mesh, self.heights)
         start, axis, director = self._all_coefficients
-        return Inverse(start, axis, director, self.mesh.height,
-                       None if self.mesh.heights is None else self.heights)
+        return Inverse(start, axis, director, self.mesh.height, self.heights)
 
     def invF(self, x: Array, tind: Array | None = None) -> Array:
         """Reference points of points x, both (2, nelements, npoints), also outside the cell.

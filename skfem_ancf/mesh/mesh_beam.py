@@ -269,10 +269,11 @@ class MeshBeam(NumberedMesh):
 
     def __post_init__(self):
         p = require_moderate("the nodes", require_finite("the nodes", self.doflocs, (2, None)))
-        t = require_finite("t", self.t)
-        if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
-            raise MeshError(f"t must contain node numbers, got {shown(self.t)}")
-        shape = t.shape
+        if type(self.t) is not np.ndarray or self.t.dtype != np.int32:
+            t = require_finite("t", self.t)
+            if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
+                raise MeshError(f"t must contain node numbers, got {shown(self.t)}")
+        shape = np.shape(self.t)
         if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
             raise MeshError(
                 f"a MeshBeam has two nodes per element and at least one element, t has shape "
@@ -285,11 +286,11 @@ class MeshBeam(NumberedMesh):
                 "quad.plot(basis.probes(quad.p) @ y), not basis.plot or basis.refinterp")
         self.height = require_positive("height", self.height)
         t = self.t
-        if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
+        if not ((t[1] == t[0] + 1).all() and (t[0, 1:] > t[0, :-1]).all()):
             raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
                             "t[0, k] and t[0, k] + 1, and t[0] increases")
         if (t[0, 0] or t[1, -1] != p.shape[1] - 1
-                or np.any(t[0, 1:] > t[1, :-1] + 1)):  # the elements leave nodes out
+                or (t[0, 1:] > t[1, :-1] + 1).any()):  # the elements leave nodes out
             odd = np.setxor1d(t, np.arange(p.shape[1]))
             raise MeshError(f"every node of a MeshBeam is part of an element: there are "
                             f"{p.shape[1]} nodes, and node {odd[0]} is only in "
@@ -302,7 +303,7 @@ class MeshBeam(NumberedMesh):
             if getattr(self, name) is not None or name not in ("p_XY", "heights"):
                 setattr(self, name, require_finite(name, getattr(self, name), wanted))
         chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
-        has_length = (chord > 4 * EPS * np.max(np.abs(p))) & (self.lengths > 0.0)
+        has_length = (chord > 4 * EPS * np.abs(p).max()) & (self.lengths > 0.0)
         if not has_length.all():
             k = int(np.argmin(has_length))
             a, b = p[:, t[:, k]].T.tolist()
@@ -398,9 +399,9 @@ class MeshBeam(NumberedMesh):
     def is_straight(self) -> bool:
         """True if every element is straight with sections normal to it."""
         d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
-        tol = 1e-12 + 8 * EPS * np.max(np.abs(self.p)) / np.min(self.lengths)
-        return bool(np.all(np.abs(self.p_X[:, self.t] - d[:, None]) <= tol)
-                    and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
+        tol = 1e-12 + 8 * EPS * np.abs(self.p).max() / self.lengths.min()
+        return bool((np.abs(self.p_X[:, self.t] - d[:, None]) <= tol).all()
+                    and (np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol).all())
 
     @cached_property
     def is_uniform(self) -> bool:
@@ -412,10 +413,12 @@ class MeshBeam(NumberedMesh):
 
     def _are_equal(self):
         # the round-off of the nodes' positions is no difference in length
-        noise = 8 * EPS * np.max(np.abs(self.p))
-        return bool(np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise
-                    and np.max(np.ptp(self.p_X, axis=1)) <= 1e-12 + noise / np.min(self.lengths)
-                    and np.ptp(self.chain_lengths) <= 1e-12 * np.max(self.chain_lengths))
+        noise, (least, most) = 8 * EPS * np.abs(self.p).max(), _ends(self.lengths)
+        turn = self.p_X.max(axis=1) - self.p_X.min(axis=1)
+        if not (most - least <= 1e-13 * most + noise and turn.max() <= 1e-12 + noise / least):
+            return False
+        least, most = (0.0, 0.0) if self.is_chain else _ends(self.chain_lengths)
+        return bool(most - least <= 1e-12 * most)
 
     @property
     def is_chain(self) -> bool:
@@ -713,6 +716,10 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     low = np.min([mesh.p.min(axis=1) for mesh in meshes], axis=0)
     high = np.max([mesh.p.max(axis=1) for mesh in meshes], axis=0)
     return min(total, max(longest, float(np.hypot(*(high - low)))))
+
+
+def _ends(values):
+    return values.min(), values.max()
 
 
 def _chain(n):

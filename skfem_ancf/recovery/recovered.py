@@ -81,6 +81,7 @@ class Interval(NamedTuple):
     high: float
     curved: bool
     nodes: Array
+    inverse: Array  # (n, n) from values at the nodes to coefficients of Chebyshev polynomials
 
     @property
     def eta(self) -> Array:
@@ -95,9 +96,7 @@ class Interval(NamedTuple):
 
     def weights(self, s: Array) -> Array:
         """Interpolation weights from the nodes to points s (...), shape (..., n)."""
-        degree = len(self.nodes) - 1
-        return chebvander(2.0 * s - 1.0, degree) @ np.linalg.inv(
-            chebvander(2.0 * self.nodes - 1.0, degree))
+        return chebvander(2.0 * s - 1.0, len(self.nodes) - 1) @ self.inverse
 
     def integrals(self, ends: Array) -> Array:
         """Weights (k, n) of the integrals over eta from s = 0 to ends (k,)."""
@@ -217,7 +216,8 @@ def _interval(low, high, curved, order, alone):
     else:
         n = ROUND if curved else max(FEW, order + MORE)
         nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
-    return Interval(low, high, curved, nodes)
+    return Interval(low, high, curved, nodes,
+                    np.linalg.inv(chebvander(2.0 * nodes - 1.0, n - 1)))
 
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),

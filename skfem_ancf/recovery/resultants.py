@@ -206,7 +206,7 @@ def _recovered(recovery, u, e, xi, after):
     s = recovery.arc.at(e, xi)
     for k in np.unique(segment):
         on = segment == k
-        out[:, on] = _axis(recovery.segments[k])(s[on])
+        out[:, on] = _axis(recovery.segments[k])(s[on]).T
     return _result(R, M, *out)
 
 
@@ -223,8 +223,8 @@ def _axis(segment):
     shear = shear - 2.0 * np.pi * np.round(shear.real / (2.0 * np.pi))
     # not from the derivative of the angle, which is fitted to the elements
     start = (segment.g[:, 0] - segment.g[:, -1]) / (segment.Y[..., -1] - segment.Y[..., 0])
-    curvature = segment.rate - start - segment.d_ds(shear[:, None])[:, 0]
-    return segment.spline(np.array([phi, segment.at_axis(stretch), shear, curvature]), -1)
+    curvature = segment.rate - start - segment.along.d_ds(shear[:, None])[:, 0]
+    return segment.spline(np.array([phi, segment.at_axis(stretch), shear, curvature]).T)
 
 
 def _of_elements(beam, u, eigen, e, xi):

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import scipy
-from scipy.linalg import solve_banded
 
 from ..beam.distribution import AXIS
 from ..core.linear import angle_of, first_order, largest, unwrapped
@@ -15,6 +14,7 @@ from ..core.types import Array
 from ..mesh.mapping import cross
 from ..sections.jumps import beside
 from .section_forces import NotFound, Sections
+from .sections_along import SectionsAlong
 
 #: Rounds of steps 2 and 3, and their tolerance; largest number and tolerance if they converge
 #: slowly.
@@ -31,19 +31,6 @@ BALANCE, BALANCE_AT_END = 2, 10
 #: Distance from the ends in heights up to which the element stress is used, and beyond which it is
 #: not; element lengths in heights up to which it is used fully, and beyond which it is not.
 INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
-
-
-def smoothed(s: Array, values: Array, length: float) -> Array:
-    """Solve ``f - length^2 f'' = values`` with f' = 0 at both ends of s, for f (..., n, m)."""
-    d = np.diff(s)
-    w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
-    c = length**2 / d
-    band = np.zeros((3, len(s)))
-    band[0, 1:], band[2, :-1] = -c, -c
-    band[1] = w + np.append(c, 0.0) + np.append(0.0, c)
-    right = np.moveaxis(w[:, None] * values, -2, 0)
-    found = solve_banded((1, 1), band, right.reshape(len(s), -1), check_finite=False)
-    return np.moveaxis(found.reshape(right.shape), 0, -2)
 
 
 class Segment:
@@ -123,19 +110,15 @@ class Segment:
 
     # along the axis and across
 
-    def spline(self, values: Array, axis: int) -> Any:
-        """Cubic spline through values at the sections."""
-        degree = min(3, len(self.s) - 1)
-        return scipy.interpolate.make_interp_spline(self.s, values, degree, axis=axis,
+    def spline(self, values: Array) -> Any:
+        """Cubic spline through values (n, ...) at the sections."""
+        return scipy.interpolate.make_interp_spline(self.s, values, min(3, len(self.s) - 1),
                                                     check_finite=False)
 
-    def d_ds(self, values: Array) -> Array:
-        """Axial derivative of values (..., n, m)."""
-        return self.spline(values, -2)(self.s, 1)
-
-    def smoothed(self, values: Array) -> Array:
-        """Values (..., n, m) without short waves, which would grow from round to round."""
-        return smoothed(self.s, values, 0.5 * self.height)
+    @cached_property
+    def along(self) -> SectionsAlong:
+        """Derivatives along the segment; ``smoothed`` removes short waves, which would grow."""
+        return SectionsAlong(self.s, 0.5 * self.height)
 
     def across(self, values: Any) -> Array:
         """Integral over the height of values (..., n, m)."""
@@ -151,12 +134,12 @@ class Segment:
 
     def from_axis(self, values: Array) -> Array:
         """Integral from the axis to each point of values (..., n, m)."""
-        return self.from_bottom(values) - np.sum(
-            self.span * values * self.points.till_axis, axis=-1)[..., None]
+        return self.from_bottom(values) - (
+            self.span * values * self.points.till_axis).sum(axis=-1)[..., None]
 
     def at_axis(self, values: Array) -> Array:
         """Values (..., n, m) on the axis, (..., n)."""
-        return np.sum(values * self.points.axis, axis=-1)
+        return (values * self.points.axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it.
@@ -199,7 +182,7 @@ class Segment:
         lam_y = np.sqrt(1.0 + 2.0 * eps[1])
         if self.rigid:  # sections of a cable keep their height
             lam_y = lam_y / self.thinner[:, None]
-        lean = self.alpha - np.arcsin(np.clip(eps[2] / (self.stretch * lam_y), -1.0, 1.0))
+        lean = self.alpha - _arcsin(eps[2] / (self.stretch * lam_y))
         self.rY = lam_y * _normal(lean)
         self.rX = self.stretch * _tangent(self.alpha)
         self.P = self.rX * self.S[0] + self.rY * self.S[2]
@@ -207,7 +190,7 @@ class Segment:
     def _balance(self, times=BALANCE_AT_END):
         """Change S_xx linearly in Y until normal force and moment are balanced."""
         # S_yy has second derivatives of S_xx: short waves would grow
-        self._fed = np.concatenate([0.0 * self.S[:1], self.smoothed(self.S[1:])]) / self.grade
+        self._fed = np.concatenate([0.0 * self.S[:1], self.along.smoothed(self.S[1:])]) / self.grade
         N, self.Q = _turned(self.R, self.phi)
         for _ in range(times):
             self._section()
@@ -232,18 +215,18 @@ class Segment:
         intervals, along = self.recovery.intervals, self.g * self.rX[0]
         total = self.across(self.rY)
         with_faces = along + self.lean * self.rY[0]
-        self.rate = (self.d_ds(total[0][:, None])[:, 0]
+        self.rate = (self.along.d_ds(total[0][:, None])[:, 0]
                      - with_faces @ (intervals.top - intervals.bottom)) / total[1]
         if not np.all(np.isfinite(self.rate)):
             raise NotFound(DIVERGED)
-        dt, dn = self.d_ds(self.rY)
+        dt, dn = self.along.d_ds(self.rY)
         normal = (self.slope_from_axis(self.rY[1], dn)
                   + self.from_axis(self.rate[:, None] * self.rY[0]))
-        self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
-        turned = (self.slope_from_axis(self.rY[0], self.smoothed(dt))
+        self.alpha = _arcsin(normal / (self.g * self.stretch))
+        turned = (self.slope_from_axis(self.rY[0], self.along.smoothed(dt))
                   - self.from_axis(self.rate[:, None] * self.rY[1]))
         self.stretch = (self.at_axis(along)[:, None] + turned) / (self.g * np.cos(self.alpha))
-        phi = self.spline(self.rate, 0).antiderivative()(self.s)
+        phi = self.along.integral(self.rate)
         self.phi = phi + self._line @ (self.axis_angle - phi)
 
     @cached_property
@@ -258,7 +241,7 @@ class Segment:
         """Set S_xy and S_yy from div P + b = 0 and the loads of the faces."""
         rate, viscous, phi = self.rate[:, None], self._viscous_stress(), self.phi[:, None]
         P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
-        dP = (self.d_ds(P) + rate * np.array([-P[1], P[0]])
+        dP = (self.along.d_ds(P) + rate * np.array([-P[1], P[0]])
               + self.width * _turned(self.body, phi))
         bottom, top = (_turned(f[..., None], phi) for f in self.faces)
         dP = dP + self.swell * P  # with the flux through oblique faces
@@ -353,11 +336,15 @@ class Segment:
     @cached_property
     def result(self) -> Any:
         """Spline of strain, stress and angle, with values (7, m)."""
-        return self.spline(np.moveaxis(first_order(np.concatenate(
-            [self.strain, self.stress, self.angle[None]])), 1, 0), 0)
+        return self.spline(first_order(np.concatenate(
+            [self.strain, self.stress, self.angle[None]])).swapaxes(0, 1))
 
 
 DIVERGED = "the strain is too large: no equilibrium of the section was found"
+
+
+def _arcsin(x):
+    return np.arcsin(np.minimum(np.maximum(x, -1.0), 1.0))
 
 
 def _tangent(angle):
@@ -370,4 +357,5 @@ def _normal(angle):
 
 def _turned(f, angle):
     """Components of vectors (2, ...) along angles and normal to them."""
-    return np.array([np.sum(_tangent(angle) * f, axis=0), np.sum(_normal(angle) * f, axis=0)])
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * f[0] + s * f[1], c * f[1] - s * f[0]])

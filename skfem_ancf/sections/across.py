@@ -115,8 +115,8 @@ class Across(Immutable):
                  material: Material | None) -> None:
         self.mesh, self.element = mesh, element
         self.layers: tuple[Layer, ...] = tuple(
-            replace(s, measure=s.measure.of_order(element.order))
-            for s in section.layers_on(mesh, material))
+            s if (measure := s.measure.of_order(element.order)) is s.measure else
+            replace(s, measure=measure) for s in section.layers_on(mesh, material))
         varying, even = any(s.varies for s in self.layers), mesh.heights is None
         self.plain = isinstance(section, Rectangle) and not varying
         self.simple = self.plain and even
@@ -374,6 +374,8 @@ class Across(Immutable):
         K = formulation.stabilisation(self.mesh, self.element, first.material, 1.0)
         if K is None:
             return None
+        if self.simple:
+            return K * first.width
         width = 12.0 * self.bending / (first.material.E * self.mesh.height**3)
         return K * width[:, None, None]
 
