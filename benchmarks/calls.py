@@ -11,8 +11,8 @@ import sys
 
 import numpy as np
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, Frame, MeshBeam, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, Frame, MeshBeam,
+                        Scene, StVenantKirchhoff)
 
 TIP = (1, 0)
 

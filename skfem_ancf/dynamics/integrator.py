@@ -214,9 +214,9 @@ class Integrator:
         done = self._call(steps, y, dt, rows, self._rule, _step_data(given, dt, s), self._state,
                           work, memories, rows, multipliers, works)
         lasting = contacts.lasting
-        return [Motion(begun + dt * (first + k + 1), *row, *forces, dt, work,
+        return [Motion(begun + dt * (first + k + 1), u, v, a, w, m, force, dt, dissipated,
                        memory if lasting else y.contacts, y.turns)
-                for k, row, forces, work, memory in zip(
+                for k, (u, v, a, w), (m, force), dissipated, memory in zip(
                     range(done), rows, multipliers, works.tolist(), memories)]
 
     def _call(self, function: Callable, y: Motion, dt: float, rows: Array, *args: Any) -> int:

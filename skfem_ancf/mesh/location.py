@@ -97,8 +97,8 @@ class InverseOfLines(Inverse):
         self.largest, self.heights = mesh.height, heights
 
     def __call__(self, x: Array, e: Any) -> Array:
-        gap, chord, square = x - self.start[:, e, None], self.chord[:, e, None], self.square[e, None]
-        X = np.empty(x.shape)
+        gap, X = x - self.start[:, e, None], np.empty(x.shape)
+        chord, square = self.chord[:, e, None], self.square[e, None]
         X[0] = (chord[0] * gap[0] + chord[1] * gap[1]) / square
         X[1] = 0.5 + _cross(chord, gap) / (np.sqrt(square) * self.height(e, X[0]))
         return X

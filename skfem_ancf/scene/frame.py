@@ -494,7 +494,8 @@ class Frame(Scene):
         state
             A State of this frame.
         """
-        joint, u = self.joints[0], displacement(self.system, state, "state")
+        joint: Any = self.joints[0]
+        u = displacement(self.system, state, "state")
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
         if state.base is None:
