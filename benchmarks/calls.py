@@ -1,7 +1,8 @@
 """Python calls of small tasks, counted by cProfile: ``python benchmarks/calls.py``.
 
-Counts do not depend on the machine. ``--top whole`` lists the functions of a task that make most of
-them; SKFEM_ANCF_COMPILED=0 counts the way in NumPy. ``tests/test_calls.py`` bounds them.
+Counts do not depend on the machine. The second column leaves the kernels out: it is the Python
+around them, the same in NumPy and compiled. ``--top whole`` lists the functions of tasks that make
+most calls. ``tests/test_calls.py`` bounds both.
 """
 
 import cProfile
@@ -13,6 +14,7 @@ import numpy as np
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, Frame, MeshBeam,
                         Scene, StVenantKirchhoff)
+from skfem_ancf.equations.backend import Backend
 
 TIP = (1, 0)
 
@@ -97,24 +99,40 @@ TASKS = {
 }
 
 
-def profile(name):
-    """The profile of a task that has run once before."""
+def profile(name, kernels=True):
+    """The profile of a task that has run once before; kernels in NumPy may be left out."""
     TASKS[name]()()
-    task = TASKS[name]()
-    one = cProfile.Profile()
-    one.enable()
-    task()
-    one.disable()
+    task, one, in_numpy = TASKS[name](), cProfile.Profile(), Backend._in_numpy
+
+    def left_out(self, kernel):
+        run = in_numpy(self, kernel)
+
+        def quiet(*args):
+            one.disable()
+            try:
+                return run(*args)
+            finally:
+                one.enable()
+
+        return quiet
+
+    Backend._in_numpy = in_numpy if kernels else left_out
+    try:
+        one.enable()
+        task()
+    finally:
+        one.disable()
+        Backend._in_numpy = in_numpy
     return one
 
 
-def calls(name):
+def calls(name, kernels=True):
     """Number of Python calls of a task."""
-    return pstats.Stats(profile(name)).total_calls
+    return pstats.Stats(profile(name, kernels)).total_calls
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("SKFEM_ANCF_COMPILED", "1")
+    os.environ.setdefault("SKFEM_ANCF_COMPILED", "0")
     if "--top" in sys.argv:
         for name in TASKS:
             if sys.argv[-1] in name:
@@ -122,4 +140,4 @@ if __name__ == "__main__":
                 pstats.Stats(profile(name)).sort_stats("ncalls").print_stats(60)
     else:
         for name in TASKS:
-            print(f"{name:20} {calls(name):8}", flush=True)
+            print(f"{name:20} {calls(name):8} {calls(name, False):8}", flush=True)

@@ -206,3 +206,18 @@ def test_xarray_has_the_parameters_as_coordinates(monkeypatch):
     assert named["status"].values.tolist() == [1.0, 2.0]
     measured = sweep(just, {"x": [1.0, 2.0]}, lambda x: {"status": 3.0 * x}).to_xarray()
     assert measured["status"].values.tolist() == [3.0, 6.0]
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_large_scenes_are_measured_in_threads_and_small_ones_at_once(large, monkeypatch):
+    from threading import get_ident
+
+    from skfem_ancf.sweeps import workers
+
+    if large:
+        monkeypatch.setattr(workers, "LARGE", 1)
+    E = np.array([1e9, 2e9, 4e9])
+    found = sweep(cantilever, {"E": E}, {"tip": ("displacement", (1, 0)),
+                                         "thread": lambda state: get_ident()})
+    assert_allclose(-found["tip"][:, 1], formula(E), rtol=1e-4)
+    assert all((found["thread"] == get_ident()) != large)

@@ -92,6 +92,9 @@ def _of_cable(beam):
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
     N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
+    if across.simple and beam.mesh.is_straight:
+        length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
+        return Masses(N, across.moments(xi, tind, "mass")[0] * w * length)
     eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
     J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
     # arc length, since the interpolated tangent is shorter than one

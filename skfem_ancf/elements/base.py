@@ -196,14 +196,17 @@ class ElementBeam(Immutable, Element):
     def _unit(self, X: Array, i: Any = slice(None)) -> Array:
         """Functions for height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
         axis, of_node, number = self._factors[:3, i]
-        out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
+        xi, eta = X
+        out = np.zeros((3, len(axis), *xi.shape), np.result_type(X, float))
         of_axis, of_section = axis >= 0, axis < 0
         for d in (0, 1):
-            out[d, of_axis] = hermite_basis(self._along[0], X[0], d)[axis[of_axis]]
-        if np.any(of_section):
-            S, dS = (hermite_basis(self._along[1], X[0], d)[of_node[of_section]] for d in (0, 1))
-            P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
-            out[:, of_section] = S * P, dS * P, S * dP
+            out[d, of_axis] = hermite_basis(self._along[0], xi, d)[axis[of_axis]]
+        if self.section.number:
+            of_node, number = of_node[of_section], number[of_section]
+            S, dS = (hermite_basis(self._along[1], xi, d)[of_node] for d in (0, 1))
+            P, dP = self.section(eta - 0.5)
+            P, dP = P[number], dP[number]
+            out[0, of_section], out[1, of_section], out[2, of_section] = S * P, dS * P, S * dP
         return out
 
     def local(self, X: Array, h: float | Array, i: slice = slice(None),

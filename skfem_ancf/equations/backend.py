@@ -101,15 +101,11 @@ class Backend:
 
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
         """The choice for the next call of a kernel, by its name and expected iterations."""
-        choice = self._chosen(name, iterations)
-        return choice if self._plain is None else Choice("plain", self._plain)
-
-    def _chosen(self, name, iterations):
-        missing = self._missing(name)
-        if not missing and not PROBLEMS and self._plain is None and wanted() != "0":
+        missing, off = self._missing(name), self._off
+        if off is not None:
+            return Choice("plain", off)
+        if not missing:
             return _IS_LOADED
-        if self._off is not None:
-            return Choice("plain", self._off)
         if wanted() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
         if missing == [name] and SECONDS[name] <= SHORT:
@@ -138,10 +134,15 @@ class Backend:
 
     def seconds(self, iterations: float) -> float:
         """Approximate seconds of NumPy for a number of iterations."""
-        system = self.tables.system
-        elements = sum(beam.mesh.nelements for beam in system.beams)
-        points = sum(len(group.first) for _, group in system.forces.contacts.groups)
+        elements, points = self._size
         return iterations * (ITERATION + ELEMENT * elements + POINT * points)
+
+    @cached_property
+    def _size(self):
+        """Number of elements, and of points of contact."""
+        system = self.tables.system
+        return (sum(beam.mesh.nelements for beam in system.beams),
+                sum(len(group.first) for _, group in system.forces.contacts.groups))
 
     def workspace(self, make: Callable, *sizes: int) -> Any:
         """Work arrays of a kernel, made once by ``make(equations, *sizes)``."""

@@ -76,6 +76,14 @@ class LinearSolver:
             out = out + np.bincount(i, values * v[j], self._system.N)
         return out
 
+    @cached_property
+    def _supports(self):
+        """Places in the band of the entries of fixed DOFs that are 0, and that are 1."""
+        band = self._system.K.band
+        marked = band._replace(flat=np.full(band.flat.size, np.nan))
+        fix(marked, self._system.constraints.fixed)
+        return np.flatnonzero(marked.flat == 0.0), np.flatnonzero(marked.flat == 1.0)
+
     def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
         """Fix the supports in the tangent and factorise it with the joints.
 
@@ -85,7 +93,8 @@ class LinearSolver:
             If the matrix is singular.
         """
         s, constraints = self._system, self._system.constraints
-        fix(s.K.band, constraints.fixed)
+        (zeros, ones), entries = self._supports, s.K.band.flat
+        entries[zeros], entries[ones] = 0.0, 1.0
         if not self.coupled:
             s.K.factorize()
             return
@@ -95,19 +104,19 @@ class LinearSolver:
         if u is not None:
             self.assembled_at(u, t)
         J = constraints.jacobian_entries(u, t)
-        entries = tuple(np.append(a, b) for a, b in zip(
+        more = tuple(np.append(a, b) for a, b in zip(
             constraints.curvature_entries(u, t, multipliers), self._far_entries()))
-        inside = np.abs(entries[0] - entries[1]) <= s.K.bandwidth
-        s.K.add(*(x[inside] for x in entries))
-        entries = tuple(x[~inside] for x in entries)
+        inside = np.abs(more[0] - more[1]) <= s.K.bandwidth
+        s.K.add(*(x[inside] for x in more))
+        more = tuple(x[~inside] for x in more)
         self._joined = None
-        if s.symmetric and not len(entries[0]) and constraints.few:
+        if s.symmetric and not len(more[0]) and constraints.few:
             try:
                 self._joined = Schur(s.K, J, constraints)
                 return
             except np.linalg.LinAlgError:
                 logger.debug("the band is not definite without the joints")
-        self._joined = NullSpace(s.K, J, entries, constraints, self._pattern)
+        self._joined = NullSpace(s.K, J, more, constraints, self._pattern)
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """Solve for forces (N,) and constraint residuals (m,); returns x and multipliers.

@@ -78,6 +78,10 @@ def _hermite_coefficients(m: int, derivative: int) -> Array:
     return np.array(rows / perm(n, m), dtype=float)
 
 
+#: Exponents of the largest degree, and beyond it.
+_POWERS = np.arange(64)[:, None]
+
+
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """Hermite functions of degree 2 m - 1 with derivatives 0 ... m-1 at 0, then at 1.
 
@@ -86,7 +90,6 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     x, degree = np.asarray(xi), 2 * m - 1 - derivative
     if degree < 0:
         return np.zeros((2 * m,) + x.shape)
-    k = np.arange(degree + 1)[:, None]
-    flat = x.reshape(1, -1) + 0.0
-    found = _hermite_coefficients(m, derivative) @ (flat**k * (1.0 - flat) ** (degree - k))
+    flat, k = x.reshape(1, -1) + 0.0, _POWERS[:degree + 1]
+    found = _hermite_coefficients(m, derivative) @ (flat**k * (1.0 - flat) ** k[::-1])
     return found.reshape((2 * m,) + x.shape)

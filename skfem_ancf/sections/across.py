@@ -391,6 +391,12 @@ class Across(Immutable):
             the density; "area": 1.
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
+        if self.plain:
+            layer, h = self.layers[0], self.heights(xi, tind) + np.zeros((ne, n))
+            size = h * self.breadth(layer, xi[None], tind, times=TIMES[what])
+            if what in MODULI:
+                size = size * getattr(layer.material, MODULI[what])
+            return np.array([size, 0.0 * size, size * h * h / 12.0])
         mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
         for layer, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))

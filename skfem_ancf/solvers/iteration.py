@@ -97,7 +97,7 @@ class Iterate:
 
     def residual(self) -> Array:
         """The residual at free DOFs; sets ``load``, ``phi`` and ``opening``."""
-        e, target, u, pull = self.e, self.target, self.u, np.zeros_like(self.u)
+        e, target, u, pull = self.e, self.target, self.u, np.zeros(len(self.u))
         external_force(e.loads, target.factors, target.when, target.scale, u, self.load)
         self.opening = 0.0
         if self.phi.size:
@@ -112,7 +112,7 @@ class Iterate:
         If ``moving``, the fixed DOFs take their prescribed changes.
         """
         e, target, u = self.e, self.target, self.u
-        du, dm, phi, moved = np.zeros_like(u), np.zeros_like(self.phi), self.phi, np.zeros_like(u)
+        (du, moved), phi, dm = np.zeros((2, len(u))), self.phi, np.zeros(len(self.phi))
         if moving:  # R - K du of the fixed DOFs
             moved[e.fixed] = target.prescribed
             multiply(e.K, moved, du)

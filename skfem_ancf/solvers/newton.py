@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -144,11 +145,18 @@ class Search:
         times = (0.0, 1.0) if clock is None else (clock, clock)
         memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
                                 memory)
-        self.route = Route(np.zeros(system.N), times=times)
-        if u is not None:
-            missing = system.external_force(u) - system.internal_force(u)
-            self.route = Route(u.copy(), missing * system.constraints.mask, times=times)
-        self._memory = memory
+        self._start, self._times, self._memory = u, times, memory
+        if contacts.obstacles:
+            _ = self.route  # with the contact history of the start
+
+    @cached_property
+    def route(self) -> Route:
+        """The whole load; from a displacement that is given, the way to reduce its residual."""
+        system, u = self.system, self._start
+        if u is None:
+            return Route(np.zeros(system.N), times=self._times)
+        missing = system.external_force(u) - system.internal_force(u)
+        return Route(u.copy(), missing * system.constraints.mask, times=self._times)
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""

@@ -23,6 +23,9 @@ from ..core.types import Array
 Found = dict[str, Array] | str
 Results = Generator[tuple[int, Found], None, None]
 
+#: Degrees of freedom from which a scene is measured in a thread of its own.
+LARGE = 4000
+
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -36,7 +39,7 @@ class Task(NamedTuple):
         """Measured values of a member by name, or the text of the error."""
         return self.begun(member)()
 
-    def begun(self, member: dict[str, Any]) -> Callable[[], Found]:
+    def begun(self, member: dict[str, Any]) -> partial[Found]:
         """Build the scene of a member now; returns a function that measures it."""
         try:
             return partial(self._measured, self.build(**member), member)
@@ -72,12 +75,19 @@ def here(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Re
 
 
 def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Results:
-    """As :func:`here`, built one by one and measured in one thread for each processor."""
+    """As :func:`here`, built one by one; large scenes in one thread for each processor.
+
+    Small ones are Python most of the time, which one thread runs at a time.
+    """
     threads, flying = processors(), deque()  # type: ignore[var-annotated]
     with ThreadPoolExecutor(threads) as pool:
         try:
             for k in places:
-                flying.append((k, pool.submit(task.begun(members[k]))))
+                work = task.begun(members[k])
+                if getattr(work.args[0], "N", 0) < LARGE:
+                    yield k, work()
+                    continue
+                flying.append((k, pool.submit(work)))
                 if len(flying) > 2 * threads:
                     first, future = flying.popleft()
                     yield first, future.result()

@@ -289,7 +289,9 @@ class Nodes(Joint):
 def chain_ends(beam: Beam) -> Array:
     """First and last node of each chain of a beam's mesh, shape (chains, 2)."""
     left, right = beam.mesh.t
-    return np.stack([np.setdiff1d(left, right), np.setdiff1d(right, left)], axis=1)
+    start, end = np.ones((2, len(left)), dtype=bool)
+    start[1:] = end[:-1] = left[1:] != right[:-1]
+    return np.array([left[start], right[end]]).T
 
 
 def chain_places(beams: Sequence[Beam]) -> Array:

@@ -1,0 +1,22 @@
+"""Python calls of small tasks: they are the same on every machine, and do not grow unseen."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+calls = pytest.importorskip("calls")
+
+#: Calls around the kernels, measured; a tenth more may be due to versions of NumPy and SciPy.
+AROUND = {
+    "whole, ANCF(3)": 3120, "whole, cable(5)": 3110, "solve again": 800,
+    "displacement again": 222, "replace E, solve": 2430, "strain, first": 6350,
+    "strain, again": 326, "100 steps": 1250, "run, 10 steps": 4150, "frame 14 x 14": 12900,
+}
+
+
+@pytest.mark.parametrize("name", calls.TASKS)
+def test_calls_around_the_kernels(name, monkeypatch):
+    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "0")
+    assert calls.calls(name, kernels=False) <= 1.1 * AROUND[name]
