@@ -9,14 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite, require_flag,
-                           require_integer, require_option, require_positive)
+from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
+                           require_flag, require_integer, require_option, require_positive)
 from ..core.linalg import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.types import Array
 from ..equations import stability
 from ..equations.system import System
 from . import descent
+from .continuation import continuation
 from .increment import Increment, Options, Route
 from .outcome import Attempt, Away, Equilibrium, Soft, StaticResult, StepFailed, Unstable
 from .strategies import STABILISED_BY_LOADS, STRATEGIES, Strategy
@@ -32,6 +33,11 @@ FEW, CUT = 60, 3
 MOST = 1000
 #: Number of unstabilised equilibria after which the search without friction ends.
 UNSTABILISED = 2
+#: Largest number of iterations of a user-defined energy's equilibrium close to the reference
+#: configuration: beyond a pole of the energy there are others.
+SURE = 6
+#: Largest number of steps along the path to a limit point.
+PATH = 100
 #: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, others a single iteration.
 METHODS = ("mixed", "newton", "auto")
 _NAMES = {"mixed": "the mixed iteration", "newton": "Newton's method"}
@@ -203,6 +209,9 @@ class Search:
             logger.info("%s: %s", self.attempts[-1], failure)
 
     def _done(self, result):
+        own = any(hasattr(load, "psi") for load in self.system.loads)
+        if not result.doubt and (len(self.attempts) > 1 or (own and result.iterations > SURE)):
+            result.doubt = self._limit()
         result.converged, result.attempts = True, tuple(self.attempts)
         result.message = (f"converged in {len(result.steps)} load steps, {result.iterations} "
                           f"iterations, by {self.attempts[-1].strategy}")
@@ -211,6 +220,30 @@ class Search:
         if result.doubt:
             result.message += f"; {result.doubt}"
         return result
+
+    def _limit(self):
+        """Doubt about an equilibrium that was not found easily, or "".
+
+        The path from the reference configuration is followed: has the load a maximum below 1?
+        """
+        system, loads = self.system, [0.0]
+        if (self.rules.method != "auto" or not (self.stable and self.route.proportional)
+                or self.stabilised_by_loads or self.touches or system.clock is not None):
+            return ""
+
+        def turned(point: Any) -> bool:
+            loads.append(point.load)
+            return point.load < loads[-2] or point.stable is False
+
+        try:
+            _, critical = continuation(system, PATH, max_load=1.0, until=turned, locate=1e-6,
+                                       progress=False)
+        except (AncfError, *NO_FACTORS):
+            return ""
+        limits = [point.load for point in critical if point.kind == "limit" and point.load > 0.0]
+        return "" if not limits or limits[0] >= 1.0 else (
+            f"the path from the reference configuration has a limit point at the load level "
+            f"{limits[0]:.4g}; the equilibrium found lies beyond it, and need not be the only one")
 
     def _lost(self):
         """The ConvergenceError of a search that failed."""
