@@ -138,14 +138,23 @@ def test_a_circle_that_touches_a_face_bends_a_beam(element, mu, x):
 
 
 @elements
-def test_two_circles_that_touch_a_beam_carry_it(element):
+@pytest.mark.parametrize("angle, more", [(0.0, 0.0), (0.0, 1e-14), (0.0, -3e-14), (0.3, 0.0),
+                                         (1.0, 0.0), (2.0, 1e-14)])
+def test_two_circles_that_touch_a_beam_carry_it(element, angle, more):
+    """Both ends hang down alike, however the scene is turned: it does not slide to a side."""
     h, R = 0.01, 0.1
-    scene = Scene(strip(16, 1.0, h, element)).gravity((0, -9.81))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    mesh = MeshBeam.init_line(np.linspace(0, 1.0, 17), h, angle=angle)
+    scene = Scene(Beam(mesh, element, RUBBER, width=h)).gravity(turn @ [0, -9.81 * (1.0 + more)])
     for x in (0.25, 0.75):
-        scene.obstacle(Circle((x, -h / 2 - R), R), friction=0.3)
+        scene.obstacle(Circle(tuple(turn @ [x, -h / 2 - R]), R), friction=0.3)
     state = scene.solve_static()
-    assert state.iterations <= 5 * MOST and state.stability == "stable"
-    assert state.contact().total[1] == pytest.approx(7800 * h**2 * 9.81, rel=1e-3)
+    assert state.iterations <= MOST and state.stability == "stable"
+    weight = 7800 * h**2 * 9.81
+    assert np.allclose(turn.T @ state.contact().total, [0, weight], rtol=0, atol=1e-3 * weight)
+    left, middle, right = (turn.T @ state.displacement(tuple(turn @ [x, 0])) for x in (0, 0.5, 1))
+    assert abs(middle[0]) < 1e-9 and np.allclose(left, right * [-1, 1], rtol=0, atol=1e-9)
+    assert left[1] == pytest.approx(-0.0357885 if element is CABLE else -0.0360063, abs=1e-6)
 
 
 # a beam between rollers

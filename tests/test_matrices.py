@@ -9,8 +9,8 @@ from scipy.sparse.linalg import eigsh, spsolve
 from skfem import BilinearForm, asm
 from skfem.helpers import dot
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
-                        RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt,
+                        MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 
 MATERIAL = StVenantKirchhoff(2e8, 0.0, 1000.0)
 
@@ -111,3 +111,24 @@ def test_what_is_no_state_of_the_scene():
             scene.matrices(wrong)
     light = Scene(Beam(beam().mesh, ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.0), 0.02))
     assert light.matrices().M is None
+
+
+def on_a_roller(friction, force):
+    """A cantilever bent over a roller with friction."""
+    h = 0.01
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 17), h)
+    cantilever = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e9, 0.3), width=h)
+    scene = Scene(cantilever).clamp("left").point_force((1.0, -force), at="right")
+    return scene.obstacle(Circle((0.5, -0.1 - h / 2 - 0.002), 0.1), friction=friction)
+
+
+@pytest.mark.parametrize("friction", [0.1, 5.0])
+def test_matrices_have_the_friction_of_the_state(friction):
+    """Its force is in balance, and it yields as its solution does when it is unloaded a little."""
+    scene, less = on_a_roller(friction, 4.0), on_a_roller(friction, 4.0 - 1e-3)
+    state = scene.solve_static()
+    free, rubs = scene.free, state.contact().total[0]
+    assert np.abs(scene.matrices(state).force[free]).max() < 1e-6 * abs(rubs)
+    K, force = (less.matrices(state)[k] for k in (2, 3))
+    change = (less.solve_static(start=state).u - state.u)[free]
+    close(spsolve(K[free][:, free].tocsc(), force[free]), change, 1e-3)

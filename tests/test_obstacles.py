@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
+from scipy.linalg import null_space
 
 from skfem_ancf import (Beam, CallbackError, ElementBeamANCF, ElementBeamCable, InputError,
                         MeshBeam, ModelWarning, RigidBody, Scene, StVenantKirchhoff)
@@ -626,3 +627,24 @@ def test_a_torque_that_drives_against_friction_is_in_the_balance(scheme, small):
     L, t = history.angular_momentum[window], history.t[window]
     rubs = rubbing_moment(history, range(len(history.t) - 60, len(history.t)))
     assert rubs > 0.5 and abs(60.0 - (L[-1] - L[0]) / (t[-1] - t[0]) - rubs) < 0.03 * rubs
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.0])
+def test_modes_after_friction_has_slipped_are_those_of_points_that_stick(angle):
+    """Slipped points are at the limit, on this side of it or on that by the last digit."""
+    E, h, rho = 2e9, 0.01, 7800.0
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 17), h, angle=angle)
+    bent = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(E, 0.3, rho), width=h))
+    bent.clamp("left").point_force(turn @ [1.0, -4.0], at="right")
+    bent.obstacle(Circle(tuple(turn @ [0.5, -0.1 - h / 2 - 0.002]), 0.1), friction=0.1)
+    state = bent.solve_static()
+    force = turn.T @ state.contact().total
+    assert force[0] == pytest.approx(2.1787, rel=1e-3)  # slipped: the contact's normal is inclined
+    found = bent.modes(4, state).frequencies
+    assert np.allclose(found, [20.7412, 124.2545, 158.9422, 338.7013], rtol=1e-4)
+    matrices, free = bent.matrices(state), bent.free
+    Z = null_space(matrices.J[:, free].toarray())
+    K, M = (Z.T @ A[free][:, free] @ Z for A in (matrices.K, matrices.M))
+    squares = np.sort(1.0 / np.linalg.eigvals(np.linalg.solve(K, M)).real)
+    assert np.allclose(squares[:4], found**2, rtol=1e-3)

@@ -30,7 +30,8 @@ class SceneMatrices(NamedTuple):
         Damping matrix, (N, N): minus the derivative of the force by the velocity.
     K
         Tangent stiffness, (N, N): minus the derivative of the force by the displacement, with the
-        stress, loads and multipliers of the state.
+        stress, loads and multipliers of the state. Points stick that touch an obstacle with
+        friction, also those that slip.
     force
         Loads minus internal and damping force, shape (N,).
     J
@@ -45,7 +46,13 @@ class SceneMatrices(NamedTuple):
 
 
 def matrices_of(system: Any, state: Any) -> SceneMatrices:
-    """The SceneMatrices of a System in one of its States."""
+    """The SceneMatrices of a System in one of its States, with its history of contact."""
+    contacts = system.forces.contacts
+    with contacts.lent(state.memory), contacts.stuck():
+        return _matrices_of(system, state)
+
+
+def _matrices_of(system, state):
     u, v, t, tables = np.array(state.u), state.v, state.t, system.backend.tables
     time = state.load if t is None else t
     K = load_stiffness(system, u, state.load, t) + system.constraints.curvature(

@@ -57,7 +57,7 @@ class Verdict:
 
 
 FOLLOWS = "against divergence: the loads have no potential, and statics cannot detect flutter"
-RUBS = "with the current stick and slip: friction has no potential, flutter is not detected"
+RUBS = "if points stick where they touch: friction has no potential, flutter is not detected"
 
 
 def verdict(system: Any, u: Array, load: float, multipliers: Array,
@@ -68,15 +68,17 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
     (an odd number of negative eigenvalues) means divergence: unstable. A positive definite
     symmetric part excludes it. Otherwise an eigenvalue with a negative real part, for equal masses
     at the nodes, means unstable. All else is undecided, and flutter depends on the mass: see
-    ``scene.modes``.
+    ``scene.modes``. Points that slip on obstacles count as sticking: of a disturbance either way
+    friction resists one.
     """
-    try:
-        system.assemble(u, load)
-        t = system.clock if t is None else t
-        system.solver.factorize(u, load if t is None else t, multipliers)
-        return verdict_of_factors(system)
-    except NO_FACTORS:
-        return Verdict("singular", 0)
+    t = system.clock if t is None else t
+    with system.forces.contacts.stuck():
+        try:
+            system.assemble(u, load)
+            system.solver.factorize(u, load if t is None else t, multipliers)
+            return verdict_of_factors(system)
+        except NO_FACTORS:
+            return Verdict("singular", 0)
 
 
 def verdict_of_factors(system: Any) -> Verdict:
@@ -163,7 +165,8 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
 
     The tangent at u (N,) must be positive definite beyond round-off.
     """
-    force, _ = system.assemble(u)
+    with system.forces.contacts.stuck():
+        force, _ = system.assemble(u)
     fix(system.K.band, system.constraints.fixed)
     loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
     weights = position_weights(system) * system.constraints.mask

@@ -75,4 +75,5 @@ def configuration(system: System, state: State) -> State:
                          f"{list(state.system.constraints.joints)} there, "
                          f"{list(system.constraints.joints)} in the scene; "
                          "scene.state(u, multipliers) takes them as they are")
-    return state.replace(system=system, u=u)
+    memory = system.forces.contacts.of_state(state)
+    return state.replace(system=system, u=u).replace(memory=memory)

@@ -38,9 +38,11 @@ def modes(system: System, state: State, k: int) -> Modes:
     small shift s. Solutions are refined by strains instead of assembled stiffnesses, and
     eigenvalues are quotients of sums of squared strains. Low (bending) frequencies are therefore
     accurate although the highest eigenvalues are ``(L / h)^4`` times larger. With loads without a
-    potential, K is unsymmetric and eigenvalues may be complex.
+    potential, K is unsymmetric and eigenvalues may be complex. Points stick that touch an obstacle
+    with friction, also those that slip.
     """
-    with system.forces.contacts.lent(state.memory):
+    contacts = system.forces.contacts
+    with contacts.lent(state.memory), contacts.stuck():
         return _modes(system, state, k)
 
 

@@ -148,4 +148,6 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
         logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
         result = search.find()
         result.rubbed += last.result.rubbed
-    return Instant(t, result, f"{JUMPED} by {result.attempts[-1].strategy}")
+    moved = largest_displacement(system, result.u - last.result.u)
+    way = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
+    return Instant(t, result, way, moved / (t - last.t))

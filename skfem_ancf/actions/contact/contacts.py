@@ -193,6 +193,21 @@ class Contacts:
             for x, k in zip(numbers, before):
                 x[STIFFNESS] = k
 
+    @contextmanager
+    def stuck(self) -> Iterator[None]:
+        """Context in which all points that touch stick in tangents, also those that slip.
+
+        Points that have slipped are at the limit of friction, on one side of it or the other by the
+        last digit; and of a disturbance either way friction resists one.
+        """
+        memory = self.tables.memory
+        before = memory[ANCHORED]
+        try:
+            memory[ANCHORED] *= 2.0
+            yield
+        finally:
+            memory[ANCHORED] = before
+
     def put_back(self, memory: Array | None) -> None:
         """Restore data of :meth:`remember`; without it anchors and multipliers are cleared."""
         if self.obstacles:

@@ -179,16 +179,16 @@ def _keep_work(pair, w):
 
 @source
 def _tangential(pair):
-    """Coefficient of friction, zero without anchors, and the stiffness per area."""
-    firmness = pair.common[LARGEST + pair.number + pair.k]
-    return (pair.numbers[FRICTION] * pair.common[ANCHORED],
+    """Coefficient of friction, zero without anchors; 1 if all points stick; stiffness per area."""
+    firmness, anchored = pair.common[LARGEST + pair.number + pair.k], pair.common[ANCHORED]
+    return (pair.numbers[FRICTION] * np.minimum(anchored, 1.0), 1.0 * (anchored > 1.0),
             pair.numbers[STICKING] * (1.0 + firmness))
 
 
 @source
 def add_friction(pair, same, at, w):
     """Add Coulomb friction and its derivative."""
-    friction, sticking = _tangential(pair)
+    friction, holds, sticking = _tangential(pair)
     if friction == 0.0:
         return
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
@@ -201,6 +201,7 @@ def add_friction(pair, same, at, w):
         k = sticking * area[at[i]]
         trial = k * (slip + calms * (slip - memory[SLIP, at[i]]))
         T, sticks = return_mapping(trial, friction * w[PRESSURE, i])
+        sticks = np.maximum(sticks, holds)
         change = friction * np.sign(trial) * (1.0 - sticks) * w[SLOPE, i]
         c = (1.0 + calms if same else 2.0) * k * sticks
         w[PUSH, i] -= T * ny
@@ -233,7 +234,7 @@ def resist(pair, factor, at, w):
 @source
 def _settle(pair, same, at, w, out):
     """Move anchors of slipping points to the limit of sticking; add the work to ``out[0]``."""
-    friction, sticking = _tangential(pair)
+    friction, _, sticking = _tangential(pair)
     area, pose, memory = pair.points[AREA], pair.poses[NOW], pair.memory
     augmented, lost, where = pair.numbers[TOLERANCE] > 0.0, np.empty(at.size), 0 * at
     for i in indices(at.size):
