@@ -137,24 +137,47 @@ def test_a_circle_that_touches_a_face_bends_a_beam(element, mu, x):
         assert at_once.contact().total[1] == pytest.approx(state.contact().total[1], rel=1e-3)
 
 
-@elements
-@pytest.mark.parametrize("angle, more", [(0.0, 0.0), (0.0, 1e-14), (0.0, -3e-14), (0.3, 0.0),
-                                         (1.0, 0.0), (2.0, 1e-14)])
-def test_two_circles_that_touch_a_beam_carry_it(element, angle, more):
-    """Both ends hang down alike, however the scene is turned: it does not slide to a side."""
+def on_two_circles(element, angle, more=0.0, **options):
+    """A beam that just touches them, turned by an angle, and a function that turns vectors back."""
     h, R = 0.01, 0.1
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     mesh = MeshBeam.init_line(np.linspace(0, 1.0, 17), h, angle=angle)
-    scene = Scene(Beam(mesh, element, RUBBER, width=h)).gravity(turn @ [0, -9.81 * (1.0 + more)])
+    scene = Scene(Beam(mesh, element, RUBBER, width=h))
+    scene.gravity(turn @ [0, -9.81 * (1.0 + more)], **options)
     for x in (0.25, 0.75):
         scene.obstacle(Circle(tuple(turn @ [x, -h / 2 - R]), R), friction=0.3)
+
+    def moved(state):
+        weight = 7800 * h**2 * 9.81
+        assert np.allclose(turn.T @ state.contact().total, [0, weight], rtol=0, atol=1e-3 * weight)
+        return [turn.T @ state.displacement(tuple(turn @ [x, 0])) for x in (0, 0.5, 1)]
+
+    return scene, moved
+
+
+@elements
+@pytest.mark.parametrize("angle, more", [(0.0, 0.0), (0.0, -3e-14), (0.3, 0.0), (2.0, 1e-14)])
+def test_two_circles_that_touch_a_beam_carry_it(element, angle, more):
+    """Both ends hang down alike, however the scene is turned: it does not slide to a side."""
+    scene, moved = on_two_circles(element, angle, more)
     state = scene.solve_static()
     assert state.iterations <= MOST and state.stability == "stable"
-    weight = 7800 * h**2 * 9.81
-    assert np.allclose(turn.T @ state.contact().total, [0, weight], rtol=0, atol=1e-3 * weight)
-    left, middle, right = (turn.T @ state.displacement(tuple(turn @ [x, 0])) for x in (0, 0.5, 1))
+    left, middle, right = moved(state)
     assert abs(middle[0]) < 1e-9 and np.allclose(left, right * [-1, 1], rtol=0, atol=1e-9)
     assert left[1] == pytest.approx(-0.0357885 if element is CABLE else -0.0360063, abs=1e-6)
+    assert any("points slip on" in text and "scene.run" in text for text in state.checks.findings)
+
+
+@elements
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])
+def test_two_circles_carry_a_beam_that_gets_heavy_slowly(element, angle):
+    """In a turned scene too it is at rest before, to round-off, and slips alike on both sides."""
+    scene, moved = on_two_circles(element, angle, amplitude=ramp)
+    history = scene.run(1.0, increments=5)
+    left, middle, right = moved(few(history))
+    assert abs(middle[0]) < 1e-9 and np.allclose(left, right * [-1, 1], rtol=0, atol=1e-9)
+    assert left[1] == pytest.approx(-0.035788 if element is CABLE else -0.036019, abs=2e-6)
+    assert history.found_by[0] == "at rest" and not history.state(-1).checks.findings
 
 
 # a beam between rollers

@@ -10,7 +10,7 @@ from skfem import BilinearForm, asm
 from skfem.helpers import dot
 
 from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt,
-                        MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+                        Line, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 
 MATERIAL = StVenantKirchhoff(2e8, 0.0, 1000.0)
 
@@ -132,3 +132,16 @@ def test_matrices_have_the_friction_of_the_state(friction):
     K, force = (less.matrices(state)[k] for k in (2, 3))
     change = (less.solve_static(start=state).u - state.u)[free]
     close(spsolve(K[free][:, free].tocsc(), force[free]), change, 1e-3)
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5, 1e7])
+def test_statics_in_soft_contact_is_as_tight_as_without(stiffness):
+    """A strip on a bed so soft that it sinks in by up to its length over four, and on a hard one."""
+    h = 0.01
+    strip = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), h), ElementBeamCable(5), MATERIAL, h)
+    scene = Scene(strip).clamp("left").line_load((0, -4.0))
+    scene.obstacle(Line((0, -h / 2)), stiffness=stiffness)
+    state = scene.solve_static()
+    assert np.abs(scene.matrices(state).force[scene.free]).max() < 1e-7 * 4.0
+    carried = state.contact().total[1] + state.reactions("left").force[1]
+    assert carried == pytest.approx(4.0, rel=1e-7)

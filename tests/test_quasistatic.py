@@ -6,8 +6,10 @@ from scipy.integrate import solve_bvp, trapezoid
 
 from skfem_ancf import (Beam, CallbackError, Circle, ConvergenceError, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, InputError, Line, MeshBeam,
-                        NameUnknown, Ramp, Scene, Section, StepHistory, Steps, StVenantKirchhoff,
-                        SupportError)
+                        ModelWarning, NameUnknown, Ramp, Scene, Section, StepHistory, Steps,
+                        StVenantKirchhoff, SupportError)
+from skfem_ancf.solvers import quasistatic
+from skfem_ancf.solvers.outcome import StepFailed
 
 SOFT = StVenantKirchhoff(2e8, 0.3, 7800)
 
@@ -363,3 +365,42 @@ def test_statics_takes_the_function_at_the_load_factor_and_motions_at_the_time()
     assert np.allclose(history.displacement("right")[:, 1], 0.01 * np.sin(history.t) ** 2)
     with pytest.raises(CallbackError, match="displacement"):
         Scene(beam).clamp("left").fix("right", "r^2", displacement=lambda t: (t, t)).solve_static()
+
+
+# increments that stay small
+
+
+def slow_path(monkeypatch, whole):
+    """A cantilever that is followed only by increments of a thousandth; or as a whole."""
+    follow, asked = quasistatic._next, []
+
+    def only_small(system, last, t, rules, stable, smallest):
+        asked.append(t - last.t)
+        if smallest and not whole:
+            raise ConvergenceError("none", None)
+        if not smallest and t - last.t > 2e-4:
+            raise StepFailed("far")
+        return follow(system, last, t, rules, stable, smallest)
+
+    monkeypatch.setattr(quasistatic, "_next", only_small)
+    scene = Scene(cantilever()).clamp("left").point_force(
+        (0, -1.0), at="right", amplitude=lambda t: t)
+    return scene, asked
+
+
+def test_a_run_that_stalls_says_so_and_goes_on_as_statics_does(monkeypatch):
+    scene, asked = slow_path(monkeypatch, True)
+    with pytest.warns(ModelWarning, match="only increments of .* succeed, where 0.1 was asked"):
+        history = scene.run(0.3, increments=3)
+    assert history.t[-1] == 0.3 and len(asked) < 300
+    monkeypatch.undo()
+    alone = Scene(cantilever()).clamp("left").point_force((0, -0.3), at="right").solve_static()
+    assert np.allclose(history.state(-1).u, alone.u, rtol=0, atol=1e-7)
+
+
+def test_a_run_that_stalls_where_statics_finds_nothing_ends_with_what_it_has(monkeypatch):
+    scene, asked = slow_path(monkeypatch, False)
+    with pytest.warns(ModelWarning, match="only increments of"), pytest.raises(
+            ConvergenceError, match="no equilibrium found after t = 0.0") as error:
+        scene.run(1.0, increments=10)
+    assert len(asked) < 100 and len(error.value.state) > 20

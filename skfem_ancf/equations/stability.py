@@ -169,10 +169,10 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
         force, _ = system.assemble(u)
     fix(system.K.band, system.constraints.fixed)
     loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
+    if is_nothing(system, loads):
+        return False
     weights = position_weights(system) * system.constraints.mask
     acting = np.max(loads * weights)
-    if acting * system.size <= NOTHING * system.scales.energy_of_strains:
-        return False
     least = STABILISING * acting / (system.size * max(1.0, np.sum(weights)))
     system.K.add_diagonal(-least * weights)
     try:
@@ -180,6 +180,13 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
         return system.solver.inertia() == Inertia(0, False)
     except NO_FACTORS:
         return False
+
+
+def is_nothing(system: Any, force: Array) -> bool:
+    """True if forces (N,) at free positions are zero, or round-off."""
+    weights = position_weights(system) * system.constraints.mask
+    acting = np.max(np.abs(force) * weights)
+    return bool(acting * system.size <= NOTHING * system.scales.energy_of_strains)
 
 
 def motion_in_words(system: Any, u: Array, v: Array) -> str:

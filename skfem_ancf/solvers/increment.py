@@ -95,6 +95,20 @@ class Increment:
             raise Unstable("the equilibrium found lies on the side away from the load", found)
         return found
 
+    def resting(self) -> Equilibrium | None:
+        """The last equilibrium, if only round-off acts there; else None.
+
+        As of a body in a turned scene that just touches an obstacle.
+        """
+        system, (u, multipliers) = self.system, (self.start.u, self.start.multipliers)
+        target = self._target(system.backend.tables, u)
+        force = system.internal_force(u, self.time, self.load)
+        missing = self.load * system.external_force(u) - force
+        opening = system.constraints.constraint(u, self.load)
+        if np.any(target.prescribed) or np.any(opening) or not stability.is_nothing(system, missing):
+            return None
+        return Equilibrium(u, multipliers, force)
+
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""
         contacts, start = self.system.forces.contacts, self.start

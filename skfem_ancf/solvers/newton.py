@@ -322,7 +322,7 @@ class Search:
         result = self._beginning(self.route)
         step = Increment(self.system, result, 1.0, self._options(self.route, "mixed")._replace(
             most=0))
-        return step.reached(step.iterate())
+        return step.reached(step.resting() or step.iterate())
 
     def load_steps(self, method: str, route: Route | None = None,
                    start: StaticResult | None = None, **changes: Any) -> StaticResult:
@@ -355,7 +355,7 @@ class Search:
                 most: int = descent.DESCENT) -> StaticResult:
         """The equilibrium at full load by a descent of ``most`` iterations.
 
-        ``eased``: first without friction; bodies then stick where they came to rest.
+        ``eased``: starting from the equilibrium without friction.
         """
         route, system = route or self.route, self.system
         if (not (system.symmetric or self.stabilised_by_loads or self.rubs)
@@ -383,7 +383,7 @@ class Search:
                 else:
                     found = descent.descend(step, iterate, down)
                 if contacts.obstacles:
-                    found = self._firm(found, step, eased)
+                    found = self._firm(found, step)
         except NO_FACTORS as error:
             raise StepFailed("a tangent has no factors") from error
         except StepFailed as failure:
@@ -436,13 +436,9 @@ class Search:
             return False
         return not descent.heads_on(self.system, self._beginning(route), found.u, 1.0)
 
-    def _firm(self, found, step, eased):
+    def _firm(self, found, step):
         """Solve again with contact that is stiff enough."""
-        memory = self._memory
-        if eased:
-            memory = self.system.forces.contacts.begin(found.u, self.route.times[1])
-        start = replace(self._beginning(self.route), u=found.u, multipliers=found.multipliers,
-                        memory=memory)
+        start = replace(self._beginning(self.route), u=found.u, multipliers=found.multipliers)
         loads, times = ((x, x) for x in step.options.route.acting(1.0))
         again = Increment(self.system, start, 1.0, step.options._replace(
             route=Route(found.u, None, loads, times), close=True))

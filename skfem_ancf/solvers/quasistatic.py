@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.errors import ModelWarning, warn
 from ..core.types import Array
 from ..equations.stability import largest_displacement
 from ..equations.system import System
@@ -30,6 +31,9 @@ CUTS_AT_REST = CUT**3
 BOUNDED = 20
 #: Largest number of consecutive jumps.
 JUMPS = 3
+#: Increments below this fraction of those asked for are slow; number of slow ones in a row after
+#: which the strategies of statics take a whole increment.
+SLOW, PATIENCE = 1e-2, 30
 #: Largest displacement of a node in an increment: in the first one relative to the scene's size,
 #: then relative to that at the last rate, or to the size.
 FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
@@ -72,25 +76,32 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
     descent if obstacles or only loads stabilise the scene. An increment that fails or moves the
     scene far is cut, since several equilibria may be close. If the smallest one fails, because the
     equilibrium becomes unstable, the strategies of :func:`~skfem_ancf.solvers.newton.solve_static`
-    look for another one under constant loads.
+    look for another one under constant loads. If increments stay below a hundredth of those asked
+    for, they take the next one as a whole, with a ModelWarning, so that the work is bounded.
 
     ``ends`` are increasing times; ``increments`` is the number of instants of a grid between two of
     them. Increments end at each of these instants, also after cuts. Raises StepFailed or
     ConvergenceError.
     """
     yield begin
-    jumps = 0
+    jumps = slow = 0
     for end in ends[ends > begin.t]:
         grid = np.linspace(begin.t, end, increments + 1)[1:]
         most = (end - begin.t) / increments
         size, least = most, rules.min_step * most
         while begin.t < end:
+            stalled = slow > PATIENCE
+            if stalled:
+                warn(f"from t = {begin.t:.6g} on only increments of {size:.3g} succeed, where "
+                     f"{most:.3g} was asked for: the next one is solved as solve_static does, "
+                     "whatever the path in between", ModelWarning)
+                size, slow = most, 0
             target = grid[np.searchsorted(grid, begin.t, side="right")]
             parts = np.ceil((target - begin.t) / size - 1e-3)
             t = target if parts <= 1.0 else begin.t + (target - begin.t) / parts
             if begin.way == AT_REST:
                 least = max(least, CUTS_AT_REST * most)
-            smallest = size <= least
+            smallest = stalled or size <= least
             try:
                 found = _next(system, begin, t, rules, stable, smallest)
             except StepFailed as failure:
@@ -101,6 +112,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             if jumps > JUMPS:
                 raise StepFailed(f"at t = {t:.6g} even the smallest increments do not lead from "
                                  "one equilibrium to the next")
+            slow = slow + 1 if size < SLOW * most else 0
             if found.result.iterations <= FEW * rules.max_iterations:
                 size = min(LARGER * size, most)
             begin = found

@@ -151,7 +151,7 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
         if way is _released and flags is None:
             continue
         try:
-            return climb.up(way(climb, flags))
+            return climb.up(way(climb, flags), rough=way is _released)
         except failed:
             if way is ways[-1]:
                 raise
@@ -180,7 +180,7 @@ def _from_soft(climb, _, most=None):
 
 
 def _released(climb, flags):
-    """The equilibrium on soft obstacles, starting from bound points."""
+    """A rough equilibrium on soft obstacles, starting from bound points."""
     contacts = climb.contacts
     with bound(contacts, flags):
         found = climb.solve(None, True)
@@ -210,8 +210,11 @@ class _Climb:
         self.contacts, self.start, self.t, self.respond = contacts, start, t, respond
         self.solve, self.energy, self.failed = solve, energy, failed
 
-    def up(self, found):
-        """The equilibrium on stiff obstacles, or the last one before a failure."""
+    def up(self, found, rough):
+        """The equilibrium on stiff obstacles, or the last one before a failure.
+
+        ``rough``: ``found`` is one that is only a start.
+        """
         contacts = self.contacts
         for _ in range(TIMES):
             u, yields = found[0], np.zeros(len(contacts.groups))
@@ -220,13 +223,13 @@ class _Climb:
             wanted = firm(contacts, u, self.t, self.energy(u), yields)
             if np.all(wanted == contacts.firmness):
                 break
-            found, done = self._to(wanted, found)
+            found, done, rough = self._to(wanted, found, rough)
             if not done:
                 break
-        return found
+        return self.solve(found, False) if rough else found
 
-    def _to(self, wanted, found):
-        """The equilibrium at a firmness or the last one before it, and whether it was reached."""
+    def _to(self, wanted, found, rough):
+        """The equilibrium at a firmness or the last one before it; if reached; if it is rough."""
         contacts, rung, fails = self.contacts, RUNG, 0
         memory = contacts.tables.memory
         while True:
@@ -240,7 +243,8 @@ class _Climb:
                 memory[:] = before
                 rung, fails = np.sqrt(rung), fails + 1
                 if fails > HALVED:
-                    return found, False
+                    return found, False, rough
                 continue
+            rough = not last
             if last:
-                return found, True
+                return found, True, False

@@ -28,6 +28,7 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HE
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
 #: suggested.
 SUNK, FIRM = 0.5, 0.1
+<<<<<<< HEAD
 #: Largest factor of hardening beyond that for deep penetration.
 FIRMER = 1e5
 #: Penetration of the reference configuration allowed, relative to the height, as meshes of curves
@@ -38,6 +39,10 @@ CUT = 1e-2
 HIDDEN = 0.25
 #: Relative change of the stiffness for derivatives.
 CHANGE = 1e-4
+=======
+#: Relative pressure of points that count, and relative distance from the limit of friction.
+SEEN = 1e-3
+>>>>>>> 945246c (Static steps with friction take one road, a run that stalls says so and ends, soft contact as tight as without; findings of slip)
 #: Factor on the stiffness for difficult equilibria.
 EASED = 1e-2
 #: Collocation cannot correct multipliers within a step: constraints at its points cause rebound.
@@ -390,6 +395,19 @@ class Contacts:
                 force = force - w[PUSH:PUSH + 2]
             out.append((which, w[LAST:LAST + 2] + self.origin[:, None], force, pressure,
                         found[GAP]))
+        return out
+
+    def slipping(self, u: Array, t: float) -> list[Any]:
+        """The obstacles at which points are at the limit of friction, in statics."""
+        out = []
+        for (_, group), (k, _, force, pressure, _) in zip(self.groups, self.pushes(u, None, t)):
+            one, normal = self.obstacles[k], pressure * group.areas
+            limit = one.friction * normal
+            along = np.sqrt(np.maximum(np.sum(force**2, axis=0) - normal**2, 0.0))
+            pressed = normal > SEEN * normal.max(initial=0.0)
+            if one.friction > 0.0 and one not in out and np.any(
+                    along[pressed] > (1.0 - SEEN) * limit[pressed]):
+                out.append(one)
         return out
 
     def potential(self, u: Array, t: float) -> float:

@@ -25,6 +25,9 @@ from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, 
 
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
+#: Anchors of slipped points are inside of the limit by these parts of it and of an element, so that
+#: they stick at the start of the next step whatever the last digit.
+INSIDE, NOWHERE = 1e-9, 1e-12
 #: Rows of active points: position and slope in the middle of a mean; their displacement, or
 #: velocity; penetration at both ends; surface point at the end; its displacement, or velocity;
 #: surface point in the middle, its gap with derivatives, and its derivative by the slope; force and
@@ -246,7 +249,8 @@ def _settle(pair, same, at, w, out):
             gone = slip - memory[SLIP, at[i]]
         calms = 1.0 if same and pair.common[RATE] > 0.0 else 0.0
         T, _ = return_mapping(k * (slip + calms * gone), limit)
-        after, _ = return_mapping(slip, limit / k)
+        after, _ = return_mapping(slip, np.maximum(
+            (1.0 - INSIDE) * limit / k - NOWHERE * pair.numbers[RADIUS], 0.0))
         lost[i] = T * gone
         if augmented:
             lost[i] += w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
