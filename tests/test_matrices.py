@@ -136,7 +136,7 @@ def test_matrices_have_the_friction_of_the_state(friction):
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e4, 1e5, 1e7])
 def test_statics_in_soft_contact_is_as_tight_as_without(stiffness):
-    """A strip on a bed so soft that it sinks in by up to its length over four, and on a hard one."""
+    """A strip on a bed so soft that it sinks in by a quarter of its length, and on a hard one."""
     h = 0.01
     strip = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), h), ElementBeamCable(5), MATERIAL, h)
     scene = Scene(strip).clamp("left").line_load((0, -4.0))
