@@ -75,13 +75,9 @@ def check(state: Any) -> Checks:
         found += (_findings(beam, values[-1][1], values[-1][3])
                   + _strained(state, beam, *values[-1][1:3]) if base is None else
                   _linear_findings(beam, u, base))
-<<<<<<< HEAD
     found += pushed_points(state.system) + state._not_recovered
-=======
-    found += pushed_points(state.system)
     if state.t is None and state.base is None:
         found += _slips(state)
->>>>>>> 945246c (Static steps with friction take one road, a run that stalls says so and ends, soft contact as tight as without; findings of slip)
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))

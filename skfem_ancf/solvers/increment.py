@@ -105,9 +105,9 @@ class Increment:
         force = system.internal_force(u, self.time, self.load)
         missing = self.load * system.external_force(u) - force
         opening = system.constraints.constraint(u, self.load)
-        if np.any(target.prescribed) or np.any(opening) or not stability.is_nothing(system, missing):
-            return None
-        return Equilibrium(u, multipliers, force)
+        still = not (np.any(target.prescribed) or np.any(opening))
+        rests = still and stability.is_nothing(system, missing)
+        return Equilibrium(u, multipliers, force) if rests else None
 
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""

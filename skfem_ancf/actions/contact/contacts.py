@@ -28,7 +28,6 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HE
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
 #: suggested.
 SUNK, FIRM = 0.5, 0.1
-<<<<<<< HEAD
 #: Largest factor of hardening beyond that for deep penetration.
 FIRMER = 1e5
 #: Penetration of the reference configuration allowed, relative to the height, as meshes of curves
@@ -39,10 +38,8 @@ CUT = 1e-2
 HIDDEN = 0.25
 #: Relative change of the stiffness for derivatives.
 CHANGE = 1e-4
-=======
 #: Relative pressure of points that count, and relative distance from the limit of friction.
 SEEN = 1e-3
->>>>>>> 945246c (Static steps with friction take one road, a run that stalls says so and ends, soft contact as tight as without; findings of slip)
 #: Factor on the stiffness for difficult equilibria.
 EASED = 1e-2
 #: Collocation cannot correct multipliers within a step: constraints at its points cause rebound.
