@@ -206,3 +206,10 @@ def test_bad_heights(height, kind, words):
 def test_bad_widths(width, words):
     with pytest.raises(InputError, match=words):
         Beam(straight(), ElementBeamANCF(2), STEEL, width=width)
+
+
+@pytest.mark.parametrize("height, element", [
+    (lambda x: 0.1 * (1.0 - x) + 1e-17, 3), (lambda x: 0.1 * abs(x - 0.5) + 1e-18, "[12]")])
+def test_a_height_that_is_round_off_is_not_called_a_fold(height, element):
+    with pytest.raises(MeshError, match=f"height is zero to round-off in element {element}"):
+        MeshBeam.init_line(np.linspace(0, 1, 5), height).mapping().check()

@@ -18,6 +18,8 @@ from .taper import powers
 #: Round-off in coefficients of relative heights.
 NOTHING = 2e-14
 
+#: Smallest height over the largest one that is more than round-off.
+THIN = 1e-14
 #: Points of both faces at which folds are detected.
 _FACES = np.array([np.tile(np.linspace(0.0, 1.0, 9), 2), np.repeat([0.0, 1.0], 9)])
 
@@ -251,7 +253,14 @@ class MappingBeam(Mapping):
         return n / np.hypot(*n)
 
     def check(self) -> None:
-        """Raise :class:`MeshError` where the body folds: the map is not one to one."""
+        """Raise :class:`MeshError` where the body is too thin, or folds: not one to one."""
+        if self.mesh.heights is not None:
+            thin = np.min(self._relative(_FACES[0], None)[0], axis=1)
+            if np.min(thin) <= THIN:
+                k = int(np.argmin(thin))
+                raise MeshError(f"the height is zero to round-off in element {k}, which starts at "
+                                f"{self.mesh.p[:, self.mesh.t[0, k]].tolist()}: end the mesh "
+                                "before it gets thin there")
         least = self.detDF(_FACES).min(axis=1)
         if not least.min() > 0.0:
             bad = np.nonzero(~(least > 0.0))[0]
