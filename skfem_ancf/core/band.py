@@ -28,6 +28,10 @@ HALVES = -1
 REPEATED = 1e-13
 
 
+#: Addresses of the compiled functions of bands, see :mod:`skfem_ancf.core.loops`.
+ADDRESSES = np.zeros(4, np.int64)
+
+
 class Band(NamedTuple):
     """A band matrix: entries, pivots of ``gbtrf``, and layout."""
 
@@ -36,6 +40,7 @@ class Band(NamedTuple):
     ld: int
     width: int
     top: int
+    kernels: I1 = ADDRESSES
 
 
 def as_lapack(A: Band) -> Array:

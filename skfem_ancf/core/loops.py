@@ -7,8 +7,9 @@ import numpy as np
 from numba import objmode
 
 from . import callbacks
-from .band import LOST, REPEATED, SPARE
-from .source import source
+from .band import LOST, REPEATED, SPARE, Band
+from .jit import caller
+from .source import F1, F2, source
 
 indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
 
@@ -17,7 +18,27 @@ def column(x):
     return x
 
 
-# band matrices
+# band matrices; the functions of BANDS are compiled once and called by address
+
+
+def multiply(A, x, y):
+    _call_multiply(A.kernels[0], (A, x, y))
+
+
+def factorize(A):
+    done = np.empty(1)
+    _call_factorize(A.kernels[1], (A, done))
+    return done[0] > 0.0
+
+
+def solve(A, x):
+    _call_solve(A.kernels[2], (A, x))
+
+
+def solve_joined(A, J, J1, free, anew, Y, S, b, x):
+    done = np.empty(1)
+    _call_joined(A.kernels[3], (A, J, J1, free, anew, Y, S, b, x, done))
+    return done[0] > 0.0
 
 
 # symmetric: four columns at once, since zeros after each column replace entries that it lacks.
@@ -27,7 +48,8 @@ U = np.uint64
 I, J, K = U(1), U(2), U(3)
 
 
-def multiply(A, x, y):
+@source
+def put_product(A, x, y):
     if A.top > 0:
         _multiply_both(A, x, y)
     else:
@@ -79,12 +101,14 @@ def add_multiple(c, x, y):
         y[i] += c * x[i]
 
 
-def factorize(A):
+@source
+def put_factors(A, done):
     if A.top > 0:
-        return _exchanging(A)
-    if A.top < 0:
-        return _factorize_halves(A)
-    return _factorize_lower(A.flat, A.ld, A.width)
+        done[0] = 1.0 * _exchanging(A)
+    elif A.top < 0:
+        done[0] = 1.0 * _factorize_halves(A)
+    else:
+        done[0] = 1.0 * _factorize_lower(A.flat, A.ld, A.width)
 
 
 @source
@@ -172,7 +196,8 @@ def _exchanging(A):
     return True
 
 
-def solve(A, x):
+@source
+def put_solution(A, x):
     if A.top > 0:
         _solve_exchanged(A, x)
     else:
@@ -377,12 +402,13 @@ def subtract_rows(J, x, out):
             out[i] -= J[k, i] * x[k]
 
 
-def solve_joined(A, J, J1, free, anew, Y, S, b, x):
+@source
+def put_joined(A, J, J1, free, anew, Y, S, b, x, done):
     if anew:
         for k in range(b.size):
             for i in range(x.size):
                 Y[k, i] = J[k, i] * free[i]
-            solve(A, Y[k])
+            put_solution(A, Y[k])
     for k in range(b.size):
         for l in range(b.size):
             s = 0.0
@@ -391,10 +417,16 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
             S[k, l] = s
         for i in range(x.size):
             b[k] += J1[k, i] * x[i]
-    if not solve_dependent(S, b):
-        return False
-    subtract_rows(Y, b, x)
-    return True
+    done[0] = 1.0 * solve_dependent(S, b)
+    if done[0] > 0.0:
+        subtract_rows(Y, b, x)
+
+
+#: Large functions with annotations of their arguments, in the order of their addresses.
+BANDS = {put_product: (Band, F1, F1), put_factors: (Band, F1), put_solution: (Band, F1),
+         put_joined: (Band, F2, F2, F1, bool, F2, F2, F1, F1, F1)}
+_call_multiply, _call_factorize, _call_solve, _call_joined = (
+    caller(*hints) for hints in BANDS.values())
 
 
 # sums

@@ -12,8 +12,10 @@ from ..beam.kernels import blocks, loops as kernels
 from ..beam.kernels.compiled import CompiledTables, compiled_tables
 from ..beam.kernels.law import LINEAR, point_of
 from ..beam.strain_energy import FlatBody
+from ..core.band import ADDRESSES
 from ..core.code_cache import NotCompiled
 from ..core.jit import MADE, address, caller, compiled, reader
+from ..core.loops import BANDS
 from ..core.origin import ours
 from ..core.source import F1, F2, F3
 from ..core.words import Words
@@ -148,6 +150,8 @@ def part(name: str) -> int:
     """Compile or load a part; the address of one of :data:`PARTS`, else 0."""
     for kernel, k in KERNELS.get(name, {}).items():
         _ADDRESSES[k] = address(kernel, _HINTS[kernel])
+    if name == "bands":
+        ADDRESSES[:] = [address(*one) for one in BANDS.items()]
     return address(*PARTS[name]) if name in PARTS else 0
 
 

@@ -133,39 +133,46 @@ def cable_strains(x, d, r, E):
 
 
 @source
-def directions(t, r, s, X):
-    """Directions in which changes of the rows change the strain, from rows r to s; returns them.
+def directions(t, r, dd, X):
+    """Directions in which a change of the rows from r to r + dd changes the strain; returns them.
 
-    They are derivatives for equal r and s. Those of sections are means of the rows.
+    They are derivatives without dd. Those of sections are means of the rows.
     """
     if t.kind != SECTION:
-        cable_directions(r, s, X)
+        cable_directions(r, dd, X)
         return X
-    if r is s:
+    if len(dd) == 0:
         return r
     for g in range(len(r)):
-        a, b, c = r[g], s[g], X[g]
+        a, b, c = r[g], dd[g], X[g]
         for e in range(2 * W):
-            c[e] = 0.5 * (a[e] + b[e])
+            c[e] = a[e] + 0.5 * b[e]
     return X
 
 
 @source
-def cable_directions(r, s, X):
+def cable_directions(r, dd, X):
     """Those of extensions by r_X, then those of curvatures by r_X and by r_XX."""
     n = len(r) // 2
     for p in range(n):
         q, z = n + p, 2 * n + p
         for e in range(W):
             a, b, ax, ay = r[p, e], r[p, W + e], r[q, e], r[q, W + e]
-            a1, b1, ax1, ay1 = s[p, e], s[p, W + e], s[q, e], s[q, W + e]
-            square, square1 = a * a + b * b, a1 * a1 + b1 * b1
-            kappa = (a * ay - b * ax) / square + (a1 * ay1 - b1 * ax1) / square1
-            one, two = 1.0 / (np.sqrt(square) + np.sqrt(square1)), 1.0 / (square + square1)
-            X[p, e], X[p, W + e] = one * (a + a1), one * (b + b1)
-            X[q, e] = two * (ay + ay1 - kappa * (a + a1))
-            X[q, W + e] = -two * (ax + ax1 + kappa * (b + b1))
-            X[z, e], X[z, W + e] = -two * (b + b1), two * (a + a1)
+            square = a * a + b * b
+            length, kappa = np.sqrt(square), (a * ay - b * ax) / square
+            if len(dd) == 0:
+                one, two, kappa = 1.0 / length, 1.0 / square, 2.0 * kappa
+                X[p, e], X[p, W + e] = one * a, one * b
+            else:
+                c, d = a + dd[p, e], b + dd[p, W + e]
+                cx, cy = ax + dd[q, e], ay + dd[q, W + e]
+                other = c * c + d * d
+                kappa += (c * cy - d * cx) / other
+                one, two = 1.0 / (length + np.sqrt(other)), 2.0 / (square + other)
+                a, b, ax, ay = 0.5 * (a + c), 0.5 * (b + d), 0.5 * (ax + cx), 0.5 * (ay + cy)
+                X[p, e], X[p, W + e] = 2.0 * one * a, 2.0 * one * b
+            X[q, e], X[q, W + e] = two * (ay - kappa * a), -two * (ax + kappa * b)
+            X[z, e], X[z, W + e] = -two * b, two * a
 
 
 @source
@@ -239,14 +246,12 @@ def from_points(t, first, S, T):
 
 @source
 def stresses(t, first, E, change, T):
-    """Weighted stresses of strains; of their mean from E to E + change, unless that is empty."""
+    """Weighted stresses of strains E.
+
+    With a ``change`` about E, their work on it is the change of the energy.
+    """
     if t.law.kind == LINEAR:
-        if len(change) == 0:
-            times(t.pairs, block(t.H, first), E, T)
-        else:
-            middle = E.copy()
-            add(0.5, change, middle)
-            times(t.pairs, block(t.H, first), middle, T)
+        times(t.pairs, block(t.H, first), E, T)
     else:
         law_stresses(t, first, E, change, T)
 
@@ -260,14 +265,9 @@ def law_stresses(t, first, E, change, T):
 @source
 def put_law_stresses(t, first, E, change, T):
     """:func:`stresses` of a nonlinear law, by address."""
-    S = np.empty((3, t.weights.shape[1], W))
-    if len(change) == 0:
-        law_evaluate(t.law, at_points(t, first, E), S)
-    else:
-        middle = E.copy()
-        add(0.5, change, middle)
-        x = at_points(t, first, middle)
-        law_evaluate(t.law, x, S)
+    S, x = np.empty((3, t.weights.shape[1], W)), at_points(t, first, E)
+    law_evaluate(t.law, x, S)
+    if len(change) > 0:
         conserve(t.law, x, at_points(t, first, change), S)
     from_points(t, first, S, T)
 
@@ -349,8 +349,8 @@ def put(t, first, T, more, out):
 
 
 @source
-def push(t, first, X, T, B, F, f):
-    """Add the forces of stresses in directions X."""
+def push(t, first, X, T, U, B, F, f):
+    """Add the forces of stresses in directions X; with U, those of the constant stiffness too."""
     rows, ways = t.rows, t.ways
     B[:] = 0.0
     for s in range(len(T)):
@@ -364,29 +364,33 @@ def push(t, first, X, T, B, F, f):
                 b[e] += c[e] * y[e]
                 b[W + e] += c[e] * y[W + e]
     from_rows(t, first, B, F)
+    if len(U) > 0 and len(t.K) > 0:
+        add_constant(t.coupled, block(t.K, first), block(t.Z, first), U, F)
     add_to_nodes(t, first, F, f)
 
 
 @source
-def push_constant(t, first, U, F, f):
+def add_constant(coupled, K, Z, U, F):
     """Add the forces of the constant stiffness."""
-    if len(t.K) == 0:
-        return
-    K, Z, n, p = block(t.K, first), block(t.Z, first), 0, 0
-    F[:] = 0.0
-    for k in range(len(U)):
-        for l in range(k):
-            a, z, x, y, X, Y = K[n], Z[p], U[k], U[l], F[k], F[l]
+    for n in range(coupled.shape[1]):
+        k, l = coupled[0, n], coupled[1, n]
+        a, x, y, X, Y = K[k * (k + 1) // 2 + l], U[k], U[l], F[k], F[l]
+        for e in range(W):
+            X[e] += a[e] * y[e]
+            X[W + e] += a[W + e] * y[W + e]
+        if k != l:
+            for e in range(W):
+                Y[e] += a[e] * x[e]
+                Y[W + e] += a[W + e] * x[W + e]
+        if coupled[2, n] > 0 and k == l:
+            for e in range(W):
+                X[e] += a[2 * W + e] * x[W + e]
+                X[W + e] += a[2 * W + e] * x[e]
+        elif coupled[2, n] > 0:
+            z = Z[k * (k - 1) // 2 + l]
             for e in range(W):
                 xy, yx = a[2 * W + e] + z[e], a[2 * W + e] - z[e]
-                X[e] += a[e] * y[e] + xy * y[W + e]
-                X[W + e] += a[W + e] * y[W + e] + yx * y[e]
-                Y[e] += a[e] * x[e] + yx * x[W + e]
-                Y[W + e] += a[W + e] * x[W + e] + xy * x[e]
-            n, p = n + 1, p + 1
-        a, x, X = K[n], U[k], F[k]
-        for e in range(W):
-            X[e] += a[e] * x[e] + a[2 * W + e] * x[W + e]
-            X[W + e] += a[W + e] * x[W + e] + a[2 * W + e] * x[e]
-        n += 1
-    add_to_nodes(t, first, F, f)
+                X[e] += xy * y[W + e]
+                X[W + e] += yx * y[e]
+                Y[e] += yx * x[W + e]
+                Y[W + e] += xy * x[e]

@@ -49,6 +49,7 @@ class CompiledTables(NamedTuple):
     Q: F2  # from skew coefficients to Z, (m (m - 1) / 2, nz)
     K: F3  # constant stiffness, (n, m (m + 1) / 2, 3 W), or empty
     Z: F3  # (n, m (m - 1) / 2, W), or empty
+    coupled: I2  # functions k >= l that it couples, and 1 if x is coupled to y, (3, nc)
     law: LawTables
     along: F2  # from samples to integration points, (3 points, ns)
     weights: F3  # of the points, (n, points, W)
@@ -80,7 +81,8 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
             _blocks(each(t.frame, OF_FRAME) / R[:, :, None]), t.rows, np.array([first, second]),
             t.pairs, _blocks(each(t.H, OF_H) * sigma[:, t.pairs[0]] * sigma[:, t.pairs[1]]),
             np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None], t.of,
-            t.products, t.products[:, k != l], *_products(G[0], t.products, own), K, Z)),
+            t.products, t.products[:, k != l], *_products(G[0], t.products, own), K, Z,
+            _coupled(K, Z, D.shape[1]))),
         t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS))))
 
 
@@ -119,3 +121,14 @@ def _symmetric_and_skew(C, D):
     one, two = C[:, :, 0, :, 1], C[:, :, 1, :, 0]
     K = np.stack([C[:, i, 0, j, 0], C[:, i, 1, j, 1], 0.5 * (one + two)[:, i, j]], axis=2)
     return _blocks(K), _blocks(0.5 * (one - two)[:, a, b])
+
+
+def _coupled(K, Z, m):
+    """Functions k >= l that K and Z couple, and 1 if component x of one acts on y of the other."""
+    if not len(K):
+        return np.zeros((3, 0), np.int64)
+    k, l = np.tril_indices(m)
+    both = K.any(axis=0).reshape(len(k), 3, W).any(axis=2)
+    both[k != l, 2] |= Z.any(axis=(0, 2))
+    used = both.any(axis=1)
+    return np.array([k, l, both[:, 2]], np.int64)[:, used]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.source import source
 from .blocks import (add, at_points, between_samples, block, changes, directions, displaced,
-                     from_points, gather, moduli, push, push_constant, put, strains, stresses,
+                     from_points, gather, moduli, push, put, strains, stresses,
                      take, times, to_rows)
 from .compiled import W
 from .law import LINEAR, conserve, law_evaluate
@@ -22,12 +22,14 @@ def force(t, u, given, out, f):
     Without ``out``, given stresses act without the constant stiffness.
     """
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    U, F, d, r, B = (np.empty((m, 2 * W)), np.empty((m, 2 * W)), np.empty((R, 2 * W)),
-                     np.empty((R, 2 * W)), np.empty((R, 2 * W)))
-    E, T, X = np.empty((ns, W)), np.empty((ns, W)), np.empty((3 * R // 2, 2 * W))
+    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * W)), np.empty((2, ns, W))
+    U, F, d, r, B, X = (work[:m], work[m:2 * m], work[2 * m:2 * m + R],
+                        work[2 * m + R:2 * m + 2 * R], work[2 * m + 2 * R:2 * m + 3 * R],
+                        work[2 * m + 3 * R:])
+    E, T, whole = samples[0], samples[1], out.size > 0 or given.size == 0
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
-        if out.size > 0 or given.size == 0:
+        if whole:
             strains(t, first, d, r, E)
             stresses(t, first, E, E[:0], T)
         if out.size > 0:
@@ -35,82 +37,75 @@ def force(t, u, given, out, f):
         if given.size > 0:
             take(t, first, given, T)
         if f.size > 0:
-            push(t, first, directions(t, r, r, X), T, B, F, f)
-            if out.size > 0 or given.size == 0:
-                push_constant(t, first, U, F, f)
+            push(t, first, directions(t, r, d[:0], X), T, U if whole else U[:0], B, F, f)
 
 
 @source
 def mean(t, u, v, given, out, f):
     """As :func:`force`, but means from u to v whose work is the change of the energy."""
     R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v - u
-    U, V, F, d, dd, r, z, B = (np.empty((m, 2 * W)), np.empty((m, 2 * W)), np.empty((m, 2 * W)),
-                               np.empty((R, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W)),
-                               np.empty((R, 2 * W)), np.empty((R, 2 * W)))
-    E, C, T = np.empty((ns, W)), np.empty((ns, W)), np.empty((ns, W))
-    X = np.empty((3 * R // 2, 2 * W))
+    work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * W)), np.empty((3, ns, W))
+    U, V, F, rows = work[:m], work[m:2 * m], work[2 * m:3 * m], work[3 * m:]
+    d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
+    E, C, T, whole = samples[0], samples[1], samples[2], out.size > 0 or given.size == 0
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         gather(t, first, du, V)
         to_rows(t, first, V, dd)
-        z[:] = r
-        add(1.0, dd, z)
-        D = directions(t, r, z, X)
-        if out.size > 0 or given.size == 0:
+        D = directions(t, r, dd, X)
+        if whole:
             strains(t, first, d, r, E)
             changes(t, D, dd, C)
+            add(0.5, C, E)
             stresses(t, first, E, C, T)
+            add(0.5, V, U)
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if given.size > 0:
             take(t, first, given, T)
-        push(t, first, D, T, B, F, f)
-        if out.size > 0 or given.size == 0:
-            add(0.5, V, U)
-            push_constant(t, first, U, F, f)
+        push(t, first, D, T, U if whole else U[:0], B, F, f)
 
 
 @source
 def linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    U, F, d, dd, r, B = (np.empty((m, 2 * W)), np.empty((m, 2 * W)), np.empty((R, 2 * W)),
-                         np.empty((R, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W)))
-    E, T, X = np.empty((ns, W)), np.empty((ns, W)), np.empty((3 * R // 2, 2 * W))
+    work, samples = np.empty((2 * m + 4 * R + 3 * R // 2, 2 * W)), np.empty((2, ns, W))
+    U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
+    d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         gather(t, first, du, U)
         to_rows(t, first, U, dd)
         if t.law.kind != LINEAR:
             strains(t, first, d, r, E)
-        H, D = moduli(t, first, E), directions(t, r, r, X)
+        H, D = moduli(t, first, E), directions(t, r, d[:0], X)
         changes(t, D, dd, E)
         times(t.pairs, H, E, T)
         if out.size > 0:
             put(t, first, T, given, out)
         if f.size > 0:
-            push(t, first, D, T, B, F, f)
+            push(t, first, D, T, U[:0], B, F, f)
 
 
 @source
 def tangent(t, u, given, out, f, A, ld):
     """Tangent, force and stresses at u; the geometric part has the given stresses, if any."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    U, F, d, r, B = (np.empty((m, 2 * W)), np.empty((m, 2 * W)), np.empty((R, 2 * W)),
-                     np.empty((R, 2 * W)), np.empty((R, 2 * W)))
-    E, T, Y = np.empty((ns, W)), np.empty((ns, W)), np.empty((3 * R // 2, 2 * W))
+    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * W)), np.empty((2, ns, W))
+    U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
+    d, r, B, Y = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:]
     w, z = np.empty((t.products.shape[1], 3 * W)), np.empty((t.skew.shape[1], W))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
-        X = directions(t, r, r, Y)
+        X = directions(t, r, d[:0], Y)
         if out.size > 0 or f.size > 0 or given.size == 0:
             stresses(t, first, E, E[:0], T)
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if f.size > 0:
-            push(t, first, X, T, B, F, f)
-            push_constant(t, first, U, F, f)
+            push(t, first, X, T, U, B, F, f)
         w[:] = 0.0
         z[:] = 0.0
         add_material(t, moduli(t, first, E), X, w, z)
@@ -136,7 +131,7 @@ def unsymmetric(t, u, v, A, ld):
         to_rows(t, first, U, d)
         s[:] = r
         add(1.0, d, s)
-        one, two = directions(t, r, r, X), directions(t, s, s, Y)
+        one, two = directions(t, r, d[:0], X), directions(t, s, d[:0], Y)
         w[:] = 0.0
         z[:] = 0.0
         add_difference(t, moduli(t, first, E), one, two, w, z)
@@ -198,7 +193,7 @@ def gradients(t, u, out):
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
-        put_derivatives(t, first, directions(t, r, r, Y), B)
+        put_derivatives(t, first, directions(t, r, d[:0], Y), B)
         H, pairs = moduli(t, first, E), t.pairs
         C[:] = 0.0
         for q in range(len(H)):
@@ -278,24 +273,21 @@ def shifted(t, first, E, change, shift, S):
 def eigen_mean(t, u, v, shift, f):
     """Change of the mean force from u to v by eigenstrains (3, points, ne) of a nonlinear law."""
     R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v - u
-    U, F, d, dd, r, z, B = (np.empty((m, 2 * W)), np.empty((m, 2 * W)), np.empty((R, 2 * W)),
-                            np.empty((R, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W)),
-                            np.empty((R, 2 * W)))
+    U, d, dd, r, B = (np.empty((m, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W)),
+                      np.empty((R, 2 * W)), np.empty((R, 2 * W)))
     E, C, T = np.empty((ns, W)), np.empty((ns, W)), np.empty((ns, W))
     X, S = np.empty((3 * R // 2, 2 * W)), np.empty((3, t.weights.shape[1], W))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         gather(t, first, du, U)
         to_rows(t, first, U, dd)
-        z[:] = r
-        add(1.0, dd, z)
-        D = directions(t, r, z, X)
+        D = directions(t, r, dd, X)
         strains(t, first, d, r, E)
         changes(t, D, dd, C)
         add(0.5, C, E)
         shifted(t, first, E, C, shift, S)
         from_points(t, first, S, T)
-        push(t, first, D, T, B, F, f)
+        push(t, first, D, T, U[:0], B, U, f)
 
 
 @source
