@@ -164,11 +164,15 @@ def entry(function: Any, args: Any) -> Any:
     run.__name__, run.__module__ = function.__name__, function.__module__
     signature = tuple(types.int64 if isinstance(x, tuple) else typeof(x) for x in args)
     found = _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(run)))
+    tuples = [k for k, x in enumerate(args) if isinstance(x, tuple)]
     known: dict[int, Words] = {}
 
     def call(*args):
-        words = [_words(x, known) if isinstance(x, tuple) else x for x in args]
-        return found(*[x.address if type(x) is Words else x for x in words])
+        numbers = list(args)
+        alive = [_words(args[k], known) for k in tuples]
+        for k, words in zip(tuples, alive):
+            numbers[k] = words.address
+        return found(*numbers)
 
     return call
 

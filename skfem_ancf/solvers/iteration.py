@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..actions.tables import (add_constraint_rate, add_joint_force, constraint, external_force)
-from ..core.band import diagonal, largest, multiply
+from ..core.band import largest, multiply
 from ..core.types import Array
 from ..equations import evaluation
 from ..equations.backend import Backend
@@ -66,7 +67,7 @@ class Iterate:
         self.e, self.target = backend.tables.plain, target
         self.u, self.multipliers = u, multipliers
         self.force, self.load = np.empty_like(u), np.empty_like(u)
-        self.phi = np.zeros_like(multipliers)
+        self.phi, self.squares = np.zeros_like(multipliers), self.e.sizes**2
         self.stresses, self.independent = backend.tables.stresses, backend.tables.stresses
         self._tangent, self._force, self._linearised, self._hold_back = backend.leaves(
             evaluation.tangent, evaluation.force, evaluation.linearised, evaluation.hold_back,
@@ -90,21 +91,24 @@ class Iterate:
             self._linearised(u - du, du, self.stresses, self.independent)
         self._tangent(u, factors, t, target.scale, target.at, mixed, self.stresses,
                       self.independent, self.force)
-        scale = np.empty_like(u)
-        diagonal(e.K, scale)
-        scale = np.abs(scale)
-        self.weights = 1.0 / (scale + SMALLEST * mean_stiffness(scale, e.sizes) / e.sizes**2)
+        scale = np.abs(e.K.flat[e.K.top::e.K.ld])
+        least = SMALLEST * mean_stiffness(scale, self.squares)
+        self.weights = 1.0 / (scale + least / self.squares)
 
     def residual(self) -> Array:
         """The residual at free DOFs; sets ``load``, ``phi`` and ``opening``."""
-        e, target, u, pull = self.e, self.target, self.u, np.zeros(len(self.u))
+        e, target, u = self.e, self.target, self.u
         external_force(e.loads, target.factors, target.when, target.scale, u, self.load)
-        self.opening = 0.0
+        self.opening, R = 0.0, self.load - self.force
         if self.phi.size:
             constraint(e.joints, target.c, target.g, target.at, u, self.phi)
             self.opening = largest(self.phi / e.joints.sizes)
+            pull = np.zeros(len(u))
             add_joint_force(e.joints, target.g, target.at, u, self.multipliers, pull)
-        return (self.load - self.force - target.gap - pull) * e.free
+            R -= pull
+        R -= target.gap
+        R *= e.free
+        return R
 
     def correction(self, R: Array, moving: bool, solver: Any) -> tuple[Array, Array, float]:
         """Corrections of u and the multipliers, and the root of their work; NaN on failure.
@@ -112,8 +116,9 @@ class Iterate:
         If ``moving``, the fixed DOFs take their prescribed changes.
         """
         e, target, u = self.e, self.target, self.u
-        (du, moved), phi, dm = np.zeros((2, len(u))), self.phi, np.zeros(len(self.phi))
+        du, phi, dm = np.empty(len(u)), self.phi, np.zeros(len(self.phi))
         if moving:  # R - K du of the fixed DOFs
+            moved = np.zeros(len(u))
             moved[e.fixed] = target.prescribed
             multiply(e.K, moved, du)
             R = (R - du) * e.free
@@ -121,9 +126,10 @@ class Iterate:
                 add_constraint_rate(e.joints, target.g, target.at, u, moved, phi)
         if not solver.solve_into(target.at, u, self.multipliers, R, -phi, du, dm):
             return du, dm, np.nan
-        work = float(np.sqrt(abs(R @ du) + abs(phi @ dm)))
-        du += moved
-        if e.forces.contacts.number and not moving:
+        work = sqrt(abs(np.dot(R, du)) + abs(np.dot(phi, dm)))
+        if moving:
+            du += moved
+        elif e.forces.contacts.number:
             self._hold_back(target.at, u, R, du, dm)
         return du, dm, work
 
@@ -206,12 +212,12 @@ def _diverging(wary, k, work):
 
 def norm(x: Array, weights: Array) -> float:
     """Root of the weighted sum of squares."""
-    return float(np.sqrt(np.dot(x * x, weights)))
+    return sqrt(np.dot(x * x, weights))
 
 
 def reference_work(force: Array, load: Array, u: Array) -> float:
     """Root of the work of the forces, to which corrections are compared."""
-    return float(np.sqrt(max(abs(force @ u), abs(load @ u))))
+    return sqrt(max(abs(np.dot(force, u)), abs(np.dot(load, u))))
 
 
 def settled(work: float, reference: float, rules: Any) -> bool:
@@ -219,6 +225,6 @@ def settled(work: float, reference: float, rules: Any) -> bool:
     return work <= rules.tol * reference + rules.floor
 
 
-def mean_stiffness(diagonal: Array, sizes: Array) -> float:
-    """Mean of the scaled stiffnesses; 1 if it is zero."""
-    return float(np.dot(sizes * sizes, diagonal)) / sizes.size or 1.0
+def mean_stiffness(diagonal: Array, squares: Array) -> float:
+    """Mean of the stiffnesses, scaled by the squared sizes of the DOFs; 1 if it is zero."""
+    return float(np.dot(squares, diagonal)) / squares.size or 1.0
