@@ -166,7 +166,7 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
     works: list[float] = []
     for k in range(rules.iterations + 1):
         # the last residual needs no tangent
-        part = min(1.0, work / before) if k > 1 else 1.0
+        part = min(1.0, work / before) if k > 1 and before > 0.0 else 1.0
         last = (k >= LEAST or (k > 0 and quiet)) and settled(work * part, reference, rules)
         if last:
             x.evaluate_force()
