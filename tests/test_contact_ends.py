@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from skfem_ancf import (Beam, Circle, ConvergenceError, ElementBeamANCF, ElementBeamCable, Line,
                         MeshBeam, Scene, StVenantKirchhoff, SupportError)
 
-MOST = 60
+MOST = 105
 RUBBER = StVenantKirchhoff(2e8, 0.3, 7800.0)
 CABLE, SECTIONS = ElementBeamCable(5), ElementBeamANCF(2)
 elements = pytest.mark.parametrize("element", [CABLE, SECTIONS], ids=["cable", "sections"])
