@@ -33,7 +33,7 @@ COMPILING = {"StrainTables": 12.0, "elements": 3.0, "contacts": 12.0, "unsymmetr
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
               "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}
-LOADING = 0.7
+LOADING = 0.5
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds of compiling that need no reason once the parts are loaded.
 SHORT = 2.0

@@ -74,7 +74,7 @@ class Sections:
     def field(self, q: Array, slope: bool = False) -> Array:
         """A field of nodal values (ne, nb, 2), or its derivative by xi; (2, n, k)."""
         def of(functions):
-            return np.einsum("bnk,nbi->ink", functions, q[self.e], optimize=True)
+            return (q[self.e].swapaxes(1, 2) @ functions.swapaxes(0, 1)).swapaxes(0, 1)
 
         if slope or self._arm is None:
             return of(self._functions[1 if slope else 0])
@@ -83,10 +83,12 @@ class Sections:
 
     def nodal(self, force: Array) -> Array:
         """Element vectors (ne, nb, 2) of forces (2, n, k)."""
-        parts = np.einsum("bnk,ink->nbi", self._functions[0], force, optimize=True)
+        def of(functions, force):
+            return functions.swapaxes(0, 1) @ force.transpose(1, 2, 0)
+
+        parts = of(self._functions[0], force)
         if self._arm is not None:
-            parts = parts + np.einsum("bnk,ink->nbi", self._functions[1], self._arm * np.array(
-                [force[1], -force[0]]), optimize=True)
+            parts = parts + of(self._functions[1], self._arm * np.array([force[1], -force[0]]))
         out = np.zeros((self.beam.mesh.nelements,) + parts.shape[1:], parts.dtype)
         np.add.at(out, self.e, parts)
         return out

@@ -198,9 +198,9 @@ class Increment:
         backend = backend or system.backend
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not solver else 0)
+        target = self._target(backend.tables, u)
         status, x, residuals, works = equilibrium(
-            backend, self._target(backend.tables, u), rules, solver or system.solver, u,
-            multipliers)
+            backend, target, rules, solver or system.solver, u, multipliers)
         n = len(works)
         self.record.iterations += n
         self.record.force_residuals += residuals
@@ -211,8 +211,20 @@ class Increment:
         if lost := system.constraints.lost(x.u):
             raise StepFailed(lost)
         if n == 0:
-            system.solver.forget()
+            self._take_tangent(backend, target, x)
         return Equilibrium(x.u, x.multipliers, x.force)
+
+    def _take_tangent(self, backend, target, x):
+        """Factorise the first tangent of an iteration if it is that of the solution."""
+        tables, solver = backend.tables, self.system.solver
+        if (backend is not self.system.backend or tables.prestressed
+                or tables.plain.loads.custom):
+            solver.forget()
+            return
+        try:
+            solver.factorize(x.u, target.at, x.multipliers)
+        except NO_FACTORS:
+            solver.forget()
 
     def _target(self, tables, u):
         """The :class:`~skfem_ancf.solvers.iteration.Target` of the level."""
