@@ -132,7 +132,7 @@ def test_a_long_motion_is_compiled_on_its_way_which_is_said(auto, capsys):
     assert loads[0] == "steps"
     said = capsys.readouterr().err.splitlines()
     assert said[0].startswith("skfem_ancf: compiling once, about ") and " s, cached in " in said[0]
-    assert said[-1].endswith("100%") and len(said) == 3  # the kernel, and the steps
+    assert said[-1].endswith("100%") and len(said) > 2  # parts, and the steps
     assert s.plan("dynamic")["compiled loop"].reason.endswith("compiled code is loaded")
     s.system.internal_force(np.full(s.layout.N, 1e-3))  # as energies of the motion ask for them
     assert loads == ["steps", "force"]

@@ -24,8 +24,9 @@ class NotCompiled(Exception):
 
 
 #: Lines of files that are compiled, and names of others on which compiled code depends.
-_MARKS = re.compile(rb"^\s*(@source|@primitive|import numba|from numba)", re.MULTILINE)
-_ALSO = "loops.py", "tables.py", "words.py"
+_MARKS = re.compile(rb"^\s*(@source|@primitive|import numba|from (numba|\.+(core\.)?source) )",
+                    re.MULTILINE)
+_ALSO = "loops.py", "words.py"
 
 
 @cache
