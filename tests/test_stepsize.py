@@ -57,6 +57,21 @@ def test_error_is_in_proportion_to_the_tolerance(scheme, name):
     assert 0.05 < min(ratios) and max(ratios) < 2.5, ratios
 
 
+@pytest.mark.parametrize("scheme, size", [("auto", 1e-4), ("energy-momentum", 1e-5)])
+def test_small_vibrations_are_right(scheme, size):
+    """The first mode swings as a cosine with the frequency of the eigenvalue problem."""
+    scene = Scene(soft(2, 2, E=1e5, h=0.1)).clamp("left")
+    modes = scene.modes(1)
+    largest = np.abs(modes.mode(0, 1.0).u[positions(scene)]).max()
+    start = modes.mode(0, size * scene.system.size / largest)
+    period = 2.0 * np.pi / modes.frequencies[0]
+    history = scene.integrate(3.0 * period, "auto", scheme=scheme, start=start,
+                              t_eval=np.linspace(0.0, 3.0 * period, 25))
+    right = np.cos(modes.frequencies[0] * history.t)[:, None] * start.u
+    at = positions(scene)
+    assert np.abs(history.u - right)[:, at].max() < 0.01 * np.abs(start.u[at]).max()
+
+
 @pytest.mark.parametrize("name, rtol, tol", [("swinging", 1e-6, 1e-3), ("vibrating", 1e-4, 1e-2)])
 def test_as_many_steps_as_scipy_at_the_same_error(name, rtol, tol):
     """By its Radau, of the same order; its tolerances are of a step, of rates too."""

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import copyreg
 import logging
 import re
-import sys
-from importlib import import_module
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -34,21 +30,6 @@ SYMMETRIC, OTHER = 1e-6, 0.7310585786
 #: Gauss points for the work from the reference configuration, and in a time step.
 WORK, MEAN = 6, 3
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
-
-
-def _form_of(module, name):
-    return attrgetter(name)(import_module(module))
-
-
-def _reduced(form):
-    """Pickle a decorated form by its name, which the function shares."""
-    module, name = form.form.__module__, form.form.__qualname__
-    named = getattr(sys.modules.get(module), name, None) is form
-    return (_form_of, (module, name)) if named else object.__reduce_ex__(form, 4)
-
-
-copyreg.pickle(LinearForm, _reduced)
-copyreg.pickle(BilinearForm, _reduced)
 
 
 class _Parameters(FormExtraParams):

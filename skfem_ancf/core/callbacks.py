@@ -7,6 +7,7 @@ import weakref
 from itertools import count
 from typing import Any
 
+from .interrupts import raise_pending
 from .source import primitive
 
 _numbers = count(1)
@@ -22,6 +23,7 @@ def handle_of(thing: Any) -> int:
 
 def owner(handle: int) -> Any:
     """The object of a handle."""
+    raise_pending()
     return _objects[handle]
 
 

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .errors import CallError, ImmutableError, InputError, NameUnknown, require_options
+from .packing import packed, unpacked
 
 T = TypeVar("T")
 
@@ -73,7 +74,7 @@ class Immutable(metaclass=_Freezing):
     def _thawed(self):
         """A copy whose attributes can be set until ``_freeze``."""
         other = object.__new__(type(self))
-        vars(other).update(self.__getstate__(), _frozen=False)
+        vars(other).update(self._attributes(), _frozen=False)
         return other
 
     def _require_thawed(self, name):
@@ -93,12 +94,15 @@ class Immutable(metaclass=_Freezing):
             self._require_thawed(name)
         object.__delattr__(self, name)
 
-    def __getstate__(self):
+    def _attributes(self):
         derived = type(self)._derived
         return {name: value for name, value in vars(self).items() if name not in derived}
 
+    def __getstate__(self):
+        return packed(self._attributes())
+
     def __setstate__(self, state):
-        vars(self).update(state)
+        vars(self).update(unpacked(state))
         self._freeze()
 
     def __deepcopy__(self, memo):

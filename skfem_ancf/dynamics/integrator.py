@@ -74,7 +74,7 @@ class Integrator:
             int(scheme.conserving), *map(float, scheme.parameters), self.tol,
             8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles])
         self._state = new_state()
-        self.dt, self.substeps, self._lost = np.nan, 0, ""
+        self.dt, self.substeps, self._lost, self.stopped = np.nan, 0, "", False
         self.longest = max(1, min(STORED // (4 * system.N + memory), BLOCK))
 
 
@@ -206,22 +206,29 @@ class Integrator:
         given = self._course.of(begun, dt, (first, first + n), self.limit, block)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
-        rows, multipliers, works = np.empty((n, 4, s.N)), np.empty((n, 2, self.m)), np.empty(n)
+        rows, works = np.full((n, 4, s.N), np.nan), np.empty(n)
+        multipliers = np.full((n, 2, self.m), np.nan)
         memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        done = self._call(steps, y, dt, rows, self._rule, _step_data(given, dt, s), self._state,
-                          work, memories, rows, multipliers, works)
+        done = self._call(steps, y, dt, (rows, multipliers), self._rule,
+                          _step_data(given, dt, s), self._state, work, memories, rows, multipliers,
+                          works)
         lasting = contacts.lasting
         return [Motion(begun + dt * (first + k + 1), u, v, a, w, m, force, dt, dissipated,
                        memory if lasting else y.contacts, y.turns)
                 for k, (u, v, a, w), (m, force), dissipated, memory in zip(
                     range(done), rows, multipliers, works.tolist(), memories)]
 
-    def _call(self, function: Callable, y: Motion, dt: float, rows: Array, *args: Any) -> int:
-        """Call a compiled function that takes steps; returns how many succeeded."""
-        s, state, before = self.system, self._state, np.array(self._state)
+    def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
+              *args: Any) -> int:
+        """Call a compiled function that takes steps; returns how many succeeded.
+
+        On Ctrl-C it counts the steps that are complete in the arrays ``out`` of NaN, the first of
+        which has the displacements, and sets ``stopped``.
+        """
+        s, state, before, rows = self.system, self._state, np.array(self._state), out[0]
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
@@ -232,10 +239,13 @@ class Integrator:
         try:
             with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
                 done = call(self._matrices, *args)
-        except BaseException:  # also Ctrl-C: the motion may continue from y
+        except BaseException as error:  # the motion may continue from y
             self._load_state(before)
             self.forget()
-            raise
+            if not isinstance(error, KeyboardInterrupt):
+                raise
+            left = [np.isnan(x.reshape(len(x), -1)).any(axis=1) for x in out]
+            done, self.stopped = int(np.argmax(np.append(left[0] | left[1], True))), True
         done, self._lost = s.constraints.first_lost(rows[:done, 0])
         if done and s.forces.contacts.sweeps:
             u, v = (np.concatenate([[x], rows[:done, k]]) for k, x in enumerate((y.u, y.v)))
@@ -253,6 +263,8 @@ class Integrator:
     def take(self, y: Motion, dt: float) -> Motion:
         """One step of size dt from the Motion ``y``; raises StepFailed."""
         taken = self.run(y, dt, 1)
+        if self.stopped:
+            raise KeyboardInterrupt
         if not taken:
             raise StepFailed(self.failure)
         return taken[0]

@@ -249,6 +249,8 @@ class Run:
         except AncfError:  # from a user's function: continue in single steps
             self._in_blocks = False
             return False
+        if not taken and self.integrator.stopped:
+            raise KeyboardInterrupt
         if not taken:
             return False
         turns = self._turns.follow(self.y.turns, np.array([y.u for y in taken]))
@@ -259,6 +261,8 @@ class Run:
         for old, new in zip([self.y, *taken], taken):
             self._store(old, new)
         self._n, self.steps, self.y = self._n + len(taken), self.steps + len(taken), taken[-1]
+        if self.integrator.stopped:
+            raise KeyboardInterrupt
         return True
 
     def _automatic(self):

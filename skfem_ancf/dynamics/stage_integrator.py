@@ -63,12 +63,13 @@ class StageIntegrator(Integrator):
             _flat(given.factors), _flat(given.supports),
             JointMotions(_flat(given.c), _flat(given.g[:, :, [0, 0, 1, 2]]),
                          int(s.backend.tables.motion_varies)))
-        rows, stages = np.empty((n + 1, 3, s.N)), np.empty((n, len(w.U), s.N))
+        rows, stages = np.full((n + 1, 3, s.N), np.nan), np.empty((n, len(w.U), s.N))
         rows[0, 0], rows[0, 1] = y.u, y.v
         forces = np.empty((n, len(w.U) + 1, self.m))
-        memories = np.empty((n, 1 + (contacts.tables.memory.size if contacts.lasting else 0)))
-        done = self._call(collocate, y, dt, rows[1:], self._rule, interval, w, self._state,
-                          memories, rows[1:], stages, forces)
+        kept = contacts.tables.memory.size if contacts.lasting else 0
+        memories = np.full((n, 1 + kept), np.nan)
+        done = self._call(collocate, y, dt, (rows[1:], memories[:, :1]), self._rule, interval, w,
+                          self._state, memories, rows[1:], stages, forces)
         return [replace(y, t=begun + dt * (first + k + 1), u=rows[k + 1, 0], v=rows[k + 1, 1],
                         acceleration=rows[k + 1, 2], algorithmic=rows[k + 1, 2],
                         multipliers=forces[k, -1], force=forces[k, -1], before=dt,

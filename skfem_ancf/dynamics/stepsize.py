@@ -22,10 +22,17 @@ SINGLE = 0.1
 REJECTED = 1.2
 #: Growth of the step size below which the size, and the factors, stay.
 WORTH = 1.3
+#: Error relative to the motion so far, over ``rtol``, where that is small beside the scene.
+OF_MOTION = 100.0
+#: Size of a motion at rest, over that of the scene.
+AT_REST = 1e-7
 
 
 class StepSize:
     """Chooses steps so that the error of every point is about ``rtol`` times the size of the scene.
+
+    For motions that are small beside the scene it is :data:`OF_MOTION` times ``rtol`` of the
+    largest displacement since the start, a root mean square as the error is.
 
     A step may add an error in proportion to its size (error per unit step). The error is a root
     mean square weighted by mass, times :data:`LARGEST`. Parts of the estimate that do not
@@ -54,11 +61,21 @@ class StepSize:
         self.span, self._averaged = t_end - t_start, scheme.order <= 2
         self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
+        self._origin, self._moved = np.zeros(0), 0.0
         self.cut = Lookahead(system, t_start, t_end).cut
 
-    def _size(self, de):
-        return (np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / self._mass)
-                / (self.system.size * self.rtol))
+    def _mean(self, du):
+        """The root mean square of a displacement over the size of the scene."""
+        return (np.sqrt(max(du @ self.system.mass.multiply(du), 0.0) / self._mass)
+                / self.system.size)
+
+    def _scale(self, old, new):
+        """The size to which errors refer, over that of the scene."""
+        if not self._origin.size:
+            self._origin = old.u
+        self._moved = max(self._moved, self._mean(old.u - self._origin))
+        moved = max(self._moved, self._mean(new.u - self._origin))
+        return min(1.0, OF_MOTION * max(AT_REST, moved))
 
     def error(self, integrator: Integrator, old: Motion, new: Motion, dt: float) -> float:
         """The error that a step adds, over what it may add."""
@@ -74,8 +91,8 @@ class StepSize:
             for average in self._new:
                 average += part * (rate - average)
                 rate = average
-        return LARGEST * self.scheme.safety * max(
-            self._size(rate) * dt**(power - 1) * self.span, self._size(de) / SINGLE)
+        return LARGEST * self.scheme.safety / (self.rtol * self._scale(old, new)) * max(
+            self._mean(rate) * dt**(power - 1) * self.span, self._mean(de) / SINGLE)
 
     def _free(self, y, de):
         """The increment after projection onto the joints."""
@@ -103,8 +120,12 @@ class StepSize:
 
     def arrays(self) -> dict[str, Array]:
         """Arrays for a checkpoint."""
-        return {"averages": self._averages}
+        return {"averages": self._averages, "origin": self._origin,
+                "moved": np.array(self._moved)}
 
     def load(self, arrays: dict[str, Any]) -> None:
         """Restore what :meth:`arrays` returned."""
         self._averages = stored(arrays, "averages", self._averages)
+        if np.size(arrays["origin"]):
+            self._origin = stored(arrays, "origin", self._averages[0])
+        self._moved = float(stored(arrays, "moved", 0.0))

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..beam.kernels.law import CUSTOM
 from ..core import code_cache
+from ..core.interrupts import deferred
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, wanted
 from .tables import Tables
@@ -174,7 +175,8 @@ class Backend:
             except Exception as error:  # a user's function, or an incompatible Numba
                 self._give_up(kernel, error)
                 return self._in_numpy(kernel)(*args)
-            return function(equations, *args)
+            with deferred():
+                return function(equations, *args)
 
         return run
 

@@ -415,8 +415,11 @@ class Constraints:
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
-    def force_on(self, selected: Array, multipliers: Array) -> tuple[Array, Array]:
+    def force_on(self, selected: Array, multipliers: Array, rest: Array) -> tuple[Array, Array]:
         """Support-like forces: of constant joints that involve only selected DOFs (N,).
+
+        A scheme that has the equations of motion inside of steps leaves a ``rest`` (N,) of all
+        forces at their end. As the force of fixed DOFs, that of these joints balances its part.
 
         Returns
         -------
@@ -424,12 +427,20 @@ class Constraints:
             The force on the DOFs, and whether a DOF belongs to such a joint, shape (N,).
         """
         force, touched, zero = np.zeros(self.N), np.zeros(self.N, dtype=bool), np.zeros(self.N)
+        found = []
         for joint, part in zip(self.joints, self.multipliers_of(multipliers)):
             if joint.constant:
                 rows, columns, values = joint.entries(zero, 0.0)
                 if selected[columns].all():
                     np.subtract.at(force, columns, values * part[rows])
                     touched[columns] = True
+                    J = np.zeros((len(part), self.N))
+                    np.add.at(J, (rows, columns), values)
+                    found.append(J)
+        at = np.flatnonzero(touched & self.free)
+        if len(at):
+            J, sizes = np.concatenate(found)[:, at], self.coordinate_sizes[at]
+            force[at] += J.T @ np.linalg.lstsq((J * sizes).T, rest[at] * sizes, rcond=None)[0]
         return force, touched
 
     # independence and rigid motions

@@ -19,6 +19,7 @@ from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_moderate, require_option, require_options, require_path,
                            require_positive, require_unmasked, shown)
 from ..core.origin import ours
+from ..core.packing import packed
 from ..core.types import Array, StrPath
 from . import files
 from .curve import Curve, check_curvature, derivative_of
@@ -376,7 +377,7 @@ class MeshBeam(NumberedMesh):
         return out
 
     def __getstate__(self):
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return packed({field.name: getattr(self, field.name) for field in fields(self)})
 
     # topology
 

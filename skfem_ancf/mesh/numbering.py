@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copyreg
 from collections.abc import Callable
 from types import MappingProxyType
 from typing import Any, NoReturn
@@ -17,10 +16,6 @@ from ..core.immutable import Immutable, read_only
 from ..core.near_misses import NearMisses
 from ..core.types import Array
 from .places import satisfying
-
-
-# pickle takes it for a view of an array and loses the orientation
-copyreg.pickle(OrientedBoundary, lambda f: (OrientedBoundary, (np.asarray(f), f.ori)))
 
 
 def default_tags(p: Array, t: Array) -> dict[str, Array]:

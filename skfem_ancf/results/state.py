@@ -499,8 +499,9 @@ class State(Immutable, MaterialPoints, SpringForces):
         nodes = np.unique(member.dofs(boundary) // member.nd)
         there = np.zeros(system.N, dtype=bool)
         there[s].reshape(-1, member.nd)[nodes] = True
-        force, touched = system.constraints.force_on(there, self.multipliers)
-        total = np.where(system.constraints.free, 0.0, self._support_force()) + force
+        support = self._support_force()
+        force, touched = system.constraints.force_on(there, self.multipliers, support)
+        total = np.where(system.constraints.free, 0.0, support) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
         arm = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
         one, centre = np.ones(len(nodes)), arm[0, 0].copy()

@@ -560,8 +560,9 @@ class Scene(Model):
             Tolerance of the iteration in a step; that of the scheme by default.
         rtol
             Tolerance of ``dt="auto"``: the error of the displacement per step, relative to the size
-            of the scene and in proportion to the step size. The global error may be larger:
-            ``check`` measures it.
+            of the scene and in proportion to the step size. Of motions that are small beside the
+            scene it is at most 100 ``rtol`` of their largest mean displacement. The global error
+            may be larger: ``check`` measures it.
         breakpoints
             Times, shape (n,), at which loads or motions jump or have a kink: a step ends there with
             the values before, and the next one starts with the values after.

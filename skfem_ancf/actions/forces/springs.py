@@ -169,14 +169,17 @@ class TorsionalSpring(ForceElement):
     def parts(self) -> list[Part] | None:
         if isinstance(self.k, Law) or isinstance(self.damping, Law):
             return None
-        return [Part(TORSION, self._d, self._e, (self.k, self.damping, np.cos(self._start),
-                                                 np.sin(self._start), 0.0))]
+        return [Part(TORSION, self._d, self._e, (self.k, self.damping, *self.numbers[2:]))]
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Parameters of the kernel of angles."""
+        return 0.0, 0.0, float(np.cos(self._start)), float(np.sin(self._start)), 0.0
 
     def _angle(self, x):
         """The angle for directions d and e, (2, 2)."""
-        p = np.array([0.0, 0.0, np.cos(self._start), np.sin(self._start)])[:, None]
         out = np.empty(1)
-        turned(p, x.reshape(4, 1), out)
+        turned(np.array(self.numbers)[:, None], x.reshape(4, 1), out)
         return float(out[0])
 
     @staticmethod

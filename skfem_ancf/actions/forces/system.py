@@ -14,6 +14,7 @@ from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
 from .base import ForceElement, Part
 from .control import Control
+from .springs import TorsionalSpring
 from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
                       potential, run_kinds, turned, vectors_of)
 
@@ -235,13 +236,14 @@ class Forces:
 
     def turns(self, u: Array) -> Array:
         """Angles of torsional springs relative to the free angles, in (-pi, pi]."""
-        springs = [part for part in self.parts if part.kind == TORSION and part.numbers[0] > 0.0]
+        springs = [(part.d, part.e, part.numbers) for part in self.parts
+                   if part.kind == TORSION and part.numbers[0] > 0.0]
+        springs += [(*one.links, one.numbers) for one in self.custom
+                    if isinstance(one, TorsionalSpring)]
         out = np.empty((len(springs), len(u)))
-        for row, part in zip(out, springs):
-            y = [(one.start + np.sum(u[:, one.dofs] * one.weights, axis=2)).T
-                 for one in (part.d, part.e)]
-            turned(np.repeat(np.reshape(part.numbers, (-1, 1)), len(u), axis=1),
-                   np.concatenate(y), row)
+        for row, (*links, numbers) in zip(out, springs):
+            y = [(one.start + np.sum(u[:, one.dofs] * one.weights, axis=2)).T for one in links]
+            turned(np.repeat(np.reshape(numbers, (-1, 1)), len(u), axis=1), np.concatenate(y), row)
         return out
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,

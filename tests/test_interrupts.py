@@ -1,0 +1,86 @@
+"""Ctrl-C in motions, and pickles of scikit-fem's own objects."""
+
+import copy
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+from skfem import BilinearForm, LinearForm
+from skfem.generic_utils import OrientedBoundary
+
+from skfem_ancf import (Beam, ElementBeamCable, Interrupted, MeshBeam, Scene, StVenantKirchhoff)
+
+
+def swinging():
+    beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], height=0.02), ElementBeamCable(3),
+                StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.02)
+    return Scene(beam).pin("left").gravity((0, -9.81))
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "gauss", "generalized-alpha"])
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, partial(signal.raise_signal, signal.SIGINT)])
+def test_ctrl_c_in_a_users_function_keeps_the_steps_before(scheme, stop):
+    """Raised by the function, or by a signal while it runs; with the instants of a whole motion."""
+    asked, after = [], [10**9]
+
+    def tension(stretch):
+        asked.append(stretch)
+        if len(asked) > after[0]:
+            if isinstance(stop, type):
+                raise stop
+            stop()
+        return 1e2 * stretch
+
+    scene = swinging().spring(tension, ((1.0, 0.0), (1.0, -1.0)))
+    whole = scene.integrate(0.1, 2e-3, scheme=scheme)
+    after[0] = len(asked) + 4 * len(asked) // 5
+    with pytest.raises(Interrupted, match="stopped at t = ") as caught:
+        scene.integrate(0.1, 2e-3, scheme=scheme)
+    kept = caught.value.state
+    assert 20 < len(kept) < len(whole)
+    assert np.array_equal(kept.u, whole.u[:len(kept)])
+    assert np.array_equal(kept.t, whole.t[:len(kept)])
+    after[0] = 10**9
+    rest = scene.integrate(0.1, 2e-3, scheme=scheme, start=kept.state(-1))
+    assert np.allclose(rest.u[-1], whole.u[-1], rtol=0.0, atol=1e-7)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@LinearForm
+def named(v, w):
+    return v[0]
+
+
+def scaled(k, v, w):
+    return k * v[0]
+
+
+class Callable:
+    def __call__(self, u, v, w):
+        return u * v
+
+
+def test_stock_forms_are_pickled_and_copied_as_without_the_package():
+    for form in (LinearForm(partial(scaled, 2.0)), BilinearForm(Callable()), LinearForm(scaled)):
+        for other in (pickle.loads(pickle.dumps(form)), copy.copy(form), copy.deepcopy(form)):
+            assert type(other) is type(form) and type(other.form) is type(form.form)
+    code = ("import copyreg; before = dict(copyreg.dispatch_table); import skfem, skfem_ancf; "
+            "print([k for k in copyreg.dispatch_table if k.__module__.startswith('skfem')])")
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
+                           env=dict(os.environ), check=True).stdout
+    assert found.strip() == "[]"
+
+
+def test_scenes_with_decorated_forms_and_oriented_boundaries_are_pickled():
+    scene = swinging().clamp("right").load(named)
+    for other in (pickle.loads(pickle.dumps(scene)), copy.copy(scene), copy.deepcopy(scene)):
+        assert np.array_equal(other.solve_linear().u, scene.solve_linear().u)
+    mesh = scene.beams[0].mesh.with_boundaries({"upper": OrientedBoundary([3, 4], [0, 1])})
+    for other in (pickle.loads(pickle.dumps(mesh)), copy.copy(mesh)):
+        assert other.boundaries["upper"].ori.tolist() == [0, 1]
+        assert np.asarray(other.boundaries["upper"]).tolist() == [3, 4]
