@@ -29,8 +29,8 @@ NEEDED = {"steps": ["bands", "unsymmetric"], "collocate": ["bands", "gradients"]
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
-COMPILING = {"StrainTables": 12.0, "elements": 3.0, "contacts": 12.0, "unsymmetric": 3.0,
-             "bands": 4.0, "tangent": 2.0, "force": 1.0, "linearised": 1.0, "steps": 27.0}
+COMPILING = {"StrainTables": 10.0, "elements": 3.0, "contacts": 11.0, "unsymmetric": 3.0,
+             "bands": 5.0, "tangent": 3.0, "force": 1.0, "linearised": 1.0, "steps": 20.0}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
               "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.source import F1, F2, F3, I1, I2
+from ...core.source import F2, F3, I1, I2
 from .law import LawTables
 
 #: Kinds of strains.
@@ -70,16 +70,6 @@ def products_of(rows: Any, pairs: Any) -> Any:
     """``products``, ``terms`` and ``of`` of :class:`StrainTables` from rows and pairs."""
     return _products(*(np.ascontiguousarray(x, np.int64).tobytes() for x in (rows, pairs)),
                      rows.shape[1])
-
-
-class Destination(NamedTuple):
-    """Storage of a tangent: entry (i, j), i >= j, is at ``flat[j * ld + i - j]``.
-
-    In a matrix of two halves, (j, i) is ``ld // 2`` after it.
-    """
-
-    flat: F1
-    ld: int
 
 
 def apart(t: StrainTables) -> StrainTables:
