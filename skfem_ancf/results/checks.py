@@ -129,8 +129,10 @@ def pushed_points(system: Any) -> list[str]:
         slopes = [k for k, (_, _, y) in enumerate(beam.element.functionals) if y > 0]
         if not here or not beam.has_sections or beam.element.order < 2:
             continue
-        for node, c in {divmod(dof, beam.nd) for dof in here if dof % beam.nd < 2}:
-            end = np.sum(beam.mesh.t == node) == 1
+        places = {divmod(dof, beam.nd) for dof in here if dof % beam.nd < 2}
+        for node, c in places:
+            # a point that is carried along both axes bends the beam rather than pushing it
+            end = np.sum(beam.mesh.t == node) == 1 and (node, 1 - c) not in places
             first, along = s.start + node * beam.nd + c, abs(beam.mesh.p_X[c, node])
             if end and along > 0.5 and known.isdisjoint(first + 2 * k for k in slopes):
                 who = "" if beam.name is None else f" of beam {beam.name!r}"

@@ -338,6 +338,8 @@ class Frame(Scene):
             Nodes, see :meth:`nodes`, and some of "x", "y" and "angle", or a list of these.
         """
         names = [name for one in what for name in require_names("fixed component", one, COMPONENTS)]
+        if not names:
+            raise InputError('name what is held: "x", "y" or "angle", as hold(0, "x", "y")')
         return self._hold(place, names)
 
     def _hold(self, place, names, settlements=None):
@@ -416,6 +418,7 @@ class Frame(Scene):
         A point (x, y) may lie between nodes, with or without ``beam``; or ``at`` is a function of
         time that returns such points, with ``beam``.
         """
+        require_unmasked("at", at)
         if beam is not None or self._between(at):
             super().point_force(force, at, beam, amplitude)
             return self
