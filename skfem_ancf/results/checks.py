@@ -96,6 +96,10 @@ def _slips(state):
                "with the path of loads, supports and obstacles")
 
 
+#: Length over height from which on the reaction of a pushed point is right to 0.2 %.
+SHORT = 30.0
+
+
 def warn_of(state: Any) -> None:
     """Warn (:class:`~skfem_ancf.core.errors.ModelWarning`) of each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
@@ -127,7 +131,8 @@ def pushed_points(system: Any) -> list[str]:
     for beam, s in zip(system.beams, system.slices):
         here = [dof - s.start for dof in moved if s.start <= dof < s.stop]
         slopes = [k for k, (_, _, y) in enumerate(beam.element.functionals) if y > 0]
-        if not here or not beam.has_sections or beam.element.order < 2:
+        short = beam.mesh.chain_lengths.min() < SHORT * beam.mesh.height
+        if not here or not short or not beam.has_sections or beam.element.order < 2:
             continue
         places = {divmod(dof, beam.nd) for dof in here if dof % beam.nd < 2}
         for node, c in places:
