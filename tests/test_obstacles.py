@@ -417,7 +417,7 @@ def test_outlines_are_in_files_and_pictures(tmp_path):
 @pytest.mark.parametrize("make, message", [
     (lambda: Circle((0, 0), -1.0), "radius must be positive"),
     (lambda: Circle((0, np.nan), 1.0), "center"),
-    (lambda: Line((0, 0), (0, 0)), "direction"),
+    (lambda: Line((0, 0), (0, 0)), "normal must not be zero"),
     (lambda: Polygon([(0, 0), (1, 0)]), "three corners"),
     (lambda: Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), r"from \(0, 0\) to \(1, 1\) and .* cross"),
     (lambda: Polygon([(0, 0), (1, 0), (1, 0), (0, 1)]), "one place"),
