@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import ModelWarning, warn
+from ..core.errors import ConvergenceError, ModelWarning, warn
 from ..core.types import Array
 from ..equations.stability import largest_displacement
 from ..equations.system import System
@@ -25,8 +25,8 @@ logger = logging.getLogger(__name__)
 FEW, LARGER, CUT = 0.7, 1.5, 0.25
 FOLLOWED, JUMPED, AT_REST = "followed", "jumped", "at rest"
 #: Smallest increment from rest, relative to the largest, of scenes that only loads or obstacles
-#: support: smaller loads stabilise no better.
-CUTS_AT_REST = CUT**3
+#: support: smaller loads stabilise no better. Two smaller ones are tried if all strategies fail.
+CUTS_AT_REST, LAST_AT_REST = CUT**3, CUT**5
 #: Iterations of a descent in an increment.
 BOUNDED = 20
 #: Largest number of consecutive jumps.
@@ -104,7 +104,9 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             smallest = stalled or size <= least
             try:
                 found = _next(system, begin, t, rules, stable, smallest)
-            except StepFailed as failure:
+            except (StepFailed, ConvergenceError) as failure:
+                if smallest and (begin.way != AT_REST or size < 2.0 * LAST_AT_REST * most):
+                    raise
                 logger.info("t = %.6g failed (%s), increment cut", t, failure)
                 size *= CUT
                 continue
