@@ -52,7 +52,7 @@ for step, sign in (("insert", 1), ("pull", -1)):
     found = np.interp(smooth.t[at], rough.t, np.arctan2(*(
         rough.reactions("left").force.T * [[1], [-1]])))
     print(f"{step}: angle of friction {np.tan(found - slope).mean():+.4f}")
-    assert np.allclose(np.tan(found - slope), sign * 0.2, atol=0.01)
+    assert np.allclose(np.tan(found - slope), sign * 0.2, atol=0.02)
 
 # %%
 # The force against the stroke, and the arm on its way.

@@ -204,6 +204,7 @@ def mechanism():
     return scene.spring(3.0, (("ground", (1.1, -1)), bob), damping=0.1)
 
 
+@pytest.mark.filterwarnings("ignore:the path from the reference configuration")
 def test_points_of_bodies_are_found():
     scene = mechanism()
     state = scene.solve_static()
@@ -231,6 +232,7 @@ def test_the_default_outline_is_a_plate_of_that_mass_and_inertia():
     assert_allclose(np.ptp(x[1]), side)
 
 
+@pytest.mark.filterwarnings("ignore:the path from the reference configuration")
 # files and pictures
 
 def test_files_hold_the_outlines(tmp_path):

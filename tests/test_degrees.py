@@ -78,6 +78,8 @@ def test_one_element_converges_in_the_degree():
     assert np.all(np.divide(errors[:-1], errors[1:]) > 10.0)
 
 
+# at the edge of round-off later strategies decide, and doubt the path
+@pytest.mark.filterwarnings("ignore:the path from the reference configuration")
 @pytest.mark.parametrize("slenderness", [1e2, 1e3, 1e4, 1e5, 1e6])
 @pytest.mark.parametrize("degree, most", [(7, 45), (11, 36), (15, 72)])
 def test_no_degree_locks(degree, most, slenderness):

@@ -372,7 +372,7 @@ class DeadLoad(Load):
     distribution
         A :class:`~skfem_ancf.beam.distribution.Distribution`; None to determine it.
     g
-        Of a weight the acceleration, which acts on point masses too.
+        Of a weight the acceleration (2,), which acts on point masses too.
     """
 
     for_bodies = for_domains = True

@@ -27,7 +27,7 @@ from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, 
 CLOSE = 1e-5
 #: Anchors of slipped points are inside of the limit by these parts of it and of an element, so that
 #: they stick at the start of the next step whatever the last digit.
-INSIDE, NOWHERE = 1e-9, 1e-12
+INSIDE, NOWHERE = 1e-9, 1e-14
 #: Rows of active points: position and slope in the middle of a mean; their displacement, or
 #: velocity; penetration at both ends; surface point at the end; its displacement, or velocity;
 #: surface point in the middle, its gap with derivatives, and its derivative by the slope; force and
