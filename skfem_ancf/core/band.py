@@ -348,9 +348,3 @@ def smallest(x):
 def largest(x):
     """Largest absolute value, 0 if empty."""
     return np.max(np.abs(x), initial=0.0)
-
-
-@primitive("skfem_ancf.core.loops")
-def weighted(a, b, w):
-    """Sum of a b w."""
-    return np.dot(a * b, w)

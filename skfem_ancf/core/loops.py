@@ -439,13 +439,6 @@ def dot(a, b):
     return total
 
 
-def weighted(a, b, w):
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i] * w[i]
-    return total
-
-
 def total(x):
     found = 0.0
     for i in range(x.size):

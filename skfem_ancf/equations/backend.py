@@ -68,7 +68,6 @@ class Backend:
     def __init__(self, system: Any) -> None:
         self.tables = Tables(system)
         self._plain: str | None = None
-        self._workspaces: dict[str, Any] = {}
         self._flat: tuple[Any, list[Any]] | None = None
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
@@ -94,7 +93,7 @@ class Backend:
         return self.with_tables(tables)
 
     def with_tables(self, tables: Tables) -> Backend:
-        """A copy for other tables, with the same work arrays."""
+        """A copy for other tables."""
         backend = copy(self)
         backend.tables, backend._flat = tables, None
         vars(backend).pop("linearised", None)
@@ -144,12 +143,6 @@ class Backend:
         system = self.tables.system
         return (sum(beam.mesh.nelements for beam in system.beams),
                 sum(len(group.first) for _, group in system.forces.contacts.groups))
-
-    def workspace(self, make: Callable, *sizes: int) -> Any:
-        """Work arrays of a kernel, made once by ``make(equations, *sizes)``."""
-        if make.__name__ not in self._workspaces:
-            self._workspaces[make.__name__] = make(self.tables.plain, *sizes)
-        return self._workspaces[make.__name__]
 
     def of(self, kernel: Callable, iterations: float = 1.0) -> Callable:
         """A kernel bound to the equations, its first argument, in NumPy or compiled.

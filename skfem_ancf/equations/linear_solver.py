@@ -181,11 +181,6 @@ class LinearSolver:
             return determinant_sign(self._joined.reduced())
         return -1 if self.inertia().negative % 2 else 1
 
-    def take_factors(self) -> None:
-        """Adopt the factors that a kernel left in the band."""
-        if not self.coupled:
-            self._system.K.take_factors()
-
     def forget(self) -> None:
         """Discard all factors."""
         self._system.K.clear()
