@@ -235,7 +235,7 @@ def test_what_cannot_be_compiled_runs_in_numpy(error, auto, monkeypatch, caplog)
     assert str(error) in s.plan()["compiled loop"].reason
 
 
-@pytest.mark.parametrize("damage", ["empty", "noise", "a file in the way"])
+@pytest.mark.parametrize("damage", ["empty", "noise", "middle", "a file in the way"])
 def test_a_cache_that_cannot_be_used_costs_time_only(damage, tmp_path, needs_compiled):
     """A small function, with what Numba has kept of it spoilt between two processes."""
     code = f"""
@@ -260,6 +260,18 @@ print(y.tolist())
         assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
         kept = [p for p in folder.rglob("*") if p.is_file() and "double" in p.name]
         assert kept
-        for path in kept:
-            path.write_bytes(b"" if damage == "empty" else b"\x80 no code")
+        before = {path: path.read_bytes() for path in kept}
+        for path, text in before.items():
+            if damage == "middle":
+                if path.suffix == ".nbc":  # the machine code
+                    middle, size = len(text) // 2, len(text) // 4
+                    path.write_bytes(text[:middle - size] + bytes(2 * size) + text[middle + size:])
+            else:
+                path.write_bytes(b"" if damage == "empty" else b"\x80 no code")
     assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
+    if damage == "middle":  # compiled again, and read by the next process
+        mended = {path: path.read_bytes() for path in kept}
+        assert all(len(mended[path]) > 0.9 * len(text) for path, text in before.items())
+        assert not any(bytes(len(text) // 2) in text for text in mended.values())
+        assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
+        assert mended == {path: path.read_bytes() for path in kept}

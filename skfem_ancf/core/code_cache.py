@@ -8,6 +8,7 @@ import logging
 import os
 import re
 import sys
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -116,6 +117,31 @@ def note(name: str) -> None:
         _note_of(name).touch()
     except OSError as error:
         cannot_keep(error)
+
+
+@contextmanager
+def verified(place: Path, name: str) -> Iterator[None]:
+    """Around work that uses the cached files of a function: removes those that have been damaged.
+
+    A checksum lies beside each file, since Numba runs what it finds in it.
+    """
+    def files():
+        return place.glob(f"*.{name}-*.nb[ci]")
+
+    def noted(path):
+        return path.with_suffix(f"{path.suffix}-sum")
+
+    for path in files():
+        if not noted(path).exists() or noted(path).read_bytes() != _sum(path):
+            logger.info("%s is damaged, and compiled again", path)
+            path.unlink()
+    yield
+    for path in files():
+        noted(path).write_bytes(_sum(path))
+
+
+def _sum(path):
+    return b"%08x" % zlib.crc32(path.read_bytes())
 
 
 @contextmanager

@@ -10,13 +10,14 @@ from __future__ import annotations
 import pickle
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 from numba import cfunc, njit, types, typeof
 from numba.extending import intrinsic, lower_getattr_generic, models, overload, register_model
 
-from .code_cache import cannot_keep, can_keep, key, nothing_collected
+from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
 from .source import MARKED
 from .words import Words, hints
 
@@ -163,7 +164,7 @@ def entry(function: Any, args: Any) -> Any:
     run = names["run"]
     run.__name__, run.__module__ = function.__name__, function.__module__
     signature = tuple(types.int64 if isinstance(x, tuple) else typeof(x) for x in args)
-    found = _kept(lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS)(_named(run)))
+    found = _kept(_named(run), lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS))
     tuples = [k for k, x in enumerate(args) if isinstance(x, tuple)]
     known: dict[int, Words] = {}
 
@@ -196,12 +197,12 @@ def address(function: Any, hints: Any, name: str = "", kept: bool = True) -> int
 
     ``name`` distinguishes it on disk; it is cached if ``kept``.
     """
-    signature = types.void(*map(type_of, hints))
+    signature, function = types.void(*map(type_of, hints)), _named(function, name)
 
     def made(**options):
-        return cfunc(signature, **options, **OPTIONS)(_named(function, name))
+        return cfunc(signature, **options, **OPTIONS)
 
-    found = _kept(made) if kept else made()
+    found = _kept(function, made) if kept else made()(function)
     _alive.append(found)
     return found.address
 
@@ -218,16 +219,18 @@ def _named(function, name=""):
     return copy
 
 
-def _kept(make):
-    """``make(cache=True)``, or ``make()`` without a cache."""
+def _kept(function, make):
+    """``make(cache=True)(function)``, or ``make()`` without a cache."""
     register()
     with nothing_collected():
         if can_keep():
             try:
-                return make(cache=True)
+                place = Path(njit(cache=True)(function).stats.cache_path)
+                with verified(place, function.__qualname__):
+                    return make(cache=True)(function)
             except _SPOILT as error:
                 cannot_keep(error)
-        return make()
+        return make()(function)
 
 
 def caller(*hints: Any) -> Any:
