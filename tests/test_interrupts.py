@@ -6,7 +6,9 @@ import pickle
 import signal
 import subprocess
 import sys
+import time
 from functools import partial
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -49,6 +51,48 @@ def test_ctrl_c_in_a_users_function_keeps_the_steps_before(scheme, stop):
     rest = scene.integrate(0.1, 2e-3, scheme=scheme, start=kept.state(-1))
     assert np.allclose(rest.u[-1], whole.u[-1], rtol=0.0, atol=1e-7)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("handled", [signal.default_int_handler, "own"])
+@pytest.mark.parametrize("scheme", ["energy-momentum", "gauss"])
+def test_signals_at_any_instant_keep_the_steps_before(scheme, handled):
+    """Also with a handler of the user, and between the calls of his function."""
+    asked, after, seen = [0], [10**9], []
+
+    def late():
+        time.sleep(1e-4 * len(seen))
+        signal.raise_signal(signal.SIGINT)
+
+    def stop(*args):
+        seen.append(args[0])
+        raise KeyboardInterrupt
+
+    def tension(stretch):
+        asked[0] += 1
+        if asked[0] == after[0]:
+            threads.append(Thread(target=late))
+            threads[-1].start()
+        return 1e2 * stretch
+
+    threads = []
+    scene = swinging().spring(tension, ((1.0, 0.0), (1.0, -1.0)))
+    whole = scene.integrate(0.5, 2e-3, scheme=scheme)
+    number, before = asked[0], signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, stop if handled == "own" else handled)
+    try:
+        for k in range(12):
+            asked[0], after[0] = 0, number // 20 + k
+            with pytest.raises(Interrupted, match="stopped at t = ") as caught:
+                scene.integrate(0.5, 2e-3, scheme=scheme)
+            kept = caught.value.state
+            assert 5 < len(kept) < len(whole)
+            assert np.array_equal(kept.u, whole.u[:len(kept)])
+        assert signal.getsignal(signal.SIGINT) is (stop if handled == "own" else handled)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    for thread in threads:
+        thread.join()
+    assert len(threads) == 12 and (len(seen) == 12 or handled != "own")
 
 
 @LinearForm
