@@ -35,8 +35,9 @@ class Motion:
         Size of the previous step; 0 at the start.
     dissipated
         Work of damping since the start.
-    contacts
-        History variables of contact, shape (k,); None without contact.
+    history
+        What forces remember, see :class:`~skfem_ancf.equations.histories.Histories`, shape (k,) or
+        None.
     turns
         Angles including whole turns, shape (k,), see
         :class:`~skfem_ancf.actions.forces.turns.Turns`.
@@ -53,7 +54,7 @@ class Motion:
     force: Array
     before: float = 0.0
     dissipated: float = 0.0
-    contacts: Array | None = None
+    history: Array | None = None
     turns: Array | None = None
     memory: dict[str, Any] | None = None
 

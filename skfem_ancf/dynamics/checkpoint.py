@@ -22,7 +22,7 @@ from .base import Motion, Scheme, stored
 from .run import Run, task_of
 from .sensors import Sensor
 
-FORMAT = "skfem-ancf checkpoint 10"
+FORMAT = "skfem-ancf checkpoint 11"
 #: Number of times at which functions of time are compared.
 TIMES = 33
 #: Approximate number of surface points at which distances to obstacles are compared.

@@ -1,7 +1,7 @@
 """Velocities, accelerations and multipliers at the end of a step."""
 
 from ..core.band import copy, dot, solve_joined, subtract_rows
-from ..actions.forces.kernels import settle_contact
+from ..actions.forces.kernels import set_contact_rate, settle_contact
 from ..core.callbacks import call_solver
 from ..core.source import indices, source
 from ..actions.tables import add_constraint_rate
@@ -116,8 +116,16 @@ def add_work(e, matrices, rule, s, w, state):
 
 
 @source
+def begin_step(e, dt):
+    """Pass the time step to what has a history."""
+    e.span[0] = dt
+    if e.forces.contacts.lasting > 0:
+        set_contact_rate(e.forces, dt)
+
+
+@source
 def settle(forces, rule, s, w, taken):
-    """Update the contact history at the end of the step; ``taken`` is the dissipated work."""
+    """Update the history at the end of the step; ``taken`` is the dissipated work."""
     if rule.conserving > 0:
         settle_contact(forces, s.acting, s.dt, w.y[0], w.x.u, taken)
     else:

@@ -86,7 +86,7 @@ class EnergyMomentum4(EnergyMomentum):
 
     def require(self, system: System) -> None:
         super().require(system)
-        if system.damped or system.forces.contacts.lasting:
+        if system.damped or system.histories.lasting:
             raise InputError(f"{self!r} takes a part of each step back in time, where damping and "
                              "friction would add energy: use 'energy-momentum', or 'radau' for "
                              "high order")
@@ -96,7 +96,7 @@ class EnergyMomentum4(EnergyMomentum):
         for part in PARTS:
             y = integrator.take(y, part * dt)
         new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False,
-                               contacts=y.contacts)
+                               history=y.history)
         new.dissipated = lost
         return new
 

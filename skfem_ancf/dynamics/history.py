@@ -30,7 +30,7 @@ from .sensors import Readings
 
 #: Attributes of a Motion that are stored.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
-           "dissipated", "contacts", "turns")
+           "dissipated", "history", "turns")
 #: Default number of instants in a plot.
 STROBES = 8
 
@@ -41,11 +41,11 @@ def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> S
     if np.any(y.acceleration):  # a quasi-static run needs no density
         inertia = system.mass.multiply(y.acceleration)
     if system.damped:
-        with system.forces.contacts.lent(y.contacts):
+        with system.histories.lent(y.history):
             inertia = inertia + system.damping_force(y.u, y.v, y.t)
     return State(system, y.u, load=1.0, converged=True, t=y.t, message=f"t = {y.t:g}",
                  multipliers=y.multipliers, inertia=inertia, acceleration=y.acceleration, motion=y,
-                 origin=(scheme, arrays), memory=y.contacts)
+                 origin=(scheme, arrays), memory=y.history)
 
 
 class History(MaterialPoints, SpringForces):
@@ -132,8 +132,8 @@ class History(MaterialPoints, SpringForces):
             return state_of(self.system, self.scheme, last, arrays)
         row = {name: x[k] for name, x in self._columns.items()}
         row |= {name: float(row[name]) for name in ("t", "before", "dissipated")}
-        if not row["contacts"].size:
-            row["contacts"] = None
+        if not row["history"].size:
+            row["history"] = None
         return state_of(self.system, self.scheme, Motion(**row))
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
@@ -241,11 +241,11 @@ class History(MaterialPoints, SpringForces):
     @cached_property
     def strain_energy(self) -> Array:
         """Strain energy and potential of force elements, shape (nt,)."""
-        system, memories = self.system, self._columns["contacts"]
+        system, memories = self.system, self._columns["history"]
         out = np.zeros(len(self)) + system.energy_of_beams(self.u)
         if system.forces.elements:
             for k, memory in enumerate(memories):
-                with system.forces.contacts.lent(memory if memory.size else None):
+                with system.histories.lent(memory if memory.size else None):
                     out[k] += system.energy_of_forces(self.u[k], self.t[k])
         return out
 

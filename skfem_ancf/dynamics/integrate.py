@@ -97,7 +97,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         if motion is None:
             system.forces.contacts.require_clear(displacement, t_start)
         run.begin(displacement, rest if velocity is None else velocity,
-                  system.forces.contacts.of_state(start), None if motion is None else motion.turns)
+                  system.histories.of_state(start), None if motion is None else motion.turns)
         return run
 
     run, file = begun(task, sensors, until), None
@@ -166,7 +166,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
         "bending is too large, and results after that time are meaningless. Use NeoHookean, more "
         "elements, a smaller load or shorter steps"]
     texts += filter(None, [_jump_of_a_turn(history), contacts.sweep.deep()])
-    with contacts.lent(run.y.contacts):
+    with run.system.histories.lent(run.y.history):
         texts += contacts.sunk(run.y.u, run.y.t)
     for text in texts:
         warn(text, ModelWarning)

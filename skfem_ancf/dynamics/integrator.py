@@ -57,7 +57,6 @@ class Integrator:
         if self.tol >= 1.0:
             raise InputError("tol is the relative error of the iteration in a step: it must be "
                              f"less than 1, 1e-6 is coarse; got {shown(tol)}")
-        memory = system.forces.contacts.tables.memory.size
         if not scheme.conserving:
             alpha_m, alpha_f, beta, _ = scheme.parameters
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
@@ -75,7 +74,7 @@ class Integrator:
             8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles])
         self._state = new_state()
         self.dt, self.substeps, self._lost, self.stopped = np.nan, 0, "", False
-        self.longest = max(1, min(STORED // (4 * system.N + memory), BLOCK))
+        self.longest = max(1, min(STORED // (4 * system.N + system.histories.values.size), BLOCK))
 
 
     @property
@@ -121,7 +120,7 @@ class Integrator:
     # the start
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
-              contacts: Array | None = None) -> Motion:
+              history: Array | None = None) -> Motion:
         """The initial Motion, with consistent velocity, acceleration and multipliers.
 
         Rates of functions of time are those in a step dt after t, or before t unless ``ahead``.
@@ -149,7 +148,7 @@ class Integrator:
             y.v = y.v + solve(-M.multiply(jump), rate if joined is None else -joined.rate(y.v))[0]
         if joined is not None:
             rate = -joined.bend(y.v, y.acceleration)
-        force, y.contacts = self._forces(y, contacts)
+        force, y.history = self._forces(y, history)
         acceleration, y.multipliers = solve(force - M.multiply(y.acceleration), rate)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
@@ -159,15 +158,15 @@ class Integrator:
         self.expect(max(s.strain_energy(y.u, t), kinetic, kinetic + change))
         return y
 
-    def _forces(self, y, memory):
-        """Sum of all forces except inertia, and the history variables of contact."""
-        s, contacts = self.system, self.system.forces.contacts
-        with contacts.lent(memory):
-            if contacts.lasting:
-                now = contacts.begin(y.u, y.t) if memory is None else memory
-                memory = contacts.tables.memory.copy() if now is None else now
+    def _forces(self, y, history):
+        """Sum of all forces except inertia, and the history."""
+        s, histories = self.system, self.system.histories
+        with histories.lent(history):
+            if histories.lasting and history is None:
+                histories.begin(y.u, y.t)
+                history = histories.values.copy()
             force = s.external_force(y.u, y.t) - s.internal_force(y.u, y.t)
-            return force - s.damping_force(y.u, y.v, y.t) if s.damped else force, memory
+            return force - s.damping_force(y.u, y.v, y.t) if s.damped else force, history
 
     def _require_fitting_supports(self, jump, t):
         """Raise SupportError if the supports would displace the body suddenly."""
@@ -201,23 +200,22 @@ class Integrator:
 
         Functions of time are sampled for all steps ``range(*block)`` at once; by default for these.
         """
-        s, contacts = self.system, self.system.forces.contacts
+        s, histories = self.system, self.system.histories
         begun = y.t if start is None else start
         given = self._course.of(begun, dt, (first, first + n), self.limit, block)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         rows, works = np.full((n, 4, s.N), np.nan), np.empty(n)
         multipliers = np.full((n, 2, self.m), np.nan)
-        memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
+        memories = np.empty((n, histories.values.size if histories.lasting else 0))
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
         done = self._call(steps, y, dt, (rows, multipliers), self._rule,
                           _step_data(given, dt, s), self._state, work, memories, rows, multipliers,
                           works)
-        lasting = contacts.lasting
         return [Motion(begun + dt * (first + k + 1), u, v, a, w, m, force, dt, dissipated,
-                       memory if lasting else y.contacts, y.turns)
+                       memory if histories.lasting else y.history, y.turns)
                 for k, (u, v, a, w), (m, force), dissipated, memory in zip(
                     range(done), rows, multipliers, works.tolist(), memories)]
 
@@ -237,7 +235,7 @@ class Integrator:
         if pivots.any() and not getattr(call, "plain", False):  # compiled code has none
             pivots[:], state.factors[0] = 0, 0
         try:
-            with s.forces.contacts.lent(y.contacts), np.errstate(all="ignore"):
+            with s.histories.lent(y.history), np.errstate(all="ignore"):
                 done = call(self._matrices, *args)
         except BaseException as error:  # the motion may continue from y
             self._load_state(before)
@@ -280,8 +278,8 @@ class Integrator:
                 if fresh or not again:
                     raise StepFailed(str(failure)) from None
                 continue
-            if new.contacts is None:  # a custom scheme may not copy it
-                new.contacts = y.contacts
+            if new.history is None:  # a custom scheme may not copy it
+                new.history = y.history
             return new
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:

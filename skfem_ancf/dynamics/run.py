@@ -31,7 +31,7 @@ MAX_STEPS = 10**9
 MIN_RTOL = 1e-12
 EPS = np.finfo(float).eps
 #: The columns of a motion, and the place of those of contact, which may be missing.
-_columns, CONTACTS, NONE = attrgetter(*COLUMNS), COLUMNS.index("contacts"), np.zeros(0)
+_columns, HISTORY, NONE = attrgetter(*COLUMNS), COLUMNS.index("history"), np.zeros(0)
 #: Fraction of a step below which an instant is interpolated; so short a step is all round-off.
 CLOSE = 1e-6
 #: Degrees of freedom times steps of a block, so that progress bars and Ctrl-C react in time.
@@ -138,11 +138,11 @@ class Run:
 
     # the start
 
-    def begin(self, u: Array, v: Array, contacts: Array | None = None,
+    def begin(self, u: Array, v: Array, history: Array | None = None,
               turns: Array | None = None) -> None:
         """Start with a displacement and a velocity."""
         self._sample(u, v, self.task.t_start, True)
-        self.y = self._start(u, v, contacts)
+        self.y = self._start(u, v, history)
         if turns is None or len(turns) != self._turns.number:
             turns = self._turns.begin(self.y.u)
         self._follow(turns, self.y)
@@ -165,10 +165,10 @@ class Run:
         if s.forces.sampled:
             s.forces.sample(s.backend.tables.plain.forces, u, v, t, first)
 
-    def _start(self, u, v, contacts):
+    def _start(self, u, v, history):
         """The Motion at the start of a segment."""
         step = min(self._size, self._end - self._begun)
-        return self.integrator.start(u, v, self._begun, step, contacts=contacts)
+        return self.integrator.start(u, v, self._begun, step, history=history)
 
     def _follow(self, last, y):
         """Set ``y.turns`` from the previous angles (k,); returns y."""
@@ -212,7 +212,7 @@ class Run:
             self._size = FIRST * self.task.span
             self._sizes.begin()
         self._sample(y.u, y.v, self._begun, False)
-        turned = self._start(y.u, y.v, y.contacts)
+        turned = self._start(y.u, y.v, y.history)
         turned.dissipated = y.dissipated
         return self._follow(y.turns, turned)
 
@@ -356,8 +356,8 @@ class Run:
 
     def _append(self, y):
         row = _columns(y)
-        if y.contacts is None:
-            row = *row[:CONTACTS], NONE, *row[CONTACTS + 1:]
+        if y.history is None:
+            row = *row[:HISTORY], NONE, *row[HISTORY + 1:]
         if self.task.t_eval is not None:  # copy, to free the rest of the block
             row = tuple(map(np.array, row))
         self._stored.append(row)
@@ -390,7 +390,7 @@ class Run:
         """The stored arrays (nt, ...) by the names of the attributes of Motion."""
         if self._stored:
             return dict(zip(COLUMNS, map(np.array, zip(*self._stored))))
-        return {name: np.zeros((0, *np.shape([] if name == "contacts" else getattr(self.y, name))))
+        return {name: np.zeros((0, *np.shape([] if name == "history" else getattr(self.y, name))))
                 for name in COLUMNS}
 
     def history(self) -> History:

@@ -48,7 +48,7 @@ class StageIntegrator(Integrator):
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> list[Motion]:
-        s, w, contacts = self.system, self._work, self.system.forces.contacts
+        s, w, histories = self.system, self._work, self.system.histories
         table, begun = self.scheme.table, y.t if start is None else start
         given = self._course.of(begun, dt, (first, first + n), self.limit, block)
         w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
@@ -66,7 +66,7 @@ class StageIntegrator(Integrator):
         rows, stages = np.full((n + 1, 3, s.N), np.nan), np.empty((n, len(w.U), s.N))
         rows[0, 0], rows[0, 1] = y.u, y.v
         forces = np.empty((n, len(w.U) + 1, self.m))
-        kept = contacts.tables.memory.size if contacts.lasting else 0
+        kept = histories.values.size if histories.lasting else 0
         memories = np.full((n, 1 + kept), np.nan)
         done = self._call(collocate, y, dt, (rows[1:], memories[:, :1]), self._rule, interval, w,
                           self._state, memories, rows[1:], stages, forces)
@@ -74,7 +74,7 @@ class StageIntegrator(Integrator):
                         acceleration=rows[k + 1, 2], algorithmic=rows[k + 1, 2],
                         multipliers=forces[k, -1], force=forces[k, -1], before=dt,
                         dissipated=float(memories[k, 0]),
-                        contacts=memories[k, 1:] if contacts.lasting else y.contacts,
+                        history=memories[k, 1:] if histories.lasting else y.history,
                         memory={"stages": stages[k], "start": rows[k, :2],
                                 "forces": forces[k, :-1]})
                 for k in range(done)]

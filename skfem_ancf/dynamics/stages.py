@@ -32,13 +32,13 @@ CLOSINGS = 2
 def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows):
     """Take steps from ``w.y`` and ``w.first``; returns how many succeeded.
 
-    Written for each step: work of damping and contact history, (s, 1 + k); u, v, acceleration,
+    Written for each step: work of damping and history, (s, 1 + k); u, v, acceleration,
     (s, 3, N); displacements of the points, (s, n, N); multipliers there and at the end, (s, n + 1,
     m).
     """
     method = w.method
-    contacts, taken = e.forces.contacts, np.empty(1)
-    if contacts.lasting > 0:
+    taken = np.empty(1)
+    if e.lasting > 0:
         set_contact_rate(e.forces, s.h)
     for k in range(rows.shape[0]):
         if k > 0 or s.begun > 0:
@@ -50,11 +50,11 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
         if not _end(e, matrices, method, s, w, state, k):
             state.failure[0] = DEPENDENT
             return k
-        if contacts.lasting > 0:
+        if e.lasting > 0:
             t = s.times[(k + 1) * (method.points.size + 1) - 1]
             settle_contact(e.forces, t, 0.0, w.y[0], w.y[0], taken)
             state.dissipated[0] += taken[0]
-            copy(contacts.memory, memories[k, 1:])
+            copy(e.history, memories[k, 1:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
         for j in range(3):
             copy(w.y[j], rows[k, j])

@@ -18,7 +18,7 @@ import numpy as np
 from ..core.band import clear, copy, dot, solve_joined, total
 from ..beam.strain_energy import body_linearised, body_stress, quadratic
 from ..actions.contact.tables import PRESSURES
-from ..actions.forces.kernels import augment_contact, set_contact_rate
+from ..actions.forces.kernels import augment_contact
 from ..core.callbacks import call_solver
 from ..core.source import indices, source
 from ..actions.tables import constraint
@@ -26,7 +26,8 @@ from .convergence import (AUGMENTED, MIXED, DEPENDENT, DONE, EXACTLY, FAILED, FA
                           ITERATIONS, LASTING, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
                           SYMMETRIC, UNSYMMETRIC, UNSETTLED, judged, round_off)
 from .dampers import solve_rows
-from .end_of_step import accelerations, add_work, close_acceleration, end_velocity, finish, settle
+from .end_of_step import (accelerations, add_work, begin_step, close_acceleration, end_velocity,
+                          finish, settle)
 from .records import step_of
 from .residual import (add_damping_force, add_elastic, add_impulses, directions, free_velocity,
                        internal_force, kinetic_energy, residual, to_damping_velocity, to_middle)
@@ -37,7 +38,7 @@ from .tangent import factorize_tangent, factors, tangent
 def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, works):
     """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded.
 
-    Written for each step: contact history, (n, k); u, v, a and w, (n, 4, N); multipliers at the end
+    Written for each step: history, (n, k); u, v, a and w, (n, 4, N); multipliers at the end
     and where they were evaluated, (n, 2, m); work of damping, (n,).
     """
     contacts, taken = e.forces.contacts, np.empty(1)
@@ -52,10 +53,10 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, wo
             return n
         if matrices.dampers.active > 0:
             add_work(e, matrices, rule, s, w, state)
-        if contacts.lasting > 0:
+        if e.lasting > 0:
             settle(e.forces, rule, s, w, taken)
             state.dissipated[0] += taken[0]
-            copy(contacts.memory, memories[n])
+            copy(e.history, memories[n])
         works[n] = state.dissipated[0]
         finish(e.free, matrices.M, s, w, state)
         for k in range(4):
@@ -73,8 +74,8 @@ def _iterate(e, matrices, rule, s, w, state):
     rough, wanted = _predict(e.free, matrices.M, rule, s, w, state)
     status, left, most = GO_ON, ITERATIONS, AUGMENTED
     _start(e, w, state)
-    if contacts.lasting > 0:
-        set_contact_rate(e.forces, s.dt)
+    if e.lasting > 0:
+        begin_step(e, s.dt)
     while left > 0:
         left, most = left - 1, most - 1
         if state.factors[0] == 0:

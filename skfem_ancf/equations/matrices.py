@@ -47,8 +47,7 @@ class SceneMatrices(NamedTuple):
 
 def matrices_of(system: Any, state: Any) -> SceneMatrices:
     """The SceneMatrices of a System in one of its States, with its history of contact."""
-    contacts = system.forces.contacts
-    with contacts.lent(state.memory), contacts.stuck():
+    with system.histories.lent(state.memory), system.forces.contacts.stuck():
         return _matrices_of(system, state)
 
 

@@ -32,6 +32,7 @@ from ..mesh.mesh_beam import reach
 from . import evaluation
 from .backend import Backend
 from .constraints import Constraints
+from .histories import Histories
 from .linear_solver import LinearSolver
 from .mass_solver import MassSolver, ModalDamping
 from .scales import Scales
@@ -108,6 +109,7 @@ class System:
         self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
                                            for domain in domains)], self.N, self.bandwidth,
                              None if self.constraints.frame is None else chain_places(self.beams))
+        self.histories = Histories(self.forces.contacts, self.beams)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         if self.damping.stiffness and domains:

@@ -44,6 +44,9 @@ class Equations(NamedTuple):
     forces: ForceTables
     copies: Annotated[Any, FlatBody]  # as body, for several displacements, see Tables.copied
     sizes: F1  # Constraints.coordinate_sizes
+    history: F1  # Histories.values
+    span: F1  # Histories.span
+    lasting: int  # 1 if steps change the history
 
 
 class Tables:
@@ -65,7 +68,9 @@ class Tables:
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
                                viscous_body_of(body, system.beams, system.retardation),
-                               self._forces(), body, system.constraints.coordinate_sizes)
+                               self._forces(), body, system.constraints.coordinate_sizes,
+                               system.histories.values, system.histories.span,
+                               int(system.histories.lasting))
 
     @property
     def system(self) -> Any:

@@ -75,5 +75,5 @@ def configuration(system: System, state: State) -> State:
                          f"{list(state.system.constraints.joints)} there, "
                          f"{list(system.constraints.joints)} in the scene; "
                          "scene.state(u, multipliers) takes them as they are")
-    memory = system.forces.contacts.of_state(state)
+    memory = system.histories.of_state(state)
     return state.replace(system=system, u=u).replace(memory=memory)

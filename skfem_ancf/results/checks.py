@@ -88,7 +88,7 @@ def _slips(state):
     contacts = state.system.forces.contacts
     if not contacts.anchored:
         return
-    with contacts.lent(state.memory):
+    with state.system.histories.lent(state.memory):
         obstacles = contacts.slipping(np.array(state.u), state.load)
     for one in obstacles:
         yield (f"points slip on {one!r}, and friction depends on the path: solve_static goes from "

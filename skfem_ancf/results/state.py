@@ -94,7 +94,8 @@ class State(Immutable, MaterialPoints, SpringForces):
         Where and how the solution left the path from the reference configuration; empty if it did
         not.
     memory
-        History data of load steps at obstacles, shape (n,), or None.
+        What forces remember of the path, as anchors of friction, shape (n,), or None; see
+        :class:`~skfem_ancf.equations.histories.Histories`.
     base : State or None
         The state of linearisation, for linear solutions and modes: strain, stress, section
         forces, rotations and reactions are of first order in the difference, the strain energy of
@@ -199,7 +200,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         gives the critical load.
         """
         if self._verdict is None and self.t is None and self.base is None:
-            with self._contact_memory():
+            with self._history():
                 self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
         return self._verdict
 
@@ -243,9 +244,9 @@ class State(Immutable, MaterialPoints, SpringForces):
         """Velocity of the degrees of freedom, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
-    def _contact_memory(self):
-        """A context in which the obstacles have the history data of this state."""
-        return self.system.forces.contacts.lent(self.memory)
+    def _history(self):
+        """A context with the history of this state."""
+        return self.system.histories.lent(self.memory)
 
     # linear solutions
 
@@ -451,7 +452,7 @@ class State(Immutable, MaterialPoints, SpringForces):
 
         Raises InputError if there is no obstacle.
         """
-        with self._contact_memory():
+        with self._history():
             return contact_of(self, obstacle)
 
     @property
@@ -461,7 +462,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         It is W(E) of the total strain, also under temperatures and eigenstrains E0: the field
         "energy" is W(E - E0), and the difference is the potential of these loads.
         """
-        with self._contact_memory():
+        with self._history():
             if self.base is not None:
                 return linear_energy(self.system, self.base.u, self.u - self.base.u, self.load)
             return self.system.strain_energy(self.u, self._time)
@@ -470,7 +471,7 @@ class State(Immutable, MaterialPoints, SpringForces):
     def internal_force(self) -> Array:
         """Internal force on all degrees of freedom, shape (N,)."""
         if self._force is None:
-            with self._contact_memory():
+            with self._history():
                 self._force = (
                     self.system.internal_force(self.u, self.t, self.load) if self.base is None else
                     linear_force(self.system, self.base.u, self.u - self.base.u, self.load))

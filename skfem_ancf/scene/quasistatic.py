@@ -98,7 +98,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     made.t = t_start
     try:
-        with (system.forces.contacts.lent(),
+        with (system.histories.lent(),
               progress_bar(progress, total=ends[-1] - t_start, desc="time") as bar):
             begin = _begin(system, t_start, start, u, rules, stable)
             for instant in follow(system, ends, increments, begin, rules, stable):
@@ -127,7 +127,7 @@ def _ends_of(steps):
 
 def _begin(system, t, start, u, rules, stable):
     """The first instant: ``start`` if it belongs to a run of the scene, or computed from it."""
-    memory = system.forces.contacts.of_state(start)
+    memory = system.histories.of_state(start)
     motion = None if start is None else start._motion
     if motion is None or start.system is not system or not isinstance(
             start._origin[0], QuasiStatic):
@@ -155,9 +155,9 @@ class _Record:
         u, zero = instant.result.u, np.zeros(self.system.N)
         before = self._motions[-1].turns if self._motions else None
         turns = self._turns.begin(u) if before is None else self._turns.follow(before, u[None])[0]
-        contacts, memory = self.system.forces.contacts, instant.result.memory
-        if memory is None and contacts.obstacles:
-            memory = np.zeros(contacts.tables.memory.size)
+        memory = instant.result.memory
+        if memory is None:
+            memory = np.zeros(self.system.histories.values.size)
         y = Motion(instant.t, u, zero, zero, zero, instant.result.multipliers,
                    instant.result.multipliers, 0.0, instant.result.rubbed, memory, turns)
         self._motions.append(y)

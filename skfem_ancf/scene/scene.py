@@ -345,7 +345,7 @@ class Scene(Model):
                     raise InputError("goal=, max_elements= and max_degree= are of an adaptive "
                                      "solution: give adapt=, its tolerance, too")
                 u = None if start is None else displacement(self.system, start)
-                memory = self.system.forces.contacts.of_state(start)
+                memory = self.system.histories.of_state(start)
                 state = solve_static(self.system, u, memory, find)
             elif start is None:
                 state = solve_adaptive(self, adapt, max_elements, goal, max_degree, find)

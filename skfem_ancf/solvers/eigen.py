@@ -41,8 +41,7 @@ def modes(system: System, state: State, k: int) -> Modes:
     potential, K is unsymmetric and eigenvalues may be complex. Points stick that touch an obstacle
     with friction, also those that slip.
     """
-    contacts = system.forces.contacts
-    with contacts.lent(state.memory), contacts.stuck():
+    with system.histories.lent(state.memory), system.forces.contacts.stuck():
         return _modes(system, state, k)
 
 

@@ -111,15 +111,15 @@ class Increment:
 
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""
-        contacts, start = self.system.forces.contacts, self.start
-        rubbed = start.rubbed + contacts.settle(found.u, self.time)
+        histories, start = self.system.histories, self.start
+        rubbed = start.rubbed + histories.accept(start.u, found.u, self.time)
         return replace(start, steps=[*start.steps, self.record], load=self.level, rubbed=rubbed,
-                       memory=contacts.remember(), **found._asdict())
+                       memory=histories.get(), **found._asdict())
 
     def _augmented(self):
         """Repeat with corrected pressures until the penetration is within tolerance."""
         contacts = self.system.forces.contacts
-        contacts.put_back(self.start.memory)
+        self.system.histories.put(self.start.memory)
         found = self._touching()
         if not contacts.augmented:
             return found

@@ -122,7 +122,7 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     if memory is None:
         start = (np.zeros(system.N), 0.0) if u is None else (u, 1.0)
         system.forces.contacts.require_clear(*start)
-    with system.forces.contacts.lent():
+    with system.histories.lent():
         return Search(system, u, memory, rules, stable, progress).find()
 
 
@@ -149,8 +149,8 @@ class Search:
         self._spent, self._unstabilised, self._unstable = 0, 0, False
         contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
-        memory = contacts.begin(np.zeros(system.N) if u is None else u, times[u is not None],
-                                memory)
+        memory = system.histories.begin(np.zeros(system.N) if u is None else u,
+                                        times[u is not None], memory)
         self._start, self._times, self._memory = u, times, memory
         if contacts.obstacles:
             _ = self.route  # with the contact history of the start
@@ -366,7 +366,7 @@ class Search:
         step, down = Increment(system, result, 1.0, options), descent.Descent(system)
         far = options._replace(most=min(most, 7 * self.rules.max_iterations))
 
-        contacts.put_back(self._memory)
+        system.histories.put(self._memory)
         # descents start where obstacles have moved to
         times = (route.acting(level)[1] for level in (0.0, 1.0))
         if passed := contacts.passed(*((result.u, t) for t in times)):

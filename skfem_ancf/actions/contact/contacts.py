@@ -156,25 +156,7 @@ class Contacts:
         """Distance, gradient and second derivatives of a user-defined shape, (6, n)."""
         out[:] = self.obstacles[obstacle].shape.derivatives(x + self.origin[:, None], t)
 
-    # memory
-
-    @property
-    def lasting(self) -> int:
-        """Flags of history data; 0 for none."""
-        return self.tables.lasting
-
-    @contextmanager
-    def lent(self, memory: Array | None = None) -> Iterator[None]:
-        """Context in which the tables have the history data of a state, or none.
-
-        States own their history data, so that results do not depend on the order of evaluation.
-        """
-        before = self.tables.memory.copy()
-        try:
-            self.put_back(memory)
-            yield
-        finally:
-            self.put_back(before)
+    # history
 
     @contextmanager
     def eased(self, soft: bool = False) -> Iterator[None]:
@@ -210,37 +192,13 @@ class Contacts:
         finally:
             memory[ANCHORED] = before
 
-    def put_back(self, memory: Array | None) -> None:
-        """Restore data of :meth:`remember`; without it anchors and multipliers are cleared."""
-        if self.obstacles:
-            self.tables.memory[:] = 0.0 if memory is None else memory
-
-    def remember(self) -> Array | None:
-        """History data of steps, shape (n,); None if there are none."""
+    def begin(self, u: Array, t: float, anew: bool) -> None:
+        """Begin a run; ``anew``, friction begins at u."""
         memory = self.tables.memory
-        return memory.copy() if np.any(memory) else None
-
-    def of_state(self, state: Any) -> Array | None:
-        """History data of a State of this scene; None for other obstacles."""
-        if state is None:
-            return None
-        ours, theirs = self.tables, state.system.forces.contacts.tables
-        same = np.array_equal(ours.ints, theirs.ints) and np.array_equal(ours.floats, theirs.floats)
-        return state.memory if same else None
-
-    def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
-        """Start from anchors at u and zero multipliers, or from given history data (n,).
-
-        Returns the initial history data, or None.
-        """
-        if not self.obstacles:
-            return None
-        self.put_back(memory)
-        self.tables.memory[RATE] = 0.0
-        if memory is None and self.anchored:
+        memory[RATE] = 0.0
+        if anew and self.anchored:
             self.settle(u, t)
-            self.tables.memory[ANCHORED] = 1.0
-        return self.remember()
+            memory[ANCHORED] = 1.0
 
     @property
     def firmness(self) -> Array:
