@@ -152,7 +152,10 @@ def compiled(function: Any) -> Any:
 
 
 def entry(function: Any, args: Any) -> Any:
-    """A compiled function for Python, for arguments of these types; named tuples become words."""
+    """A compiled function for Python, for arguments of these types; named tuples become words.
+
+    If the first argument is a named tuple, the function takes the address of its words.
+    """
     names: dict[str, Any] = {"function": njit(inline="always", **OPTIONS)(function)}
     given = [f"a{k}" for k in range(len(args))]
     for k, x in enumerate(args):
@@ -165,17 +168,16 @@ def entry(function: Any, args: Any) -> Any:
     run.__name__, run.__module__ = function.__name__, function.__module__
     signature = tuple(types.int64 if isinstance(x, tuple) else typeof(x) for x in args)
     found = _kept(_named(run), lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS))
-    tuples = [k for k, x in enumerate(args) if isinstance(x, tuple)]
+    tuples = [k for k, x in enumerate(args) if k > 0 and isinstance(x, tuple)]
     known: dict[int, Words] = {}
 
     def call(*args):
         numbers = list(args)
-        alive = [_words(args[k], known) for k in tuples]
-        for k, words in zip(tuples, alive):
-            numbers[k] = words.address
+        for k in tuples:
+            numbers[k] = _words(args[k], known).address
         return found(*numbers)
 
-    return call
+    return call if tuples else found
 
 
 #: Number of tuples whose words are cached.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -232,7 +232,7 @@ class Integrator:
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
         call = self._backend.of(function, OF_STEP * len(rows))
         pivots = self._matrices.U.pivots
-        if pivots.any() and not getattr(call, "plain", False):  # compiled code has none
+        if pivots.any() and not isinstance(call, partial):  # compiled code has none
             pivots[:], state.factors[0] = 0, 0
         try:
             with s.histories.lent(y.history), np.errstate(all="ignore"):

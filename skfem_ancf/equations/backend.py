@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from threading import RLock
 from typing import Any, NamedTuple
 
@@ -30,7 +30,8 @@ NEEDED = {"steps": ["bands", "unsymmetric"], "collocate": ["bands", "gradients"]
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
 COMPILING = {"StrainTables": 10.0, "elements": 3.0, "contacts": 11.0, "unsymmetric": 3.0,
-             "bands": 5.0, "tangent": 3.0, "force": 1.0, "linearised": 1.0, "steps": 20.0}
+             "bands": 5.0, "balance": 5.0, "tangent": 3.0, "force": 1.0, "linearised": 1.0,
+             "steps": 20.0}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
               "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}
@@ -68,7 +69,7 @@ class Backend:
     def __init__(self, system: Any) -> None:
         self.tables = Tables(system)
         self._plain: str | None = None
-        self._flat: tuple[Any, list[Any]] | None = None
+        self._flat: Any = None  # Equations for compiled code, their words, and all to keep alive
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif system.forces.contacts.custom:
@@ -147,7 +148,7 @@ class Backend:
     def of(self, kernel: Callable, iterations: float = 1.0) -> Callable:
         """A kernel bound to the equations, its first argument, in NumPy or compiled.
 
-        ``iterations`` are those of the work that is done with it.
+        ``iterations`` are those of the work that is done with it. NumPy may warn of overflow.
         """
         return self.leaves(kernel, iterations=iterations)[0]
 
@@ -159,19 +160,36 @@ class Backend:
             return [self._in_numpy(kernel) for kernel in kernels]
         return [self._compiled(kernel) for kernel in kernels]
 
+    def _in_numpy(self, kernel):
+        return partial(kernel, self.tables.plain)
+
     def _compiled(self, kernel):
+        loaded: list[Any] = []
+
         def run(*args):
-            if PROBLEMS or self._plain is not None:  # found since it was chosen
-                return self._in_numpy(kernel)(*args)
-            try:
-                function, equations = self._load(kernel, args)
-            except Exception as error:  # a user's function, or an incompatible Numba
-                self._give_up(kernel, error)
-                return self._in_numpy(kernel)(*args)
-            with deferred():
-                return function(equations, *args)
+            if not loaded:
+                loaded.append(self._loaded(kernel, args))
+            return loaded[0](*args)
 
         return run
+
+    def _loaded(self, kernel, args):
+        """A kernel as the first call needs it: compiled, or in NumPy if that is impossible."""
+        if PROBLEMS or self._plain is not None:  # found since it was chosen
+            return self._in_numpy(kernel)
+        try:
+            function = partial(self._load(kernel, args), self._flat[1].address)
+        except Exception as error:  # a user's function, or an incompatible Numba
+            self._give_up(kernel, error)
+            return self._in_numpy(kernel)
+        if kernel.__name__ not in NEEDED and not self.tables.calls_back:
+            return function
+
+        def interruptible(*args):
+            with deferred():
+                return function(*args)
+
+        return interruptible
 
     def _give_up(self, kernel, error):
         if isinstance(error, code_cache.NotCompiled):
@@ -182,16 +200,8 @@ class Backend:
                         f"{kernel.__name__} cannot be compiled: {error!r}")
         logger.warning("%s; it runs in NumPy", PROBLEMS[-1])
 
-    def _in_numpy(self, kernel):
-        def run(*args):
-            with np.errstate(all="ignore"):  # overflow shows in the residual
-                return kernel(self.tables.plain, *args)
-
-        run.plain = True
-        return run
-
     def _load(self, kernel, args):
-        """The compiled function and its equations; announces long compilations."""
+        """The compiled function, and its equations in ``_flat``; announces long compilations."""
         global _worked
         name = kernel.__name__
         if self._flat is None or name not in LOADED:
@@ -210,7 +220,7 @@ class Backend:
                     LOADED[name] = entry(kernel, (self._flat[0], *args))
                     code_cache.note(name)
                     update(name)
-        return LOADED[name], self._flat[0]
+        return LOADED[name]
 
 
 def load_part(name: str, update: Callable[[str], None]) -> None:

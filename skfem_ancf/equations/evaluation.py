@@ -4,10 +4,11 @@ import numpy as np
 
 from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_tangent,
                                       contact_along, contact_work)
-from ..actions.tables import add_load_stiffness
+from ..actions.tables import (add_joint_force, add_load_stiffness, constraint,
+                              external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
-from ..core.band import dot
+from ..core.band import diagonal, dot, largest
 from ..core.source import indices, source
 
 
@@ -48,6 +49,58 @@ def tangent(e, u, factors, t, scale, at, use_independent, stresses, independent,
 def linearised(e, u, du, stresses, independent):
     """Set the independent stresses: stresses at u plus their linearised change by du."""
     body_linearised(e.body, u, du, stresses, independent)
+
+
+#: Rows of the vectors of a static iteration: displacement and its last correction, internal and
+#: external force, residual, inverse diagonal of the tangent, residual that may remain.
+U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, ROWS = range(8)
+#: Smallest stiffness of a DOF in norms, relative to the mean; DOFs of a rigid body have none.
+SMALLEST = 1e-14
+
+
+@source
+def balance(e, last, mixed, factors, before, t, start, scale, at, c, g, multipliers, phi, stresses,
+            independent, x, out):
+    """Set forces, residual, tangent and its inverse diagonal; if ``last``, without the tangent.
+
+    If ``mixed``, the geometric part uses the last stresses, linearised along the correction.
+    ``before`` and ``start`` are the factors and the time of the loads in the tangent; ``c, g`` the
+    joints at the time ``at``. To ``out`` go the norms of residual and larger force, and the largest
+    relative residual of joints.
+    """
+    u, f, load, R, weights = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS]
+    if last:
+        force(e, u, at, f)
+    else:
+        if mixed:
+            linearised(e, u - x[DU], x[DU], stresses, independent)
+        tangent(e, u, before, start, scale, at, mixed, stresses, independent, f)
+        diagonal(e.K, weights)
+        least = SMALLEST * mean_stiffness(weights, e.sizes)
+        for i in indices(u.size):
+            weights[i] = 1.0 / (np.abs(weights[i]) + least / (e.sizes[i] * e.sizes[i]))
+    external_force(e.loads, factors, t, scale, u, load)
+    for i in indices(u.size):
+        R[i] = load[i] - f[i] - x[GAP, i]
+    out[2] = 0.0
+    if phi.size > 0:
+        constraint(e.joints, c, g, at, u, phi)
+        out[2] = largest(phi / e.joints.sizes)
+        pull = np.zeros(u.size)
+        add_joint_force(e.joints, g, at, u, multipliers, pull)
+        for i in indices(u.size):
+            R[i] -= pull[i]
+    for i in indices(u.size):
+        R[i] *= e.free[i]
+    out[0] = np.sqrt(dot(R * R, weights))
+    out[1] = np.sqrt(max(dot(f * f, weights), dot(load * load, weights)))
+
+
+@source
+def mean_stiffness(diagonal, sizes):
+    """Mean of the absolute stiffnesses, scaled by the squared sizes of DOFs; 1 if it is zero."""
+    mean = dot(np.abs(diagonal), sizes * sizes) / sizes.size
+    return mean if mean > 0.0 else 1.0
 
 
 #: Line search with contact: accepted relative residual along the correction; largest number of

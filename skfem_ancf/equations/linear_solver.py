@@ -37,13 +37,9 @@ class LinearSolver:
         self._at: tuple[Array, float] = np.zeros(0), 0.0
         self._joined: Schur | NullSpace | None = None
         self._pattern = Pattern()
-
-    @property
-    def coupled(self) -> bool:
-        """True if the matrix is more than a band: multipliers, or force elements between distant
-        nodes.
-        """
-        return bool(self._system.constraints.joints) or self._system.forces.far
+        #: True if the matrix is more than a band: multipliers, or force elements between distant
+        #: nodes.
+        self.coupled = bool(system.constraints.joints) or system.forces.far
 
     @cached_property
     def condensed(self) -> Condensed | None:
@@ -137,10 +133,13 @@ class LinearSolver:
 
     def solve_into(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                    dm: Array) -> bool:
-        """Factorise and solve within a kernel; False on failure."""
+        """Factorise and solve within a kernel for R at free DOFs; False on failure."""
         try:
             self.factorize(u, t, multipliers)
-            du[:], dm[:] = self.solve(R, phi)
+            if self.coupled:
+                du[:], dm[:] = self.solve(R, phi)
+            else:
+                du[:] = self._system.K.solve(R)
         except NO_FACTORS as error:
             logger.debug("no factors: %s", error)
             return False

@@ -181,8 +181,8 @@ def _of_points(point):
     return of_points
 
 
-def flat(plain: Equations) -> tuple[Equations, list[Words]]:
-    """The equations for compiled code, and the objects that must live as long."""
+def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
+    """The equations for compiled code, their words, and those that must live as long."""
     words: list[Words] = []
     forces, loads = plain.forces, plain.loads
     body = _flat_body(plain.body, words)
@@ -194,8 +194,8 @@ def flat(plain: Equations) -> tuple[Equations, list[Words]]:
         loads = loads._replace(eigenstrained=_flat_body(loads.eigenstrained, words))
     viscous, copies = (body if x is plain.body else _flat_body(x, words)
                        for x in (plain.viscous, plain.copies))
-    return plain._replace(body=body, viscous=viscous, copies=copies, forces=forces,
-                          loads=loads), words
+    found = plain._replace(body=body, viscous=viscous, copies=copies, forces=forces, loads=loads)
+    return found, Words(found), words
 
 
 def _flat_body(body, words):

@@ -361,22 +361,25 @@ class System:
         elif t is not None and self._varying:
             factors = load * tables.factors(np.array([t]))[0]
         given = tables.stresses if independent is None else independent
-        self.backend.of(evaluation.tangent)(
-            np.array(u, dtype=float), factors, time, float(load), at, independent is not None,
-            stresses, given, force)
+        with np.errstate(all="ignore"):
+            self.backend.of(evaluation.tangent)(
+                np.array(u, dtype=float), factors, time, float(load), at, independent is not None,
+                stresses, given, force)
         return force, stresses
 
     def linearised_stress(self, u: Array, stresses: Array, du: Array) -> Array:
         """Stresses (n,) at u, linearised to ``u + du``: S + C B(u) du."""
         independent = np.zeros_like(stresses)
-        self.backend.of(evaluation.linearised)(u, du, stresses, independent)
+        with np.errstate(all="ignore"):
+            self.backend.of(evaluation.linearised)(u, du, stresses, independent)
         return independent
 
     def _force(self, kernel, *displacements, **at):
         """The force (N,) of a function of :mod:`skfem_ancf.equations.evaluation`."""
         force = np.zeros(self.N)
-        self.backend.of(kernel)(*(np.array(u, dtype=float) for u in displacements), *at.values(),
-                                force)
+        with np.errstate(all="ignore"):
+            self.backend.of(kernel)(*(np.array(u, dtype=float) for u in displacements),
+                                    *at.values(), force)
         return force
 
     def _time(self, load, t):

@@ -119,6 +119,12 @@ class Tables:
         return s.forces.tables(s.K.position, s.symmetric, self.handle if s.forces.custom else 0)
 
     @property
+    def calls_back(self) -> bool:
+        """True if kernels call Python."""
+        contacts = self.system.forces.contacts
+        return self._user_defined is not None or contacts.moving or contacts.custom
+
+    @property
     def handle(self) -> int:
         """The handle of the user-defined items."""
         if self._user_defined is None:

@@ -139,7 +139,7 @@ def _solution(s, dynamic, linear):
         yield Item("compiled loop", "skipped", "one solve")
     else:
         way, reason = (s.backend.choose("steps", STEPS * OF_STEP) if dynamic else
-                       s.backend.choose("tangent", ITERATIONS))
+                       s.backend.choose("balance", ITERATIONS))
         yield Item("compiled loop", "skipped" if way == "plain" else "computed", "whole " + (
             f"time steps, in blocks, of {STEPS}" if dynamic else "iterations") + f": {reason}")
     if dynamic:

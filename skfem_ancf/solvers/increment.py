@@ -199,13 +199,13 @@ class Increment:
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not solver else 0)
         target = self._target(backend.tables, u)
-        status, x, residuals, works = equilibrium(
-            backend, target, rules, solver or system.solver, u, multipliers)
-        n = len(works)
+        with np.errstate(all="ignore"):  # overflow shows in the residual
+            x = equilibrium(backend, target, rules, solver or system.solver, u, multipliers)
+        n = len(x.works)
         self.record.iterations += n
-        self.record.force_residuals += residuals
-        self.record.energy_residuals += works
-        self._require_converged(status, n, rules)
+        self.record.force_residuals += x.residuals
+        self.record.energy_residuals += x.works
+        self._require_converged(x.status, n, rules)
         if system.inverted(x.u):
             raise StepFailed("an element is turned inside out")
         if lost := system.constraints.lost(x.u):
