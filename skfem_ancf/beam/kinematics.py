@@ -190,6 +190,6 @@ def folded(beam: Any, u: Array) -> bool:
     """True if the axis folds back within an element: a chord is opposite to an end tangent."""
     nodes = u.reshape(-1, beam.nd)[:, :4].T
     x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
-    left, right = beam.mesh.t
-    chord = x[:, right] - x[:, left]
-    return bool(min(np.min(np.sum(chord * tangent[:, end], axis=0)) for end in (left, right)) < 0.0)
+    left, right = t = beam.mesh.t
+    ends = (x[:, right] - x[:, left])[:, None] * tangent[:, t]
+    return bool((ends[0] + ends[1] < 0.0).any())

@@ -23,15 +23,18 @@ BEGIN, END, SAMPLES, SPAN, BEGIN_GRADIENTS, END_GRADIENTS, KIND = range(7)
 
 
 class Body:
-    """The beams of a scene: their :class:`StrainTables`, and a table with a row for each."""
+    """The beams of a scene: their :class:`StrainTables`, and a table with a row for each.
 
-    def __init__(self, packs: Sequence[StrainTables], table: Any) -> None:
-        self.packs, self.table = tuple(packs), table
+    A ``kernel`` has the same tables.
+    """
+
+    def __init__(self, packs: Sequence[StrainTables], table: Any, kernel: Any = None) -> None:
+        self.packs, self.table, self._kernel = tuple(packs), table, kernel
 
     @cached_property
-    def elements(self) -> tuple[Elements, ...]:
+    def elements(self) -> Sequence[Elements]:
         """Their :class:`~skfem_ancf.beam.kernels.elements.Elements`."""
-        return tuple(map(Elements, self.packs))
+        return list(map(Elements, self.packs)) if self._kernel is None else self._kernel.elements
 
 
 class FlatBody(NamedTuple):
@@ -53,9 +56,11 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice], joined: bool = Fal
     With ``joined``, tables with the same samples are merged, so that many short beams are as fast
     as a long one.
     """
+    if len(beams) == 1:
+        return _body([beams[0].kernel.tables], lambda t: t.rows.shape[1], beams[0].kernel)
     tables = [[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
               for beam, s in zip(beams, slices)]
-    if joined and len(beams) > 1:
+    if joined:
         groups: dict[Any, list[StrainTables]] = {}
         # left nodes of a table are unique: tables of one beam stay separate
         for k, (j, t) in enumerate(pair for its in tables for pair in enumerate(its)):
@@ -77,7 +82,7 @@ def eigenstrain_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Bod
                  lambda t: t.rows.shape[1] if t.law.kind == LINEAR else 3 * t.weights.shape[1])
 
 
-def _body(tables, numbers):
+def _body(tables, numbers, kernel=None):
     rows, at, place = [], 0, 0
     flat = tuple(t for its in tables for t in its)
     for t in flat:
@@ -85,7 +90,7 @@ def _body(tables, numbers):
         n = 2 * t.rows.shape[1] * len(t.start) * span
         rows.append([at, at + size, t.rows.shape[1], span, place, place + n, t.kind])
         at, place = at + size, place + n
-    return Body(flat, np.array(rows, np.int64) if rows else np.zeros((0, KIND + 1), np.int64))
+    return Body(flat, np.array(rows, np.int64).reshape(-1, KIND + 1), kernel)
 
 
 def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float]) -> Body:

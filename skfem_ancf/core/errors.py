@@ -210,7 +210,7 @@ def _suggested(name, known):
 
 def require_finite_scalar(name: str, value: Any) -> float:
     """A finite real number as a float; not bool, text or array."""
-    if not _is_real(value):
+    if type(value) not in (float, int) and not _is_real(value):
         raise InputError(f"{name} must be a number, got {shown(value)}")
     try:
         value = float(value)

@@ -68,7 +68,8 @@ class Immutable(metaclass=_Freezing):
         attributes = vars(self)
         for name, value in attributes.items():
             if np.ndarray in type(value).__mro__ and value.flags.writeable:
-                attributes[name] = read_only(value)
+                attributes[name] = value = value.copy()
+                value.flags.writeable = False
         attributes["_frozen"] = True
 
     def _thawed(self):

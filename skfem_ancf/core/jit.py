@@ -172,9 +172,13 @@ def entry(function: Any, args: Any) -> Any:
     known: dict[int, Words] = {}
 
     def call(*args):
-        numbers = list(args)
+        numbers, alive = list(args), ()  # other threads may forget words
         for k in tuples:
-            numbers[k] = _words(args[k], known).address
+            words = known.get(id(args[k]))
+            if words is None or words.of is not args[k]:
+                words = _words(args[k], known)
+            numbers[k] = words.address
+            alive += (words,)
         return found(*numbers)
 
     return call if tuples else found
@@ -185,10 +189,9 @@ LAST = 16
 
 
 def _words(x, known):
-    found = known.pop(id(x), None)
-    if found is None or found.of is not x:
-        found = Words(x)
-    known[id(x)] = found
+    """Words of a tuple that is not known."""
+    known.pop(id(x), None)
+    known[id(x)] = found = Words(x)
     if len(known) > LAST:
         del known[next(iter(known))]
     return found

@@ -10,8 +10,6 @@ from functools import cached_property, partial
 from threading import RLock
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..beam.kernels.law import CUSTOM
 from ..core import code_cache
 from ..core.interrupts import deferred

@@ -1,5 +1,7 @@
 """Evaluations of the equations of a scene, which run in NumPy or compiled."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_tangent,
@@ -9,7 +11,7 @@ from ..actions.tables import (add_joint_force, add_load_stiffness, constraint,
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
 from ..core.band import diagonal, dot, largest
-from ..core.source import indices, source
+from ..core.source import F1, indices, source
 
 
 @source
@@ -51,43 +53,58 @@ def linearised(e, u, du, stresses, independent):
     body_linearised(e.body, u, du, stresses, independent)
 
 
+class Target(NamedTuple):
+    """The static equilibrium to find."""
+
+    factors: F1  # of the loads
+    before: F1  # the same for the first tangent
+    scale: float  # load factor of user-defined loads
+    when: float  # time of loads; NaN for full size
+    at: float  # time of joints
+    c: F1  # tables of the joints at that time
+    g: F1
+    gap: F1  # residual that may remain, (N,)
+    prescribed: F1  # required changes of the fixed DOFs
+
+
 #: Rows of the vectors of a static iteration: displacement and its last correction, internal and
-#: external force, residual, inverse diagonal of the tangent, residual that may remain.
-U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, ROWS = range(8)
+#: external force, residual, inverse diagonal of the tangent.
+U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, ROWS = range(7)
 #: Smallest stiffness of a DOF in norms, relative to the mean; DOFs of a rigid body have none.
 SMALLEST = 1e-14
 
 
 @source
-def balance(e, last, mixed, factors, before, t, start, scale, at, c, g, multipliers, phi, stresses,
-            independent, x, out):
+def balance(e, target, first, last, mixed, x, m, stresses, out):
     """Set forces, residual, tangent and its inverse diagonal; if ``last``, without the tangent.
 
-    If ``mixed``, the geometric part uses the last stresses, linearised along the correction.
-    ``before`` and ``start`` are the factors and the time of the loads in the tangent; ``c, g`` the
-    joints at the time ``at``. To ``out`` go the norms of residual and larger force, and the largest
-    relative residual of joints.
+    ``m`` are the multipliers and residuals of joints, ``stresses`` those of the strain and the
+    independent ones. If ``mixed``, the geometric part uses the last stresses, linearised along the
+    correction. To ``out`` go the norms of residual and larger force, and the largest relative
+    residual of joints.
     """
-    u, f, load, R, weights = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS]
+    u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
     if last:
-        force(e, u, at, f)
+        force(e, u, target.at, f)
     else:
         if mixed:
-            linearised(e, u - x[DU], x[DU], stresses, independent)
-        tangent(e, u, before, start, scale, at, mixed, stresses, independent, f)
+            linearised(e, u - x[DU], x[DU], stresses[0], stresses[1])
+        factors = target.before if first else target.factors
+        t = np.inf if first and np.isnan(target.when) else target.when
+        tangent(e, u, factors, t, target.scale, target.at, mixed, stresses[0], stresses[1], f)
         diagonal(e.K, weights)
         least = SMALLEST * mean_stiffness(weights, e.sizes)
         for i in indices(u.size):
             weights[i] = 1.0 / (np.abs(weights[i]) + least / (e.sizes[i] * e.sizes[i]))
-    external_force(e.loads, factors, t, scale, u, load)
+    external_force(e.loads, target.factors, target.when, target.scale, u, load)
     for i in indices(u.size):
-        R[i] = load[i] - f[i] - x[GAP, i]
+        R[i] = load[i] - f[i] - target.gap[i]
     out[2] = 0.0
     if phi.size > 0:
-        constraint(e.joints, c, g, at, u, phi)
+        constraint(e.joints, target.c, target.g, target.at, u, phi)
         out[2] = largest(phi / e.joints.sizes)
         pull = np.zeros(u.size)
-        add_joint_force(e.joints, g, at, u, multipliers, pull)
+        add_joint_force(e.joints, target.g, target.at, u, m[0], pull)
         for i in indices(u.size):
             R[i] -= pull[i]
     for i in indices(u.size):

@@ -243,12 +243,20 @@ class System:
 
     def inverted(self, u: Array) -> bool:
         """True if an element is turned inside out."""
-        return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices)
-                   if b.has_sections) or any(d.inverted(u[self.of(d)]) for d in self.domains)
+        for member, s in zip(self.members, self.slices):
+            if isinstance(member, Domain):
+                if member.inverted(u[s]):
+                    return True
+            elif isinstance(member, Beam) and member.has_sections and member.kernel.inverted(u[s]):
+                return True
+        return False
 
     def folded(self, u: Array) -> bool:
         """True if the axis folds back within an element."""
-        return any(folded(b, u[s]) for b, s in zip(self.beams, self.slices))
+        for beam, s in zip(self.beams, self.slices):
+            if folded(beam, u[s]):
+                return True
+        return False
 
     def stiffness_at_rest(self) -> sparse.csr_array:
         """The stiffness of force elements in the reference configuration, shape (N, N)."""

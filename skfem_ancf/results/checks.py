@@ -107,8 +107,8 @@ def warn_of(state: Any) -> None:
     for text in _kinks(state):
         warn(text, ModelWarning)
     warn_of_points(state.system)
-    for beam in state.beams:
-        u = state.u_of(beam)
+    for beam, s in zip(state.system.beams, state.system.slices):
+        u = state.u[s]
         for text in _findings(beam, kinematics.shortest(beam, u), turning(beam, u)):
             warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
@@ -240,7 +240,8 @@ def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
         turns = _turns(beam, u, base)
         return float(np.max(np.abs(turns[right] - turns[left])))
     turn = tangents(beam, u) / tangents(beam, 0.0)
-    return float(np.max(np.abs(np.angle(turn[right] * turn[left].conj()))))
+    turn = turn[right] * turn[left].conj()
+    return float(abs(np.arctan2(turn.imag, turn.real)).max())
 
 
 def _turns(beam, u, base=None):

@@ -144,12 +144,11 @@ class State(Immutable, MaterialPoints, SpringForces):
             if np.shape(value) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
                                  f"{np.shape(value)}")
-        self.system, self.u, self.load, self.multipliers = system, u, load, multipliers
-        self.converged, self.iterations, self.message = converged, iterations, message
-        self.steps, self.t, self.acceleration = tuple(steps), t, acceleration
-        self.doubt, self.memory, self.base = doubt, memory, base
-        self._force, self._inertia, self._verdict = force, inertia, verdict
-        self._motion, self._origin = motion, origin
+        vars(self).update(
+            system=system, u=u, load=load, multipliers=multipliers, converged=converged,
+            iterations=iterations, message=message, steps=tuple(steps), t=t,
+            acceleration=acceleration, doubt=doubt, memory=memory, base=base, _force=force,
+            _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin)
 
     def replace(self, **changes: Any) -> State:
         """A copy with changed attributes, as ``replace(message="guess")``.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -13,10 +12,11 @@ from ..core.errors import ConvergenceError
 from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..equations import stability
+from ..equations.evaluation import Target
 from ..equations.system import System
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
-                        Target, equilibrium)
+                        equilibrium)
 from .outcome import Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed, Unstable
 from .touching import SOON, found_touching
 
@@ -111,10 +111,19 @@ class Increment:
 
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""
+<<<<<<< HEAD
         histories, start = self.system.histories, self.start
         rubbed = start.rubbed + histories.accept(start.u, found.u, self.time)
         return replace(start, steps=[*start.steps, self.record], load=self.level, rubbed=rubbed,
                        memory=histories.get(), **found._asdict())
+=======
+        contacts, start = self.system.forces.contacts, self.start
+        rubbed = start.rubbed + contacts.settle(found.u, self.time)
+        return StaticResult(**vars(start) | {
+            "steps": [*start.steps, self.record], "load": self.level, "rubbed": rubbed,
+            "memory": contacts.remember(), "u": found.u, "multipliers": found.multipliers,
+            "force": found.force})
+>>>>>>> 08aa8ad (Checks after a static solve with fewer calls; one beam has one set of arrays)
 
     def _augmented(self):
         """Repeat with corrected pressures until the penetration is within tolerance."""
@@ -227,7 +236,7 @@ class Increment:
             solver.forget()
 
     def _target(self, tables, u):
-        """The :class:`~skfem_ancf.solvers.iteration.Target` of the level."""
+        """The :class:`~skfem_ancf.equations.evaluation.Target` of the level."""
         constraints, route = self.system.constraints, self.options.route
         gap, clock, fixed = route.gap, self.system.clock, constraints.fixed
         values = constraints.values(self.time if clock is None else self.load, self.time)

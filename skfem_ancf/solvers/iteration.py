@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan, sqrt
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..core.band import multiply
 from ..core.types import Array
 from ..equations import evaluation
 from ..equations.backend import Backend
-from ..equations.evaluation import GAP, ROWS, U
+from ..equations.evaluation import ROWS, Target, U
 
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
 ITERATIONS = 8
@@ -28,20 +28,6 @@ DIVERGING = 0.9
 SOFT, LATE, LARGE = 10.0, 8, 3.0
 #: Early end of an iteration: by the third correction, or by the second and late ones.
 FIRST, WATCHED = 1, 2
-
-
-class Target(NamedTuple):
-    """The equilibrium to find."""
-
-    factors: Array  # of the loads
-    before: Array  # the same for the first tangent
-    scale: float  # load factor of user-defined loads
-    when: float  # time of loads; NaN for full size
-    at: float  # time of joints
-    c: Array  # tables of the joints at that time
-    g: Array
-    gap: Array  # residual that may remain, (N,)
-    prescribed: Array  # required changes of the fixed DOFs
 
 
 class Rules(NamedTuple):
@@ -82,26 +68,25 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
     u, multipliers
         The start, (N,) and (m,); not changed.
     """
-    e, stresses, at = backend.tables.plain, backend.tables.stresses, target.at
+    e, at, out = backend.tables.plain, target.at, np.empty(3)
     evaluate, hold_back = backend.leaves(evaluation.balance, evaluation.hold_back,
                                          iterations=ITERATIONS)
-    x, out, multipliers = np.zeros((ROWS, len(u))), np.empty(3), multipliers.copy()
-    x[U], x[GAP], phi, dm = u, target.gap, 0.0 * multipliers, 0.0 * multipliers
-    u, du, force, load, R = x[:GAP - 1]
-    others = (target.scale, at, target.c, target.g, multipliers, phi, stresses,
-              stresses.copy(), x, out)
-    factors, t = target.factors, target.when
-    acting = factors, target.before, t, np.inf if isnan(t) else t, *others
-    work = before = reference = np.inf
-    quiet, moving, status = False, bool(target.prescribed.any()), NOT_CONVERGED
+    x, m = np.zeros((ROWS, len(u))), np.zeros((2, len(multipliers)))
+    stresses, dm = np.zeros((2, backend.tables.stresses.size)), np.empty(len(multipliers))
+    x[U], m[0] = u, multipliers
+    u, du, force, load, R, _ = x
+    multipliers, phi = m
     residuals: list[float] = []
     works: list[float] = []
+    quiet, moving = False, bool(target.prescribed.any())
+    work = before = reference = np.inf
+    status = NOT_CONVERGED
     for k in range(rules.iterations + 1):
         # the last residual needs no tangent
         part = work / before if k > 1 and 0.0 < work < before else 1.0
         last = (k >= LEAST or (k > 0 and quiet)) and (
             work * part <= rules.tol * reference + rules.floor)
-        evaluate(last, rules.mixed and k > 0, *acting)
+        evaluate(target, k == 0, last, rules.mixed and k > 0, x, m, stresses, out)
         rho, size, opening = out.tolist()
         if not rho < 1e300:
             status = NOT_FINITE
@@ -111,7 +96,6 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
             small = rho <= 1e-3 * rules.tol * size
             # round-off, unless the correction shows that it is the load of a slender beam
             quiet = rho <= rules.force_floor
-            acting = factors, factors, t, t, *others
         else:
             small = last and rho <= rules.tol * size + rules.force_floor
         if small and not moving and opening <= CLOSED:
@@ -120,12 +104,12 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
         if k == rules.iterations:
             break
         if last:
-            evaluate(False, rules.mixed, *acting)
+            evaluate(target, False, False, rules.mixed, x, m, stresses, out)
         if moving:
             moved = _move(e, target, u, R, phi)
         before, work = work, np.inf
         if solver.solve_into(at, u, multipliers, R, -phi, du, dm):
-            work = sqrt(abs(R @ du) + abs(phi @ dm))
+            work = float(abs(R @ du) + abs(phi @ dm) if phi.size else abs(R @ du)) ** 0.5
         if not work < 1e300:
             status = SINGULAR
             break
@@ -136,11 +120,18 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
         moving = False
         u += du
         multipliers += dm
-        reference = sqrt(max(abs(force @ u), abs(load @ u)))
+        reference = float(max(abs(force @ u), abs(load @ u))) ** 0.5
         works.append(work / reference if reference > 0.0 else 0.0)
         if rules.wary and _diverging(rules.wary, k, works[-1]):
             break
-    return Iterate(status, u.copy(), multipliers, force.copy(), residuals, works)
+    return Iterate(status, u.copy(), multipliers.copy(), force.copy(), residuals, works)
+
+
+def _diverging(wary, k, work):
+    """True if correction k indicates that the iteration will not converge."""
+    if wary == FIRST:
+        return k == 2 and work > DIVERGING
+    return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
 
 
 def _move(e, target, u, R, phi):
@@ -151,13 +142,6 @@ def _move(e, target, u, R, phi):
     R -= force * e.free
     add_constraint_rate(e.joints, target.g, target.at, u, moved, phi)
     return moved
-
-
-def _diverging(wary, k, work):
-    """True if correction k indicates that the iteration will not converge."""
-    if wary == FIRST:
-        return k == 2 and work > DIVERGING
-    return wary == WATCHED and ((k == 1 and work > SOFT) or (k >= LATE and work > LARGE))
 
 
 def reference_work(force: Array, load: Array, u: Array) -> float:

@@ -23,6 +23,8 @@ from ...core.types import Array
 from .law import LINEAR, conserve, law_evaluate
 from .tables import CABLE, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables
 
+#: Mode of ``take`` for valid numbers, which is the fastest.
+CLIP: Any = "clip"
 #: Relative difference between shared and own derivatives that is round-off.
 SAME = 1e-13
 
@@ -98,25 +100,27 @@ class Elements:
         self.start, self.rest = t.start, self.measured(self.x)
         # ends: sample, row, and number of the direction
         (g, h), n = t.rows, self.ns // 2
-        self._second = second = np.flatnonzero(g != h)
-        self._sample, self._row = np.append(np.arange(self.ns), second), np.append(g, h[second])
-        self._direction = (np.append(np.arange(self.ns), second + n) if t.kind == CABLE else
-                          np.append(h, g[second]))
+        self._second = second = (g != h).nonzero()[0]
+        own = np.arange(self.ns)
+        self._sample, self._row = np.concatenate([own, second]), np.concatenate([g, h[second]])
+        self._direction = (np.concatenate([own, second + n]) if t.kind == CABLE else
+                          np.concatenate([h, g[second]]))
         self._G_ends = np.ascontiguousarray(G.transpose(0, 2, 1).take(self._row, axis=2))
         # relative DOFs (2 m, ne); stresses: modulus and strain of each summand, sorted by stress
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
         (s, z), q = t.pairs, np.arange(t.pairs.shape[1])
         both = np.concatenate([t.pairs, t.pairs[::-1, s != z]], axis=1)
-        order = np.argsort(both[0], kind="stable")
-        self._modulus = np.append(q, q[s != z])[order]
+        order = both[0].argsort(kind="stable")
+        self._modulus = np.concatenate([q, q[s != z]])[order]
         self._other = both[1, order]
-        self._begin = np.searchsorted(both[0, order], np.arange(self.ns))
+        self._begin = both[0, order].searchsorted(own)
         self.moduli = self._last(t.H, OF_H)
 
     def _last(self, x, column):
         """A table with the elements as last axis, of length 1 if all are equal."""
-        return np.moveaxis(x if len(x) == 1 else x[self.t.at[:, column]], 0, -1).copy()
+        x = x if len(x) == 1 else x[self.t.at[:, column]]
+        return x.transpose(*range(1, x.ndim), 0).copy()
 
     @cached_property
     def C(self) -> Array | None:
@@ -128,8 +132,8 @@ class Elements:
 
     def relative(self, u: Array) -> Array:
         """DOFs relative to the left node, (m, 2, ne)."""
-        U, q = _taken(u, self._dofs), self.m // 2 * 2
-        U[q:q + 2] -= _taken(u, self._left)
+        U, q = u.take(self._dofs, 0, None, CLIP), self.m // 2 * 2
+        U[q:q + 2] -= u.take(self._left, 0, None, CLIP)
         return U.reshape(self.m, 2, -1)
 
     def rows(self, U: Array) -> Array:
@@ -173,7 +177,7 @@ class Elements:
 
     def change(self, Y: Array, d: Array) -> Array:
         """Change (ns, ne) of the strain by a change of the rows in directions Y."""
-        x = _taken(Y, self._direction) * _taken(d, self._row)
+        x = Y.take(self._direction, 0, None, CLIP) * d.take(self._row, 0, None, CLIP)
         ends = x[:, 0] + x[:, 1]
         strain = ends[:self.ns]
         strain[self._second] += ends[self.ns:]
@@ -188,7 +192,8 @@ class Elements:
     def linear_stress(self, strain: Array, moduli: Array | None = None) -> Array:
         """Weighted stresses (ns, ne) by moduli (nq, ne) between samples."""
         H = self.moduli if moduli is None else moduli
-        return np.add.reduceat(_taken(H, self._modulus) * _taken(strain, self._other), self._begin)
+        products = H.take(self._modulus, 0, None, CLIP) * strain.take(self._other, 0, None, CLIP)
+        return np.add.reduceat(products, self._begin)
 
     @cached_property
     def weights(self) -> Array:
@@ -260,7 +265,7 @@ class Elements:
 
     def force(self, Y: Array, T: Array, U: Array | None = None) -> Array:
         """Element forces (m, 2, ne) of stresses; with U, those of the constant stiffness too."""
-        F = _taken(T, self._sample)[:, None] * _taken(Y, self._direction)
+        F = T.take(self._sample, 0, None, CLIP)[:, None] * Y.take(self._direction, 0, None, CLIP)
         if self.own:
             F = np.matmul(self._G_ends, F.transpose(2, 0, 1)).transpose(1, 2, 0)
         elif self._even:
@@ -277,7 +282,7 @@ class Elements:
     def add(self, F: Array, f: Array) -> None:
         """Add element forces (m, 2, ne) to f."""
         q = self.m // 2
-        at, F = self._ends, np.append(F.ravel(), -F[q].ravel())
+        at, F = self._ends, np.concatenate([F, -F[q:q + 1]]).ravel()
         f[self._span] += np.bincount(at, F, self._span.stop - self._span.start)
 
     @cached_property
@@ -287,7 +292,7 @@ class Elements:
 
     @cached_property
     def _ends(self):
-        return np.append(self._dofs.ravel(), self._left.ravel()) - self._span.start
+        return np.concatenate([self._dofs, self._left]).ravel() - self._span.start
 
     # tangent
 
@@ -298,8 +303,11 @@ class Elements:
         Terms of the products of the samples come first, for the geometric part.
         """
         t, ns, second = self.t, self.ns, self._second
-        own = [np.flatnonzero(t.terms[0] == p)[0] for p in t.of]
-        p, a, b, q = t.terms[:, np.append(own, np.setdiff1d(np.arange(t.terms.shape[1]), own))]
+        first, rest = np.full(t.products.shape[1], -1), np.ones(t.terms.shape[1], bool)
+        first[t.terms[0, ::-1]] = np.arange(len(rest))[::-1]
+        own = first[t.of]
+        rest[own] = False
+        p, a, b, q = t.terms[:, np.concatenate([own, rest.nonzero()[0]])]
         end = np.zeros(2 * ns, int)
         end[:ns], end[ns + second] = np.arange(ns), ns + np.arange(len(second))
         (k, l), (g, h), R = t.products[:, p], t.rows, self.R[:, 0]
@@ -313,7 +321,7 @@ class Elements:
         """P (m (m + 1) / 2, terms) of xx, yy and xy + yx, Q of xy - yx, and its terms."""
         _, _, _, k, l, _, _ = self._terms
         (i, j), G = np.tril_indices(self.m), self.G[0].T
-        one, two, skew = G[:, k], G[:, l], np.flatnonzero(k != l)
+        one, two, skew = G[:, k], G[:, l], (k != l).nonzero()[0]
         P = one[i] * two[j] + one[j] * two[i]
         return P, (one[i] * two[j] - one[j] * two[i])[:, skew], skew
 
@@ -338,11 +346,13 @@ class Elements:
         X[:n, :2] += N[:, None]
         return X
 
-    def coefficients(self, Y: Array, Z: Array, moduli: Array | None) -> tuple[Array, Array, Array]:
+    def coefficients(self, Y: Array, Z: Array, moduli: Array) -> tuple[Array, Array, Array]:
         """Coefficients (terms, 3, ne) of xx, yy, xy + yx, and xy and yx, of the material part."""
         a, b, q, _, _, factor, _ = self._terms
-        c = self._constant_moduli if moduli is self.moduli else factor * _taken(moduli, q)[:, None]
-        X, Z, w = _taken(Y, a) * c, _taken(Z, b), np.empty((len(a), 3, self.ne))
+        c = (self._constant_moduli if moduli is self.moduli else
+             factor * moduli.take(q, 0, None, CLIP)[:, None])
+        X, Z = Y.take(a, 0, None, CLIP) * c, Z.take(b, 0, None, CLIP)
+        w = np.empty((len(a), 3, self.ne))
         np.multiply(X, Z, out=w[:, :2])
         xy, yx = X[:, 0] * Z[:, 1], X[:, 1] * Z[:, 0]
         np.add(xy, yx, out=w[:, 2])
@@ -358,7 +368,7 @@ class Elements:
             return np.matmul(self.G.transpose(0, 2, 1)[:, None], WG)
         P, Q, skew = self._products
         K = (P @ w.reshape(len(w), -1)).reshape(-1, 3, self.ne)
-        Z = Q @ (_taken(xy, skew) - _taken(yx, skew))
+        Z = Q @ (xy.take(skew, 0, None, CLIP) - yx.take(skew, 0, None, CLIP))
         return np.concatenate([K.reshape(-1, self.ne), 0.5 * (K[:, 2] + Z), 0.5 * (K[:, 2] - Z)])
 
     def lower(self, K: Array) -> Array:
@@ -367,7 +377,7 @@ class Elements:
         if self.own:
             at = (part * self.m + k) * self.m + l
             return K.reshape(self.ne, -1).take(at, axis=1).T * sign[:, None]
-        return _taken(K, _of_products(self.m)) * self._signs
+        return K.take(_of_products(self.m), 0, None, CLIP) * self._signs
 
     @cached_property
     def _signs(self):
@@ -428,7 +438,7 @@ class Elements:
         """Derivatives of the strain in directions Y by the DOFs of both nodes, (ne, ns, 2 nb)."""
         R, D = (x[:, 0].T[:, :, None] for x in (self.R[self._row], self.D))
         G = self.G.take(self._row, axis=1) * R * D.transpose(0, 2, 1)
-        ends = G[..., None] * _taken(Y, self._direction).transpose(2, 0, 1)[:, :, None]
+        ends = G[..., None] * Y.take(self._direction, 0, None, CLIP).transpose(2, 0, 1)[:, :, None]
         B, q = np.empty((self.ne, self.ns, self.m + 1, 2)), self.m // 2
         B[:, :, 1:] = ends[:, :self.ns]
         B[:, self._second, 1:] += ends[:, self.ns:]
@@ -440,8 +450,3 @@ class Elements:
         H, (s, z) = np.zeros((moduli.shape[1], self.ns, self.ns)), self.t.pairs
         H[:, s, z] = H[:, z, s] = moduli.T
         return H
-
-
-def _taken(x, i):
-    """``x[i]``, faster."""
-    return x.take(i, axis=0, mode="clip")

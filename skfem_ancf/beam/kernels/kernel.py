@@ -14,8 +14,8 @@ from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements
 from .law import LINEAR, law_evaluate
 from .runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
-                   run_gradients, run_mean, run_stress, run_tangent, run_viscous)
-from .tables import StrainTables, apart, linearised, repeated, scaled
+                   run_gradients, run_mean, run_stress, run_tangent)
+from .tables import StrainTables, apart, repeated, scaled
 
 #: Approximate number of elements whose energies are evaluated together.
 TOGETHER = 4096
@@ -147,8 +147,13 @@ class ElementKernel:
 
     def viscous_forces(self, u: Array, v: Array, time: float) -> Array:
         """Viscous element forces for the rate v of the displacement."""
-        return self._forces([Elements(apart(t)) for t in self.viscous_tables(time)], run_viscous,
-                            u, v)
+        u, v = (self.gather(self._checked(x)).ravel() for x in (u, v))
+        out = np.zeros_like(u)
+        for e in self._apart:
+            one = e.at(u)[2]
+            Y = e.directions(one, one)
+            e.add(e.force(Y, time * e.linear_stress(e.change(Y, e.rows(e.relative(v))))), out)
+        return out.reshape(self.t.shape[1], -1, 2)
 
     def small_forces(self, u: Array) -> Array:
         """Linearised element forces, ``K(0) u`` by the strain, which has less round-off."""
@@ -179,8 +184,7 @@ class ElementKernel:
         The stresses of all :attr:`tables` are side by side; further columns are ignored.
         """
         given = np.split(stress, np.cumsum([t.rows.shape[1] for t in self.tables]), axis=1)
-        return self._tangents(run_eigen_tangent, u,
-                              [Elements(apart(linearised(t))) for t in self.tables], given)
+        return self._tangents(_run_geometric, u, self._apart, given)
 
     def _tangents(self, run, u, elements, given=None):
         u, n = self.gather(self._checked(u)).ravel(), 2 * self.nd
@@ -228,6 +232,12 @@ class ElementKernel:
 
 def _run_tangent(e, u, given, flat, ld):
     run_tangent(e, u, given, given, u[:0], flat, ld)
+
+
+def _run_geometric(e, u, given, flat, ld):
+    one = e.at(u)[2]
+    e.add_to_band(e.tangent(one, e.directions(one, one), given.reshape(e.ne, e.ns).T, None), flat,
+                  ld)
 
 
 def _square_root(K):

@@ -105,15 +105,17 @@ class SectionKernel(ElementKernel):
         for one, e in zip(self.integrals, self.elements):
             if one.first:
                 r = e.x + e.rows(e.relative(u))
-                yield [r[rows[one.samples.component == component]] for rows in e.t.rows]
+                yield r[e.t.rows[:, one.samples.component == component]]
 
     def inverted(self, u: Array) -> bool:
-        return not all((x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0]).all()
-                       for x, y in self._gradients(u, 2))
+        for x, y in self._gradients(u, 2):
+            if not (x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0]).all():
+                return True
+        return False
 
     def shortest(self, u: Array) -> Any:
         """Smallest axial stretch where eps_xx is sampled."""
-        return min(np.sqrt(np.min(np.sum(x * x, axis=1))) for x, _ in self._gradients(u, 0))
+        return min([np.hypot(x[:, 0], x[:, 1]).min() for x, _ in self._gradients(u, 0)])
 
 
 def beam_gradients(mesh: MeshBeam, element: ElementBeam, X: Array,
