@@ -333,6 +333,12 @@ def dot(a, b):
 
 
 @primitive("skfem_ancf.core.loops")
+def weighted_square(x, weights):
+    """Weighted sum of squares."""
+    return np.dot(x * x, weights)
+
+
+@primitive("skfem_ancf.core.loops")
 def total(x):
     """Sum."""
     return np.sum(x)

@@ -439,6 +439,13 @@ def dot(a, b):
     return total
 
 
+def weighted_square(x, weights):
+    out = 0.0
+    for i in range(x.size):
+        out += weights[i] * x[i] * x[i]
+    return out
+
+
 def total(x):
     found = 0.0
     for i in range(x.size):

@@ -10,7 +10,7 @@ from ..actions.tables import (add_joint_force, add_load_stiffness, constraint,
                               external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
-from ..core.band import diagonal, dot, largest
+from ..core.band import diagonal, dot, largest, weighted_square
 from ..core.source import F1, indices, source
 
 
@@ -88,35 +88,42 @@ def balance(e, target, first, last, mixed, x, m, stresses, out):
         force(e, u, target.at, f)
     else:
         if mixed:
-            linearised(e, u - x[DU], x[DU], stresses[0], stresses[1])
+            before, du = np.empty(u.size), x[DU]
+            for i in indices(u.size):
+                before[i] = u[i] - du[i]
+            linearised(e, before, du, stresses[0], stresses[1])
         factors = target.before if first else target.factors
         t = np.inf if first and np.isnan(target.when) else target.when
         tangent(e, u, factors, t, target.scale, target.at, mixed, stresses[0], stresses[1], f)
         diagonal(e.K, weights)
+        for i in indices(u.size):
+            weights[i] = np.abs(weights[i])
         least = SMALLEST * mean_stiffness(weights, e.sizes)
         for i in indices(u.size):
-            weights[i] = 1.0 / (np.abs(weights[i]) + least / (e.sizes[i] * e.sizes[i]))
+            weights[i] = 1.0 / (weights[i] + least / (e.sizes[i] * e.sizes[i]))
     external_force(e.loads, target.factors, target.when, target.scale, u, load)
     for i in indices(u.size):
         R[i] = load[i] - f[i] - target.gap[i]
     out[2] = 0.0
     if phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, u, phi)
-        out[2] = largest(phi / e.joints.sizes)
-        pull = np.zeros(u.size)
+        opening, pull = np.empty(phi.size), np.zeros(u.size)
+        for k in indices(phi.size):
+            opening[k] = phi[k] / e.joints.sizes[k]
+        out[2] = largest(opening)
         add_joint_force(e.joints, target.g, target.at, u, m[0], pull)
         for i in indices(u.size):
             R[i] -= pull[i]
     for i in indices(u.size):
         R[i] *= e.free[i]
-    out[0] = np.sqrt(dot(R * R, weights))
-    out[1] = np.sqrt(max(dot(f * f, weights), dot(load * load, weights)))
+    out[0] = np.sqrt(weighted_square(R, weights))
+    out[1] = np.sqrt(max(weighted_square(f, weights), weighted_square(load, weights)))
 
 
 @source
 def mean_stiffness(diagonal, sizes):
-    """Mean of the absolute stiffnesses, scaled by the squared sizes of DOFs; 1 if it is zero."""
-    mean = dot(np.abs(diagonal), sizes * sizes) / sizes.size
+    """Mean of the stiffnesses, scaled by the squared sizes of the DOFs; 1 if it is zero."""
+    mean = weighted_square(sizes, diagonal) / sizes.size
     return mean if mean > 0.0 else 1.0
 
 
