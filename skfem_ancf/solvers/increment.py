@@ -111,19 +111,12 @@ class Increment:
 
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""
-<<<<<<< HEAD
         histories, start = self.system.histories, self.start
         rubbed = start.rubbed + histories.accept(start.u, found.u, self.time)
-        return replace(start, steps=[*start.steps, self.record], load=self.level, rubbed=rubbed,
-                       memory=histories.get(), **found._asdict())
-=======
-        contacts, start = self.system.forces.contacts, self.start
-        rubbed = start.rubbed + contacts.settle(found.u, self.time)
         return StaticResult(**vars(start) | {
             "steps": [*start.steps, self.record], "load": self.level, "rubbed": rubbed,
-            "memory": contacts.remember(), "u": found.u, "multipliers": found.multipliers,
+            "memory": histories.get(), "u": found.u, "multipliers": found.multipliers,
             "force": found.force})
->>>>>>> 08aa8ad (Checks after a static solve with fewer calls; one beam has one set of arrays)
 
     def _augmented(self):
         """Repeat with corrected pressures until the penetration is within tolerance."""

@@ -258,6 +258,8 @@ class Contacts:
         ``u`` (N,) is the displacement there. Unless it is zero the start may be in contact, and is
         refused from a penetration of its height on; obstacles that move may push it.
         """
+        if not self.obstacles:
+            return
         given = bool(np.any(u))
         cut = 1.0 if given else CUT
         for (which, group), x, gap in self.look(u, t):
