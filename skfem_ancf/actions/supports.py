@@ -57,9 +57,8 @@ class Support(Item):
         return (PrescribedDisplacement(self.boundary, self.names, self.displacement, self.beam),)
 
     def bind(self, layout: Layout) -> Support:
-        beam = layout.beam(self.beam)
-        return self._with(dofs=beam.dofs(self.boundary, self.names) + layout.offset(beam),
-                          _member=(beam, layout.offset(beam)))
+        beam, first = layout.beam(self.beam), layout.offset(self.beam)
+        return self._with(dofs=beam.dofs(self.boundary, self.names) + first, _member=(beam, first))
 
     def hold(self, fixed: dict[int, float]) -> None:
         """Add its prescribed DOFs to ``fixed``; SupportError where two displacements conflict."""

@@ -231,7 +231,7 @@ class Beam(Immutable):
     @cached_property
     def origin(self) -> Array:
         """A point near the beam, origin of the local coordinates."""
-        return read_only(self.mesh.p.mean(axis=1))
+        return read_only(np.add.reduce(self.mesh.p, axis=1) / self.mesh.p.shape[1])
 
     @cached_property
     def q0_local(self) -> Array:
@@ -255,15 +255,17 @@ class Beam(Immutable):
         names
             Their names, as ``"r^1"``, or without component, as ``"r"``; None for all.
         """
-        facets = np.unique(facets_of(self.mesh, boundary))
+        facets = facets_of(self.mesh, boundary)
+        if len(facets) > 1:
+            facets = np.unique(facets)
         if facets[-1] >= self.mesh.p.shape[1]:  # facets below that number are sections at nodes
             facets = np.unique(self.mesh.facets[:, facets])
         known, both = self.dofnames, self.element.dofnames
         names = known if names is None else require_names(
-            "degree of freedom", names, [*known, *(n for n in both if n not in known)])
+            "degree of freedom", names, [*known, *[n for n in both if n not in known]])
         rows = np.array([k for k, full in enumerate(known)
-                         if full in names or full.rsplit("^", 1)[0] in names])
-        return np.sort((facets[:, None] * self.nd + rows).ravel())
+                         if full in names or both[k // 2] in names])
+        return (facets[:, None] * self.nd + rows).ravel()
 
     @cached_property
     def finder(self) -> Finder:
@@ -285,10 +287,12 @@ class Beam(Immutable):
     @cached_property
     def sizes(self) -> Array:
         """Typical changes of the DOFs when the beam moves by its size, shape (N,)."""
-        length, h = float(self.mesh.lengths.mean()), self.mesh.height
+        length, h = float(np.add.reduce(self.mesh.lengths)) / self.mesh.nelements, self.mesh.height
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
-        return read_only(np.tile(np.repeat(node, 2), self.N // self.nd))
+        out = np.empty((self.N // self.nd, len(node), 2))
+        out[:] = np.array(node)[:, None]
+        return read_only(out.ravel())
 
     def rigid_motions(self) -> Array:
         """Two translations and the rotation about :attr:`origin`, (N, 3)."""
@@ -363,8 +367,7 @@ class Beam(Immutable):
     def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
         load = self.masses.weights(require_finite("g", g, (2,)))
-        return self.kernel.scatter(np.broadcast_to(
-            load, (self.mesh.nelements,) + load.shape[1:]).copy())
+        return self.kernel.scatter(load + np.zeros((self.mesh.nelements, 1, 1)))
 
     def mass(self) -> csr_matrix:
         """The constant mass matrix, sparse, shape (N, N)."""

@@ -56,6 +56,8 @@ class Layout:
         """The number of a member (object, name or number); None for the only one."""
         if which is None and len(self.members) == 1:
             return 0
+        if type(which) is int and 0 <= which < len(self.members):
+            return which
         found = self._numbers.get(id(which))
         if found is not None:
             return found

@@ -27,8 +27,8 @@ def is_many(points: Any) -> bool:
     """True for a two-dimensional array, or a list or tuple of points."""
     if isinstance(points, np.ndarray):
         return points.ndim == 2
-    return isinstance(points, (list, tuple)) and len(points) > 0 and all(
-        isinstance(p, (list, tuple, np.ndarray)) for p in points)
+    return isinstance(points, (list, tuple)) and len(points) > 0 and all([
+        isinstance(p, (list, tuple, np.ndarray)) for p in points])
 
 
 def as_points(points: Any) -> Array:
@@ -64,7 +64,7 @@ class BeamPoints:
         self.beam, self.number, self.slice, self.index = beam, number, dofs, index
         self.n, self.e, self.X = len(e), e, X
 
-    @cached_property
+    @property
     def at(self) -> Array:
         """Points of the reference cell in the shape (2, n, 1)."""
         return self.X[:, :, None]
@@ -74,12 +74,12 @@ class BeamPoints:
         """Positions in the reference configuration, (2, n)."""
         return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
 
-    @cached_property
+    @property
     def off_axis(self) -> bool:
         """True if a point is off the axis of a cable, where positions are nonlinear."""
         return not self.beam.has_sections and bool(np.any(np.abs(self.X[1] - 0.5) > ON_AXIS))
 
-    @cached_property
+    @property
     def dofs(self) -> Array:
         """DOFs of the element of each point, (nb, 2, n)."""
         first = self.slice.start + self.beam.mesh.t[0, self.e] * self.beam.nd
@@ -101,7 +101,10 @@ class BeamPoints:
 
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum (..., 2, n) of weighted DOFs (..., N) at each point."""
-        return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
+        out = 0.0
+        for w, d in zip(weights, self.dofs):
+            out = out + w * u[..., d]
+        return out
 
     def displacement(self, u: Array) -> Array:
         """Displacements (..., 2, n) for DOFs ``u`` (..., N) of the scene."""
@@ -250,7 +253,7 @@ class Points:
         elif len(self.beams) == 1 and not self.bodies:
             beam = self.beams[0]
         x = as_points(points)
-        one, x = x.ndim == 1, np.reshape(x, (2, -1))
+        one, x = x.ndim == 1, x.reshape(2, -1)
         return Located(one, x.shape[1], self._in_all(x, ask) if beam is None else
                        [self._in_one(x, beam, chain, ask)])
 

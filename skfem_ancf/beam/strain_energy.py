@@ -101,11 +101,10 @@ def viscous_body_of(body: Body, beams: Sequence["Beam"], times: Sequence[float])
     packs: list[StrainTables] = []
     rows, first = [], 0
     for beam, time in zip(beams, times):
-        viscous = beam.kernel.viscous_tables(time)
-        last = first + len(viscous)
+        last = first + len(beam.kernel.tables)
         if time > 0.0:
-            packs += [t._replace(start=own.start)
-                      for t, own in zip(viscous, body.packs[first:last])]
+            packs += [t._replace(start=own.start) for t, own in zip(
+                beam.kernel.viscous_tables(time), body.packs[first:last])]
             rows += list(body.table[first:last])
         first = last
     return Body(tuple(packs), np.array(rows)) if packs else body

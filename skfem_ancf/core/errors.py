@@ -271,14 +271,14 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     given = array
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
-    if shape is not None and array.shape != shape and (array.ndim != len(shape) or any(
-            wanted not in (None, n) for wanted, n in zip(shape, array.shape))):
+    if shape is not None and array.shape != shape and (array.ndim != len(shape) or any([
+            wanted not in (None, n) for wanted, n in zip(shape, array.shape)])):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         example = example or "(0, 1)" * (tuple(shape) == (2,))
         raise InputError(f"{name} must have shape {wanted}{example and f', as {example}'}, got "
                          f"{array.shape}: {shown(given)}")
     finite = np.isfinite(array)
-    if not finite.all():
+    if not np.logical_and.reduce(finite, axis=None):
         raise InputError(f"{name} has a value that is NaN or infinite: {array[~finite][0]}")
     return array
 
@@ -314,8 +314,10 @@ def require_increasing(name: str, values: Any) -> Array:
 
 def require_point(point: Any) -> Array:
     """A material point as an array (2,); else MeshError."""
-    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and not any(
-            isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x) for x in point):
+    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and all([
+            type(x) in (float, int, np.float64) or not (
+                isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x))
+            for x in point]):
         return require_finite("a material point", point, (2,))
     raise MeshError("a material point has two coordinates (x, y) in the reference configuration, "
                     f"or is the name of an end, as 'right', got {shown(point)}")
@@ -399,7 +401,8 @@ def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...
     if not isinstance(names, (tuple, list, set, frozenset, np.ndarray)) or (
             getattr(names, "ndim", 1) != 1):
         raise InputError(f"{kind}s are named by a text or a list of texts, got {shown(names)}")
-    return tuple(require_option(kind, name, known) for name in names)
+    return tuple([name if type(name) is str and name in known else
+                  require_option(kind, name, known) for name in names])
 
 
 def require_text(name: str, value: Any) -> Any:
@@ -428,7 +431,7 @@ def require_flag(name: str, value: object) -> bool:
 
 def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
     """An instance with these attributes; ``kind`` is its name in the message."""
-    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
+    if isinstance(value, type) or not all([hasattr(value, a) for a in attributes]):
         raise InputError(f"{name} must be a {kind}, got {shown(value)}")
     return value
 

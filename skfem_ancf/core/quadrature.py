@@ -59,7 +59,7 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
     (x, wx), (y, wy) = axis, section
     X = np.empty((2, len(x), len(y)))
     X[0], X[1] = x[:, None], y
-    return X.reshape(2, -1), np.outer(wx, wy).ravel()
+    return X.reshape(2, -1), (wx[:, None] * wy).ravel()
 
 
 def _rule(name: str, rule: Any) -> Rule:

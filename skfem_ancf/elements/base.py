@@ -203,7 +203,7 @@ class ElementBeam(Immutable, Element):
             out[d, of_axis] = hermite_basis(self._along[0], xi, d)[axis[of_axis]]
         if self.section.number:
             of_node, number = of_node[of_section], number[of_section]
-            S, dS = (hermite_basis(self._along[1], xi, d)[of_node] for d in (0, 1))
+            S, dS = [hermite_basis(self._along[1], xi, d)[of_node] for d in (0, 1)]
             P, dP = self.section(eta - 0.5)
             P, dP = P[number], dP[number]
             out[0, of_section], out[1, of_section], out[2, of_section] = S * P, dS * P, S * dP
@@ -227,12 +227,12 @@ class ElementBeam(Immutable, Element):
             The power of L that multiplies a function: the number of its derivatives along X.
         """
         power, slope = self._factors[3:, i]
-        unit = self._unit(X, i)
-        if np.ndim(h) == unit.ndim - 1:  # the same points of each element
+        unit, axes = self._unit(X, i), 0 if type(h) is float else np.ndim(h)
+        if axes == unit.ndim - 1:  # the same points of each element
             unit = unit[:, :, None]
         column = (-1,) + (1,) * (unit.ndim - 2)
-        value, d_xi, d_eta = np.asarray(h) ** power.reshape(column) * unit
-        if np.ndim(h):  # h^p P(Y / h) of a height that varies
+        value, d_xi, d_eta = h ** power.reshape(column) * unit
+        if axes:  # h^p P(Y / h) of a height that varies
             d_xi += np.multiply.outer(power, rate / h) * value
         return value, d_xi, d_eta, slope
 
@@ -250,8 +250,9 @@ class ElementBeam(Immutable, Element):
     @property
     def by_reference(self) -> bool:
         """True if elements follow from one of unit length and height by :meth:`powers`."""
-        return all(getattr(type(self), name) is getattr(ElementBeam, name)
-                   for name in ("local", "of_mesh", "functions", "slopes"))
+        kind, base = type(self), ElementBeam
+        return (kind.local is base.local and kind.of_mesh is base.of_mesh
+                and kind.functions is base.functions and kind.slopes is base.slopes)
 
     def unit_slopes(self, X: Array, Y: Array) -> Array:
         """Derivatives of the local functions for unit height and length, (n + m, 2 nodal_dofs).

@@ -219,9 +219,12 @@ def null_space(H: Array | sparse.csr_array) -> Array:
     if not H.shape[0]:
         return np.eye(n)[:n if n <= DENSE else MOST]
     if n <= DENSE:
-        H = dense(H)
-        _, sigma, V = np.linalg.svd(H if len(H) <= 4 * n else np.linalg.qr(H, mode="r"))
-        return V[int(np.sum(sigma > FREE * sigma[0])):]
+        H = H if isinstance(H, np.ndarray) else dense(H)
+        _, sigma, V, info = scipy.linalg.lapack.dgesdd(
+            H if len(H) <= 4 * n else np.linalg.qr(H, mode="r"))
+        if info != 0:
+            raise np.linalg.LinAlgError("the singular values were not found")
+        return V[np.count_nonzero(sigma > FREE * sigma[0]):]
     # inverse iteration with H^T H + small^2, in a form with the root of its condition number
     small = 0.1 * FREE
     lu = splu(sparse.bmat([[small * sparse.eye(H.shape[0]), H],

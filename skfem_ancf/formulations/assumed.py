@@ -60,10 +60,11 @@ class Assumed(Formulation):
         sampling = element.sampling
         axis, samples = gauss(sampling.points), sampling.samples
         require_like("material", material, "Material", "law")
-        law = material.law(material.shear_factor(element))
+        factor = material.shear_factor(element)
+        law = material.law(factor)
         whole = Term(law, axis, section, samples)
         if element.order > 1:
-            return self._volumetric_apart(whole, element, material) or [whole]
+            return self._volumetric_apart(whole, element, material, factor) or [whole]
         if not isinstance(law, LinearLaw):
             return [whole]
         uncoupled, coupling = split_moduli(self.name, material, element)
@@ -77,11 +78,11 @@ class Assumed(Formulation):
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
 
     @staticmethod
-    def _volumetric_apart(whole: Term, element: ElementBeam, material: Material
-                          ) -> list[Term] | None:
+    def _volumetric_apart(whole: Term, element: ElementBeam, material: Material,
+                          factor: float) -> list[Term] | None:
         """The term split in two, the volumetric one with few points along the axis; or None."""
         volume = element.sampling.volume
-        laws = material.volumetric_split(material.shear_factor(element)) if volume else None
+        laws = material.volumetric_split(factor) if volume else None
         if laws is None:
             return None
         points = tuple(whole.axis[0])

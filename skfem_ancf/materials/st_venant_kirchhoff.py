@@ -35,9 +35,9 @@ class StVenantKirchhoff(Material):
         return hooke(self.E, self.nu, self.plane)
 
     def law(self, k_s: float = 1.0) -> Law:
-        cls = type(self)
-        if any(getattr(cls, name) is not getattr(StVenantKirchhoff, name)
-               for name in ("energy", "stress", "moduli")):
+        cls, own = type(self), StVenantKirchhoff
+        if (cls.energy is not own.energy or cls.stress is not own.stress
+                or cls.moduli is not own.moduli):
             return super().law(k_s)  # a subclass with another law
         D = self.D
         D[2, 2] *= require_positive("k_s", k_s)

@@ -14,6 +14,10 @@ from ..core.errors import MeshError
 from ..core.types import Array
 from .reference_cell import hermite_basis
 
+EPS = float(np.finfo(float).eps)
+#: A distance outside of elements that have no such point.
+FARTHEST = float(np.finfo(float).max)
+
 #: Tolerance and largest number of Newton iterations.
 CLOSE, ITERATIONS = 1e-7, 30
 
@@ -131,8 +135,8 @@ class Finder:
         chains that contain a point the one with the nearest axis is taken; the fourth result is
         true where there are several. ``chain`` restricts the search to the chain of this number.
         """
-        noise = 1e-9 + 8 * np.finfo(float).eps * (
-            self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
+        noise = 1e-9 + 8 * EPS * (
+            self.size + np.maximum.reduce(np.abs(x), axis=None, initial=0.0)) / self.mesh.height
         tied = np.zeros(x.shape[1], dtype=bool)
         with np.errstate(all="ignore"):
             if chain is not None:
@@ -152,7 +156,7 @@ class Finder:
     def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
         """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
         e, X, outside, tied = self.find(x, chain)
-        if np.any(outside > self.allowed):
+        if (outside > self.allowed).any():
             raise self._refusal(x, outside, chain)
         return e, X, tied
 
@@ -210,7 +214,7 @@ class Finder:
 
     def _find(self, x, noise):
         e, X, outside = self._nearest(x, noise)
-        left = np.nonzero((outside > 0) & np.isfinite(outside))[0]
+        left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
         if len(left):
             e[left], X[:, left], outside[left] = self._best(
                 x[:, left], self._candidates(x[:, left]), noise)
@@ -218,13 +222,13 @@ class Finder:
                 all_of_them = np.arange(self.mesh.nelements)[None]
                 e[i], X[:, i], outside[i] = (part[..., 0] for part in self._best(
                     x[:, i:i + 1], all_of_them, noise))
-        return e, np.clip(X, 0.0, 1.0), outside
+        return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
 
     @staticmethod
     def _outside(X, noise):
         out = np.maximum(*np.abs(X - 0.5)) - 0.5
         out[out < noise] = 0.0
-        out[np.isnan(out)] = np.finfo(float).max
+        out[np.isnan(out)] = FARTHEST
         return out
 
     @cached_property
@@ -265,9 +269,10 @@ class Finder:
             e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
         else:
             d, nodes = self._line
-            e = np.clip(np.searchsorted(nodes, d @ x) - 1, 0, len(nodes) - 2)
+            e = np.minimum(np.maximum(nodes.searchsorted(d @ x) - 1, 0), len(nodes) - 2)
             todo = np.arange(x.shape[1])
-        X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
+        X, outside = np.empty(x.shape), np.empty(x.shape[1])
+        X[:], outside[:] = 0.5, np.inf
         steps = 0
         while len(todo):
             X[:, todo] = self.inverse(x[:, todo, None], e[todo])[..., 0]

@@ -259,7 +259,7 @@ class MeshBeam(NumberedMesh):
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
         height, heights, taper = heights
-        tangent = np.broadcast_to(tangent, p.shape)
+        tangent = tangent + np.zeros(p.shape)
         return cls(p, t, default_tags(p, t), height=height, p_X=tangent, lengths=lengths, s=s,
                    p_Y=np.array([0.0 - tangent[1], tangent[0]]), curve=curve, heights=heights,
                    taper=taper, p_XY=np.zeros(p.shape) if turning is None else turning)
@@ -301,8 +301,11 @@ class MeshBeam(NumberedMesh):
                             "with MeshBeam.init_line or init_curve")
         for name, wanted in (("p_X", p.shape), ("p_Y", p.shape), ("p_XY", p.shape),
                              ("lengths", shape[1:]), ("heights", (4, shape[1]))):
-            if getattr(self, name) is not None or name not in ("p_XY", "heights"):
-                setattr(self, name, require_finite(name, getattr(self, name), wanted))
+            value = getattr(self, name)
+            if value is not None or name not in ("p_XY", "heights"):
+                found = require_finite(name, value, wanted)
+                if found is not value:
+                    setattr(self, name, found)
         chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
         has_length = (chord > 4 * EPS * np.abs(p).max()) & (self.lengths > 0.0)
         if not has_length.all():

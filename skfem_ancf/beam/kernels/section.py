@@ -171,8 +171,8 @@ def _rows(mesh, element, samples, tind):
         unit, n, h = element.unit_slopes(X[:, x], X[:, y]), len(x), mesh.height
         t = mesh.t if tind is None else mesh.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])[:, None]
-        scale = np.repeat(np.concatenate([1.0 / L, np.full_like(L, 1.0 / h)], axis=1),
-                          [n, len(unit) - n], axis=1)
+        scale = np.empty((len(L), len(unit)))
+        scale[:, :n], scale[:, n:] = 1.0 / L, 1.0 / h
         G = unit * (scale[:, :, None] * element.powers(h, L)[:, None])
         frame = np.empty((len(L), len(unit), 2))
         e = ((mesh.p[:, t[1]] - mesh.p[:, t[0]]) / L.T).T[:, None]
@@ -195,8 +195,9 @@ def _moduli(samples, term, law, weights):
     """Pairs of coupled samples (2, nq), and their moduli (1 or ne, nq)."""
     A, c = _interpolation(samples, term), samples.component
     D = law.D[c[:, None], c] if law.kind == LINEAR else np.ones((len(c), len(c)))
-    s, t = np.nonzero(np.triu((np.abs(A).T @ np.abs(A) > 0.0) & (D != 0.0)
-                              | np.eye(len(c), dtype=bool)))
+    row, size = np.arange(len(c)), np.abs(A)
+    s, t = (((size.T @ size > 0.0) & (D != 0.0) & (row[:, None] < row))
+            | (row[:, None] == row)).nonzero()
     D, A = law.D[c[s], c[t]], (A[:, s] * A[:, t]).T
     H = weights @ A.T
     keep = (s == t) | (np.abs(H) > ORTHOGONAL * (np.abs(weights) @ np.abs(A).T)).any(axis=0)
