@@ -27,8 +27,8 @@ def is_many(points: Any) -> bool:
     """True for a two-dimensional array, or a list or tuple of points."""
     if isinstance(points, np.ndarray):
         return points.ndim == 2
-    return isinstance(points, (list, tuple)) and len(points) > 0 and all([
-        isinstance(p, (list, tuple, np.ndarray)) for p in points])
+    return isinstance(points, (list, tuple)) and len(points) > 0 and False not in [
+        isinstance(p, (list, tuple, np.ndarray)) for p in points]
 
 
 def as_points(points: Any) -> Array:
@@ -101,7 +101,7 @@ class BeamPoints:
 
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum (..., 2, n) of weighted DOFs (..., N) at each point."""
-        out = 0.0
+        out: Any = 0.0
         for w, d in zip(weights, self.dofs):
             out = out + w * u[..., d]
         return out

@@ -72,9 +72,10 @@ def _rule(name: str, rule: Any) -> Rule:
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     """Lagrange polynomials of nodes (n,) at points (m,), shape (m, n)."""
     nodes, x = np.asarray(nodes, dtype=float), np.asarray(x, dtype=float)
-    if len(set(nodes.tolist())) < len(nodes):
+    if len(set(nodes.tolist())) < nodes.size:
         raise InputError(f"nodes must be different, got {shown(nodes)}")
-    out = np.ones((len(x), len(nodes)))
+    out = np.empty((x.size, nodes.size))
+    out[:] = 1.0
     for i, a in enumerate(nodes):
         for j, b in enumerate(nodes):
             if i != j:

@@ -317,9 +317,9 @@ class CondensedMass:
 def _order(nodes):
     """Node numbers in a fill-reducing order."""
     (i, j), n = nodes.nodes.reshape(-1, 2).T, len(nodes.fixed)
-    one = np.ones(len(i))
-    links = sparse.coo_array((np.append(one, one), (np.append(i, j), np.append(j, i))), (n, n))
-    A = (links + 2.0 * len(i) * sparse.eye_array(n)).tocsc()
+    k = np.arange(n)
+    values = np.repeat([1.0, 2.0 * len(i)], [2 * len(i), n])
+    A = sparse.csc_array((values, (np.concatenate([i, j, k]), np.concatenate([j, i, k]))), (n, n))
     return np.argsort(splu(A, "MMD_AT_PLUS_A", options={"SymmetricMode": True}).perm_c)
 
 

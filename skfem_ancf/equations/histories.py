@@ -55,7 +55,7 @@ class Histories:
 
     def get(self) -> Array | None:
         """A copy of the history that is set; None if nothing has happened."""
-        return self.values.copy() if self.values.any() else None
+        return self.values.copy() if self.values.size and self.values.any() else None
 
     def begin(self, u: Array, t: float, history: Array | None = None) -> Array | None:
         """Set the history of a start at u and t, or a given one; returns it.

@@ -78,7 +78,7 @@ class LinearSolver:
         band = self._system.K.band
         marked = band._replace(flat=np.full(band.flat.size, np.nan))
         fix(marked, self._system.constraints.fixed)
-        return np.flatnonzero(marked.flat == 0.0), np.flatnonzero(marked.flat == 1.0)
+        return (marked.flat == 0.0).nonzero()[0], (marked.flat == 1.0).nonzero()[0]
 
     def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
         """Fix the supports in the tangent and factorise it with the joints.

@@ -79,9 +79,13 @@ def _motions_of_frame(c, joints):
         motions, shift = beam.rigid_motions().copy(), beam.origin - origin
         motions[:, 2] += shift[0] * motions[:, 1] - shift[1] * motions[:, 0]
         values.append(motions / (1.0, 1.0, c.size))
-    motions, number = _sparse(np.concatenate(values), of_part), int(parts.max()) + 1
-    held = sparse.vstack([frame.fixed_motions(parts, origin, c.size, number),
-                          joints[len(frame.equations):] @ motions])
+    motions, number = np.concatenate(values), int(parts.max()) + 1
+    if number > 1:
+        motions = _sparse(motions, of_part)
+    held = frame.fixed_motions(parts, origin, c.size, number)
+    others = joints[len(frame.equations):] @ motions
+    held = sparse.vstack([held, others]) if number > 1 else np.concatenate([
+        held.toarray(), others])
     return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
 
 

@@ -238,7 +238,7 @@ def potential(system: Any, u: Array, load: float, turned: Array | None = None) -
 
 def largest_displacement(system: Any, du: Array) -> float:
     """The largest displacement of a node, for displacements (..., N)."""
-    places = np.nonzero(position_weights(system))[0]
+    places = position_weights(system).nonzero()[0]
     return float(np.hypot(*du[..., places].reshape(-1, 2).T).max(initial=0.0))
 
 

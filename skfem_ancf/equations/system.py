@@ -243,13 +243,10 @@ class System:
 
     def inverted(self, u: Array) -> bool:
         """True if an element is turned inside out."""
-        for member, s in zip(self.members, self.slices):
-            if isinstance(member, Domain):
-                if member.inverted(u[s]):
-                    return True
-            elif isinstance(member, Beam) and member.has_sections and member.kernel.inverted(u[s]):
+        for beam, s in zip(self.beams, self.slices):
+            if beam.has_sections and beam.kernel.inverted(u[s]):
                 return True
-        return False
+        return any(domain.inverted(u[self.of(domain)]) for domain in self.domains)
 
     def folded(self, u: Array) -> bool:
         """True if the axis folds back within an element."""
@@ -283,7 +280,7 @@ class System:
     @property
     def viscous(self) -> bool:
         """True if a beam has viscous damping."""
-        return any(time > 0.0 for time in self.retardation)
+        return max(self.retardation, default=0.0) > 0.0
 
     @property
     def damped(self) -> bool:

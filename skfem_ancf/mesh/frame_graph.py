@@ -202,12 +202,16 @@ class FrameGraph:
         (x, y) as a tuple, a function of points x (2, n) that returns n truth values, an array of
         numbers, an array of points (k, 2), or a list of these.
         """
-        return np.unique(self.same[self.points_at(place)])
+        found = self.same[self.points_at(place)]
+        return found if len(found) == 1 else np.unique(found)
 
     def points_at(self, place: Any) -> Array:
         """As :meth:`nodes_at`, with all given points that were merged into each node."""
+        n = self.points.shape[1]
+        if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
+            return np.array([require_integer("the number of a node", place, 0, n - 1)])
         require_unmasked("place", place)
-        n, place = self.points.shape[1], points_of_rows(place)
+        place = points_of_rows(place)
         if isinstance(place, str):
             if place in self.lost:
                 raise MeshError(f"{place!r} contains the point {self.lost[place]} of the mesh, "
@@ -220,8 +224,6 @@ class FrameGraph:
             raise NameUnknown("name of nodes", place, {**self.nodes, **self.groups})
         if is_point(place) and not isinstance(place, list):
             return self._nearest_node(place)
-        if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
-            return np.array([require_integer("the number of a node", place, 0, n - 1)])
         if callable(place):
             chosen = satisfying(place, self.points, "nodes")
             if not len(chosen):

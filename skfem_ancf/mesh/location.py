@@ -125,8 +125,10 @@ class Finder:
         """The previous and the next element in the chain, (2, nelements); -1 at its ends."""
         left, right = self.mesh.t
         joined, e = right[:-1] == left[1:], np.arange(self.mesh.nelements)
-        return np.array([np.append(-1, np.where(joined, e[:-1], -1)),
-                         np.append(np.where(joined, e[1:], -1), -1)])
+        out = np.empty((2, len(e)), int)
+        out[0, :1] = out[1, -1:] = -1
+        out[0, 1:], out[1, :-1] = np.where(joined, e[:-1], -1), np.where(joined, e[1:], -1)
+        return out
 
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """Elements (n,), reference points (2, n) and distances outside of them for points (2, n).

@@ -261,8 +261,10 @@ class MappingBeam(Mapping):
                 raise MeshError(f"the height is zero to round-off in element {k}, which starts at "
                                 f"{self.mesh.p[:, self.mesh.t[0, k]].tolist()}: end the mesh "
                                 "before it gets thin there")
-        least = self.detDF(_FACES).min(axis=1)
-        if not least.min() > 0.0:
+        m = self.mesh
+        least = m.lengths * m.height if m.is_straight and m.heights is None else (
+            np.minimum.reduce(self.detDF(_FACES), axis=1))
+        if not np.minimum.reduce(least) > 0.0:
             bad = np.nonzero(~(least > 0.0))[0]
             at = self.mesh.p[:, self.mesh.t[0, bad[0]]]
             raise MeshError(

@@ -402,10 +402,13 @@ class MeshBeam(NumberedMesh):
     @cached_property
     def is_straight(self) -> bool:
         """True if every element is straight with sections normal to it."""
-        d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
-        tol = 1e-12 + 8 * EPS * np.abs(self.p).max() / self.lengths.min()
-        return bool((np.abs(self.p_X[:, self.t] - d[:, None]) <= tol).all()
-                    and (np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol).all())
+        p, d = self.doflocs, self.p_X
+        chord = (p[:, self.t[1]] - p[:, self.t[0]]) / self.lengths
+        tol = 1e-12 + 8 * EPS * np.maximum.reduce(np.abs(p), axis=None) / np.minimum.reduce(
+            self.lengths)
+        off = np.concatenate([(d[:, self.t] - chord[:, None]).reshape(2, -1),
+                              self.p_Y - np.array([-d[1], d[0]])], axis=1)
+        return bool(np.maximum.reduce(np.abs(off), axis=None) <= tol)
 
     @cached_property
     def is_uniform(self) -> bool:
@@ -417,9 +420,11 @@ class MeshBeam(NumberedMesh):
 
     def _are_equal(self):
         # the round-off of the nodes' positions is no difference in length
-        noise, (least, most) = 8 * EPS * np.abs(self.p).max(), _ends(self.lengths)
-        turn = self.p_X.max(axis=1) - self.p_X.min(axis=1)
-        if not (most - least <= 1e-13 * most + noise and turn.max() <= 1e-12 + noise / least):
+        noise = 8 * EPS * np.maximum.reduce(np.abs(self.doflocs), axis=None)
+        least, most = _ends(self.lengths)
+        turn = np.maximum.reduce(self.p_X, axis=1) - np.minimum.reduce(self.p_X, axis=1)
+        if not (most - least <= 1e-13 * most + noise
+                and np.maximum.reduce(turn) <= 1e-12 + noise / least):
             return False
         least, most = (0.0, 0.0) if self.is_chain else _ends(self.chain_lengths)
         return bool(most - least <= 1e-12 * most)
@@ -723,7 +728,7 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
 
 
 def _ends(values):
-    return values.min(), values.max()
+    return np.minimum.reduce(values), np.maximum.reduce(values)
 
 
 def _chain(n):

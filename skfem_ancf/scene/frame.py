@@ -402,12 +402,12 @@ class Frame(Scene):
         """
         _no_beam(beam)
         require_option("thickness at the nodes of a frame", thickness, ("free",))
-        return self.hold(boundary, *COMPONENTS)
+        return self._hold(boundary, COMPONENTS)
 
     def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
         """Fix the positions of nodes, see :meth:`nodes`; ``beam`` is None for a frame."""
         _no_beam(beam)
-        return self.hold(boundary, "x", "y")
+        return self._hold(boundary, ("x", "y"))
 
     # loads
 

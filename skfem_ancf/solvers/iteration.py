@@ -78,7 +78,7 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
     multipliers, phi = m
     residuals: list[float] = []
     works: list[float] = []
-    quiet, moving = False, bool(target.prescribed.any())
+    quiet, moving = False, bool(np.logical_or.reduce(target.prescribed))
     work = before = reference = np.inf
     status = NOT_CONVERGED
     for k in range(rules.iterations + 1):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,7 +95,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
                      f"{most:.3g} was asked for: the next one is solved as solve_static does, "
                      "whatever the path in between", ModelWarning)
                 size, slow = most, 0
-            target = grid[np.searchsorted(grid, begin.t, side="right")]
+            target = grid[grid.searchsorted(begin.t, side="right")]
             parts = np.ceil((target - begin.t) / size - 1e-3)
             t = target if parts <= 1.0 else begin.t + (target - begin.t) / parts
             if begin.way == AT_REST:
@@ -125,8 +124,9 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
           smallest: bool) -> Instant:
     """The equilibrium at t; by all strategies if the increment is the smallest."""
     route = Route(last.result.u, None, (1.0, 1.0), (last.t, t))
-    start = replace(last.result, load=0.0, steps=[], rejected=0, unstable=False, doubt="",
-                    diverging=False)
+    start = StaticResult(**vars(last.result) | {
+        "load": 0.0, "steps": [], "rejected": 0, "unstable": False, "doubt": "",
+        "diverging": False})
     failed: Any = None
     far = FAR * system.size
     if last.rate is not None:

@@ -98,7 +98,7 @@ class Contacts:
         if groups:
             x = np.concatenate([group.starts[:2] for _, group in groups], axis=1)
             self.origin = 0.5 * (x.min(axis=1) + x.max(axis=1))
-        start = np.append(self.origin, np.zeros(2))[:, None]
+        start = np.array([*self.origin, 0.0, 0.0])[:, None]
         self.groups = [(k, group._replace(starts=group.starts - start)) for k, group in groups]
         self.moving = any(one.moves for one in self.obstacles)
         self.custom = any(one.shape.kind == CUSTOM for one in self.obstacles)

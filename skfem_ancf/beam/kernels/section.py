@@ -109,7 +109,7 @@ class SectionKernel(ElementKernel):
 
     def inverted(self, u: Array) -> bool:
         for x, y in self._gradients(u, 2):
-            if not (x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0]).all():
+            if not np.logical_and.reduce(x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0], axis=None):
                 return True
         return False
 
