@@ -43,7 +43,8 @@ def first_order(z: Any) -> Any:
 
 def largest(z: Array) -> Any:
     """Largest modulus; of a result at a :func:`step` that of its change, without round-off."""
-    return np.abs(z.imag / STEP if np.iscomplexobj(z) else z).max()
+    change = z.imag / STEP if z.dtype.kind == "c" else z
+    return np.maximum.reduce(np.abs(change), axis=None)
 
 
 def angle_of(x: Any, y: Any) -> Any:

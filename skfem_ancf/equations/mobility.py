@@ -83,9 +83,9 @@ def _motions_of_frame(c, joints):
     if number > 1:
         motions = _sparse(motions, of_part)
     held = frame.fixed_motions(parts, origin, c.size, number)
-    others = joints[len(frame.equations):] @ motions
-    held = sparse.vstack([held, others]) if number > 1 else np.concatenate([
-        held.toarray(), others])
+    if joints.shape[0] > len(frame.equations):
+        others = joints[len(frame.equations):] @ motions
+        held = sparse.vstack([held, others]) if number > 1 else np.concatenate([held, others])
     return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
 
 

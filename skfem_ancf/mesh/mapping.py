@@ -93,7 +93,7 @@ class MappingBeam(Mapping):
     def _sum(coefficients, functions):
         """Combine (2, n, ne) coefficients with functions (n, np) or (n, ne, np)."""
         if functions.ndim == 2:
-            return np.einsum("ine,np->iep", coefficients, functions)
+            return coefficients.transpose(0, 2, 1) @ functions
         return np.einsum("ine,nep->iep", coefficients, functions)
 
     # heights

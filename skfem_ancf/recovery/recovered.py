@@ -227,12 +227,13 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
     Only the consecutive components ``unknown`` of ``strain`` are solved for.
     """
     k = list(unknown)
-    strain = np.array(strain, dtype=np.result_type(strain, stress, float))
     if isinstance(law, LinearLaw):
-        gap = (stress - law.stress(strain))[k[0]:k[-1] + 1]
-        strain[k[0]:k[-1] + 1] += law.compliance(tuple(unknown)).dot(
-            gap.reshape(len(k), -1)).reshape(gap.shape)
+        gap, some = stress - law.stress(strain), slice(k[0], k[-1] + 1)
+        strain = strain.astype(gap.dtype)
+        strain[some] += (law.compliance(tuple(unknown)) @ gap[some].reshape(len(k), -1)).reshape(
+            gap[some].shape)
         return strain
+    strain = np.array(strain, dtype=np.result_type(strain, stress, float))
     with np.errstate(all="ignore"):
         for _ in range(30):
             found = law.stress(strain)
@@ -317,6 +318,8 @@ class Recovery:
 
     def by_law(self, function: Callable[..., Array], *fields: Array) -> Array:
         """``function(law, *fields)`` with the law of each point, for fields (..., n, m)."""
+        if len(self.laws) == 1:
+            return function(self.laws[0][1], *fields)
         return np.concatenate([function(law, *(f[..., columns] for f in fields))
                                for columns, law in self.laws], axis=-1)
 

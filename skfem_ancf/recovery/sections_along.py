@@ -62,8 +62,8 @@ class SectionsAlong:
 
 def _rows(values: Array) -> Array:
     """Values (..., n, m) as floats, one row for each section."""
-    rows = values.swapaxes(0, -2)
-    return np.ascontiguousarray(rows).reshape(len(rows), -1).view(float)
+    rows = np.ascontiguousarray(values.swapaxes(0, -2))
+    return rows.reshape(values.shape[-2], -1).view(float)
 
 
 def _back(rows: Array, like: Any) -> Array:

@@ -134,12 +134,12 @@ class Segment:
 
     def from_axis(self, values: Array) -> Array:
         """Integral from the axis to each point of values (..., n, m)."""
-        return self.from_bottom(values) - (
-            self.span * values * self.points.till_axis).sum(axis=-1)[..., None]
+        return self.from_bottom(values) - np.add.reduce(
+            self.span * values * self.points.till_axis, axis=-1)[..., None]
 
     def at_axis(self, values: Array) -> Array:
         """Values (..., n, m) on the axis, (..., n)."""
-        return (values * self.points.axis).sum(axis=-1)
+        return np.add.reduce(values * self.points.axis, axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it.
@@ -217,7 +217,7 @@ class Segment:
         with_faces = along + self.lean * self.rY[0]
         self.rate = (self.along.d_ds(total[0][:, None])[:, 0]
                      - with_faces @ (intervals.top - intervals.bottom)) / total[1]
-        if not np.all(np.isfinite(self.rate)):
+        if not np.isfinite(self.rate).all():
             raise NotFound(DIVERGED)
         dt, dn = self.along.d_ds(self.rY)
         normal = (self.slope_from_axis(self.rY[1], dn)
@@ -243,7 +243,7 @@ class Segment:
         P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
         dP = (self.along.d_ds(P) + rate * np.array([-P[1], P[0]])
               + self.width * _turned(self.body, phi))
-        bottom, top = (_turned(f[..., None], phi) for f in self.faces)
+        bottom, top = [_turned(f[..., None], phi) for f in self.faces]
         dP = dP + self.swell * P  # with the flux through oblique faces
         left = top + bottom + self.across(dP)[..., None]
         P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P

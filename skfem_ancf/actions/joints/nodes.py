@@ -253,9 +253,11 @@ class Nodes(Joint):
                                   (self.turned // 2, self.leader[self.turned] // 2)), (n, n))
         return np.asarray(connected_components(links, directed=False)[1])
 
-    def fixed_motions(self, parts: Array, origin: Array, size: float,
-                     number: int) -> sparse.csr_array:
-        """Constraints of nodes and supports on the rigid motions of groups, one row each."""
+    def fixed_motions(self, parts: Array, origin: Array, size: float, number: int) -> Any:
+        """Constraints of nodes and supports on the rigid motions of groups, one row each.
+
+        A sparse matrix; for one group a dense one.
+        """
         part = np.repeat(parts, 2)
         x, y = (self.graph.points[:, self.nodes] - origin[:, None]) / size
         one = np.ones(len(x))
@@ -270,10 +272,14 @@ class Nodes(Joint):
             at += [part[ends], part[others]]
             row += [count + np.arange(len(ends)), count + np.arange(len(others))]
             count += len(ends)
-        columns = 3 * np.concatenate(at)[:, None] + np.arange(3)
-        return sparse.csr_array(
-            (np.concatenate(rows).ravel(), (np.repeat(np.concatenate(row), 3), columns.ravel())),
-            shape=(count, 3 * number))
+        i, j = np.concatenate(row), 3 * np.concatenate(at)[:, None] + np.arange(3)
+        values = np.concatenate(rows)
+        if number == 1:
+            out = np.zeros((count, 3))
+            np.add.at(out, i, values)
+            return out
+        return sparse.csr_array((values.ravel(), (np.repeat(i, 3), j.ravel())),
+                                shape=(count, 3 * number))
 
     def describe(self, parts: Array) -> list[str]:
         """Names of rigid groups, for messages."""
