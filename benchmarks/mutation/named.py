@@ -147,7 +147,7 @@ NAMED = [
      "for temporary in [self.path]:",
      "test_an_interrupted_series_keeps_its_list"),
     ("locate: all points on the axis", "mesh/location.py",
-     "noise))\n        return e, np.clip(X, 0.0, 1.0), outside",
+     "noise))\n        return e, np.minimum(np.maximum(X, 0.0), 1.0), outside",
      "noise))\n        return e, np.array([np.clip(X[0], 0.0, 1.0), 0.0 * X[1] + 0.5]), outside",
      "test_points_off_the_axis_are_found_in_their_element"),
     ("locate: no second look at all elements", "mesh/location.py",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from scipy.sparse import csr_matrix
 from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
+from ..core.caching import cached_property
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
                            require_label, require_like, require_names, require_unmasked, shown)
 from ..core.immutable import Immutable, read_only

@@ -7,11 +7,11 @@ of two numbers. Several points are an array (2, n), as in scikit-fem, or a list 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..core.caching import cached_property
 from ..core.errors import (InputError, MeshError, require_finite, require_integer, require_point,
                            shown)
 from ..core.types import Array

@@ -1,12 +1,12 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy
+from ..core.caching import cached_property
 from ..core.source import I1, I2, primitive, shaped, source
 from .beam import Beam
 from .kernels.elements import Elements

@@ -1,14 +1,28 @@
-"""Caches for functions of arrays."""
+"""Caches for functions of arrays and for properties."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from functools import lru_cache, wraps
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+if TYPE_CHECKING:
+    from functools import cached_property
+else:
+    class cached_property(functools.cached_property):
+        """As of Python 3.12: without the lock for all objects, at which other threads wait."""
+
+        def __get__(self, instance, owner=None):
+            if instance is None:
+                return self
+            value = instance.__dict__[self.attrname] = self.func(instance)
+            return value
 
 
 class ArrayKey:

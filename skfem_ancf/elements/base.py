@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 from skfem.element import DiscreteField, Element
 
+from ..core.caching import cached_property
 from ..core.errors import InputError, MeshError, require_finite, shown
 from ..core.immutable import Immutable
 from ..core.quadrature import gauss

@@ -6,12 +6,13 @@ import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy
-from functools import cached_property, partial
+from functools import partial
 from threading import RLock
 from typing import Any, NamedTuple
 
 from ..beam.kernels.law import CUSTOM
 from ..core import code_cache
+from ..core.caching import cached_property
 from ..core.interrupts import deferred
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, wanted

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from ..actions.joints.part import Part
 from ..actions.joints.settlements import COMPONENTS
 from ..beam.beam import Beam
 from ..beam.rigid import RigidBody
+from ..core.caching import cached_property
 from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..core.origin import ours
 from ..core.types import Array

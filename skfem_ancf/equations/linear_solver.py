@@ -7,13 +7,13 @@ definite K; sparse LU on the null space of J; static condensation for frames.
 from __future__ import annotations
 
 import logging
-from functools import cached_property
 from typing import Any
 from weakref import proxy
 
 import numpy as np
 
 from ..core.band import fix
+from ..core.caching import cached_property
 from ..core.linalg import NO_FACTORS, BandMatrix, Inertia
 from ..core.types import Array
 from .condensation import Condensed

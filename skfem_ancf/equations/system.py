@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
 from itertools import accumulate, count, pairwise
 from typing import Any, cast
 
@@ -24,6 +23,7 @@ from ..beam.domain import Domain
 from ..beam.kinematics import folded
 from ..beam.points import Points
 from ..beam.rigid import RigidBody
+from ..core.caching import cached_property
 from ..core.errors import InputError
 from ..core.linalg import BandMatrix
 from ..core.types import Array

@@ -1,13 +1,14 @@
 """Tables of the equations of a scene, the arguments of kernels."""
 
 from copy import copy
-from functools import cached_property, partial
+from functools import partial
 from typing import Annotated, Any, NamedTuple
 from weakref import ref
 
 import numpy as np
 
 from ..core.band import Band
+from ..core.caching import cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables

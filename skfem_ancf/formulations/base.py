@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..core.caching import cached_property
 from ..core.errors import require_like
 from ..core.immutable import Immutable, read_only
 from ..core.linear import stress_of

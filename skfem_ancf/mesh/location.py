@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from math import factorial
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.polynomial.polynomial import polyder, polyval
 
+from ..core.caching import cached_property
 from ..core.errors import MeshError
 from ..core.types import Array
 from .reference_cell import hermite_basis

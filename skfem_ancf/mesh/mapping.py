@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from skfem.mapping import Mapping
 
+from ..core.caching import cached_property
 from ..core.errors import MeshError
 from ..core.types import Array
 from .location import Inverse, InverseOfLines, with_slope

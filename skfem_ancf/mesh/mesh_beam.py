@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
+from ..core.caching import cached_property
 from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_finite_scalar, require_function, require_integer,
                            require_moderate, require_option, require_options, require_path,

@@ -22,7 +22,7 @@ recovered fields are found for each axial segment between jumps of the section f
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -32,6 +32,7 @@ from numpy.polynomial.chebyshev import chebint, chebvander
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..beam.strains import on_grid, stress_at
+from ..core.caching import cached_property
 from ..core.linear import largest
 from ..core.quadrature import gauss
 from ..core.types import Array, Law

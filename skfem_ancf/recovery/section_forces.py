@@ -8,13 +8,14 @@ the element between a node and a section gives the section force and moment.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
+from ..core.caching import cached_property
 from ..core.errors import AncfError
 from ..core.quadrature import gauss, lagrange
 from ..core.types import Array

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints
 from ..beam.rigid import RigidBody
+from ..core.caching import cached_property
 from ..core.errors import InputError, NameUnknown, require_flag, shown
 from ..core.immutable import Immutable
 from ..core.linear import first_order, step

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.caching import cached_property
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
                            require_flag, require_integer, require_option, require_positive)
 from ..core.linalg import NO_FACTORS

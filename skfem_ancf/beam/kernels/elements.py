@@ -14,11 +14,12 @@ The tangent is a product of constant matrices with few coefficients, those of pr
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from ...core.caching import cached_property
 from ...core.types import Array
 from .law import LINEAR, conserve, law_evaluate
 from .tables import CABLE, OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, StrainTables

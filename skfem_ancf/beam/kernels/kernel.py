@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ...core.caching import cached_property
 from ...core.errors import InputError
 from ...core.types import Array
 from ...elements.base import ElementBeam
