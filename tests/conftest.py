@@ -28,6 +28,7 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     if config.getoption("noise") is not None:
         noise.install(config.getoption("noise"))
+        config.addinivalue_line("filterwarnings", "ignore:overflow encountered in scalar multiply")
     if config.getoption("margins"):
         margins.install()
         config.pluginmanager.register(margins)

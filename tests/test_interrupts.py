@@ -18,6 +18,14 @@ from skfem.generic_utils import OrientedBoundary
 from skfem_ancf import (Beam, ElementBeamCable, Interrupted, MeshBeam, Scene, StVenantKirchhoff)
 
 
+@pytest.fixture(autouse=True)
+def pythons_own_handler():
+    """A process that a shell has started in the background ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def swinging():
     beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], height=0.02), ElementBeamCable(3),
                 StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.02)

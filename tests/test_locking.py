@@ -9,6 +9,7 @@ from scipy.optimize import root
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.beam.kinematics import folded
 from skfem_ancf.core.quadrature import gauss
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.materials import Material
@@ -287,3 +288,14 @@ def test_16_elements_of_order_2_from_slender_to_very_slender(formulation, tips):
         scene = Scene(beam).fix("left", ["r", "r_X", "r_Y0^1", "r_Y1^1"]).gravity((0, -9.81))
         found.append(scene.solve_static(stable=False).displacement((1, 0))[1])
     assert np.round(found, 3).tolist() == list(tips)
+
+
+def test_ends_that_turn_against_each_other_are_a_fold():
+    """The chord alone does not show it: the ends of one element, turned by 1.45 rad each."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=1e-3), ElementBeamCable(3),
+                StVenantKirchhoff(2e8, 0.3), width=0.01)
+    for angle, expected in (0.6, False), (1.45, True):
+        u = np.zeros((5, beam.nd))
+        u[1, 2:4] = np.cos(angle) - 1.0, -np.sin(angle)
+        u[2, 2:4] = np.cos(angle) - 1.0, np.sin(angle)
+        assert folded(beam, u.ravel()) is expected

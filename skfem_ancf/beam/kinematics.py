@@ -21,6 +21,9 @@ from .strains import cable_axis, fibres
 #: Relative deflection of a cantilever by shear that gives a warning if neglected.
 SHEARED = 1e-3
 
+#: Largest rotation of an axis over one element in radians that need not be a fold.
+FOLDED = 2.5
+
 #: Kernels of the strain energy by the kinematics of elements.
 KERNELS: dict[str, Any] = {"sections": SectionKernel, "cable": CableKernel}
 
@@ -187,9 +190,17 @@ def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
 
 
 def folded(beam: Any, u: Array) -> bool:
-    """True if the axis folds back within an element: a chord is opposite to an end tangent."""
+    """True if the axis folds back within an element.
+
+    Then a chord is opposite to an end tangent, or the ends of an axis of degree 7 or less turn
+    against each other by more than :data:`FOLDED`. Such discrete equilibria are none of the beam.
+    """
     nodes = u.reshape(-1, beam.nd)[:, :4].T
     x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
     left, right = t = beam.mesh.t
     ends = (x[:, right] - x[:, left])[:, None] * tangent[:, t]
-    return bool((ends[0] + ends[1] < 0.0).any())
+    if (ends[0] + ends[1] < 0.0).any():
+        return True
+    turn = ([1.0, 1.0j] @ tangent) / ([1.0, 1.0j] @ beam.mesh.p_X)
+    largest = np.abs(np.angle(turn[right] * turn[left].conj())).max()
+    return bool(largest > FOLDED and beam.element.axis_degree <= 7)
