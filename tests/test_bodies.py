@@ -1,5 +1,6 @@
 """Rigid bodies: pendulums, masses on beams, frequencies, stability, files, and what is refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, MeshError,
-                        RigidBody, Scene, StVenantKirchhoff, SupportError)
+                        RigidBody, Scene, StabilityWarning, StVenantKirchhoff, SupportError)
 from skfem_ancf.dynamics import SCHEMES
 
 G = 9.81
@@ -190,21 +191,39 @@ def test_buckling_with_a_body_between_column_and_load():
 
 # what else a scene does
 
-def mechanism():
-    """A crank with a spring, a beam on it, and a body that hangs on its end."""
+def mechanism(share=0.5):
+    """A crank with a spring, a beam on it, and a body that hangs on its end.
+
+    Beyond 0.5913 of its weight the crank tips over.
+    """
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.05), ElementBeamANCF(2),
                 StVenantKirchhoff(1e6, 0.3, 100.0), width=0.05, name="beam")
     crank = RigidBody(0.3, 0.01, position=(-0.1, 0), angle=0.2, name="crank")
     bob = RigidBody(0.2, 0.002, position=(1.1, -0.1), name="bob",
                     outline=[(-0.1, -0.1), (0.1, -0.1), (0.0, 0.2)])
-    scene = Scene(crank, beam, bob).gravity((0, -G)).pin((-0.2, 0), crank)
+    scene = Scene(crank, beam, bob).gravity((0, -share * G)).pin((-0.2, 0), crank)
     scene.weld((crank, (0, 0)), (beam, "left"))
     scene.hinge((beam, (1, 0)), (bob, (1, 0)))
     scene.torsional_spring(8.0, crank).torsional_spring(0.5, bob)
     return scene.spring(3.0, (("ground", (1.1, -1)), bob), damping=0.1)
 
 
-@pytest.mark.filterwarnings("ignore:the path from the reference configuration")
+def test_the_crank_says_that_it_has_tipped_over():
+    """Towards a limit load the lowest eigenvalue of the stiffness falls as the root of the rest."""
+    shares, rest = (0.590, 0.591), []
+    for share in shares:
+        scene = mechanism(share)
+        state = scene.solve_static()
+        rest.append(scene.modes(1, state).frequencies[0] ** 4)
+    limit = shares[1] + rest[1] * (shares[1] - shares[0]) / (rest[0] - rest[1])
+    with pytest.warns(StabilityWarning, match="limit point at the load level") as caught:
+        tipped = mechanism(1.0).solve_static()
+    level = float(re.search(r"level (0\.\d+)", str(caught[0].message))[1])
+    assert level == pytest.approx(limit, rel=2e-4)
+    assert tipped.angle("crank") < -0.05 < 0.05 < state.angle("crank")
+    assert tipped.stability == "stable"
+
+
 def test_points_of_bodies_are_found():
     scene = mechanism()
     state = scene.solve_static()
@@ -232,7 +251,6 @@ def test_the_default_outline_is_a_plate_of_that_mass_and_inertia():
     assert_allclose(np.ptp(x[1]), side)
 
 
-@pytest.mark.filterwarnings("ignore:the path from the reference configuration")
 # files and pictures
 
 def test_files_hold_the_outlines(tmp_path):

@@ -96,11 +96,7 @@ def balance(e, target, first, last, mixed, x, m, stresses, out):
         t = np.inf if first and np.isnan(target.when) else target.when
         tangent(e, u, factors, t, target.scale, target.at, mixed, stresses[0], stresses[1], f)
         diagonal(e.K, weights)
-        for i in indices(u.size):
-            weights[i] = np.abs(weights[i])
-        least = SMALLEST * mean_stiffness(weights, e.sizes)
-        for i in indices(u.size):
-            weights[i] = 1.0 / (weights[i] + least / (e.sizes[i] * e.sizes[i]))
+        invert(weights, e.sizes)
     external_force(e.loads, target.factors, target.when, target.scale, u, load)
     for i in indices(u.size):
         R[i] = load[i] - f[i] - target.gap[i]
@@ -118,6 +114,16 @@ def balance(e, target, first, last, mixed, x, m, stresses, out):
         R[i] *= e.free[i]
     out[0] = np.sqrt(weighted_square(R, weights))
     out[1] = np.sqrt(max(weighted_square(f, weights), weighted_square(load, weights)))
+
+
+@source
+def invert(weights, sizes):
+    """Replace the diagonal of a tangent by the weights of residuals, its inverse."""
+    for i in indices(weights.size):
+        weights[i] = np.abs(weights[i])
+    least = SMALLEST * mean_stiffness(weights, sizes)
+    for i in indices(weights.size):
+        weights[i] = 1.0 / (weights[i] + least / (sizes[i] * sizes[i]))
 
 
 @source

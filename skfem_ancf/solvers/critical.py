@@ -48,6 +48,8 @@ def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critic
             continue
         single = change is None or (abs(change) == 1) if turns else abs(change) == 1
         if single or depth == DEPTH:
+            if turns and change == 0:
+                continue  # a limit point changes the number: these rates are round-off
             if turns:
                 out.append(_limit(tracer, p, a, b, tol))
             if not turns or (not single and abs(change) != 1):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.linalg import NO_FACTORS
 from ..core.types import Array
+from ..equations.evaluation import invert
 from ..equations.stability import position_weights
 from ..equations.system import System
 from ..results.points import MaterialPoints
@@ -153,6 +154,13 @@ class Tracer:
         first = guess[0], guess[1], load - start.load
         return self._correct(start, first, lambda step, dl, dR, dF: 0.0, np.inf)
 
+    def _small(self, residual, *forces):
+        """True if a residual (N,) is within tolerance, as in statics; before K has factors."""
+        e, rules, weights = self.system.backend.tables.plain, self.rules, self.system.K.diagonal()
+        invert(weights, e.sizes)
+        norms = np.sqrt([x * x @ weights for x in (residual * e.free, *forces)])
+        return bool(norms[0] <= rules.tol * norms[1:].max() + rules.force_floor)
+
     def _correct(self, start, first, increment, ds):
         """Iterate from ``start`` and first increments of u, multipliers and load."""
         system, weights = self.system, self.weights
@@ -174,7 +182,8 @@ class Tracer:
             closed = np.all(np.abs(phi) <= CLOSED * system.backend.tables.plain.joints.sizes)
             reference = max(reference_work(force, load * external, u),
                             np.sqrt(abs(external @ step * dl)))
-            if closed and settled(work, reference, rules):
+            if closed and settled(work, reference, rules) and self._small(
+                    residual, force, load * external):
                 return Point(self.system, u, m, load, force, start.arc + ds,
                              work / reference if reference > 0 else 0.0, k)
             drive, gap = self._drive(external, u, load)
