@@ -220,3 +220,33 @@ def test_buckling_knows_springs_that_act_on_one_side():
     tied = column().spring(lambda e: 1e9 * max(e - 1e-5, 0.0), between=((1, 0), (2, 0)))
     with pytest.warns(ModelWarning, match="stiffer or softer before buckling"):
         tied.buckling(1)
+
+
+@pytest.mark.parametrize("share", [0.4, -1.0])
+def test_what_load_factors_do_not_scale_acts_before_buckling(share):
+    """A cantilever column with a dead weight on its end, as an energy linear in the position."""
+    euler, height = np.pi**2 / 16.0, 0.01
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 2, 9), height), ElementBeamANCF(2),
+                StVenantKirchhoff(12e6, 0.0), width=1.0)
+    column = Scene(beam).clamp("left").point_force((-euler, 0), at=(2, 0))
+    alone = column.buckling(1).factors[0]
+    column.energy(lambda r, F, X, t: share * euler / height * r[0], over="right", scaled=False)
+    assert column.buckling(1).factors[0] == pytest.approx(alone - share, rel=1e-4)
+
+
+def test_a_prestressed_spring_acts_before_buckling():
+    """A taut cord of length 1 along a column of length 2 pulls its end back to the other end."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 2, 9), 0.01), ElementBeamCable(5),
+                StVenantKirchhoff(12e6, 0.0), width=1.0)  # E I = 1
+    column, tension = Scene(beam).clamp("left").point_force((-1, 0), at=(2, 0)), 0.2 * 0.5
+    column.spring(0.2, (("ground", (1.0, 0)), (beam, (2, 0))), length=0.5)
+
+    def balance(P):
+        # w = A (1 - cos k x) + B (k x - sin k x) with w_xx = 0, w_xxx + k^2 w_x = T w at the end
+        k = np.sqrt(P + tension)
+        c, s = np.cos(2.0 * k), np.sin(2.0 * k)
+        return np.linalg.det([[c, s], [-tension * (1.0 - c), k**3 - tension * (2.0 * k - s)]])
+
+    exact = brentq(balance, 0.3, 1.0)
+    assert column.buckling(1).factors[0] == pytest.approx(exact, rel=1e-4)
+    assert abs(exact - np.pi**2 / 16.0) > 0.02

@@ -648,3 +648,41 @@ def test_modes_after_friction_has_slipped_are_those_of_points_that_stick(angle):
     K, M = (Z.T @ A[free][:, free] @ Z for A in (matrices.K, matrices.M))
     squares = np.sort(1.0 / np.linalg.eigvals(np.linalg.solve(K, M)).real)
     assert np.allclose(squares[:4], found**2, rtol=1e-3)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["sections", "cable"])
+@pytest.mark.parametrize("angle", [0.0, -2.3, 1.0])
+def test_a_beam_rests_on_a_circle_of_any_size_at_any_angle(element, angle):
+    """Its middle sinks as on a flat floor: the radius has round-off, gaps and slips have none."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn, x = np.array([[c, -s], [s, c]]), np.linspace(-0.5, 0.5, 9)
+    mesh = MeshBeam.from_points((turn @ np.array([x, 0.0 * x])).T, 0.01)
+    up, law = turn[:, 1], StVenantKirchhoff(2e8, 0.3, 7800.0)
+
+    def sag(shape):
+        scene = Scene(Beam(mesh, element, law, width=0.01)).gravity(-9.81 * up)
+        state = scene.obstacle(shape, friction=0.3).solve_static()
+        assert state.stability == "stable"
+        assert np.allclose(state.contact().total, 7800 * 9.81 * 1e-4 * up, rtol=1e-7, atol=1e-6)
+        return state.displacement((0, 0)) @ up
+
+    flat = sag(Line(-0.0051 * up, up))
+    assert flat == pytest.approx(-1e-4, rel=0.02)
+    for radius in (2000.0, 1e5):
+        assert sag(Circle(-(radius + 0.0051) * up, radius)) == pytest.approx(flat, rel=1e-3)
+
+
+@pytest.mark.parametrize("angle", [0.0, -2.3, 1.0])
+def test_a_pinned_rod_leans_on_a_circle_of_any_size(angle):
+    """A stiff rod, pinned at one end, turns until it touches the circle in a point."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn, x, radius, gap = np.array([[c, -s], [s, c]]), np.linspace(0.0, 1.0, 5), 3000.0, 0.001
+    mesh = MeshBeam.from_points((turn @ np.array([x, 0.0 * x])).T, 0.01)
+    rod = Beam(mesh, ElementBeamCable(3), StVenantKirchhoff(2e14, 0.3), width=0.01)
+    wall = Circle(turn @ np.array([1.5, -radius - 0.005 - gap]), radius)
+    scene = Scene(rod).pin("left").point_force(turn @ np.array([0.0, -1.0]), at=turn[:, 0])
+    state = scene.obstacle(wall).solve_static()
+    tip = turn.T @ state.position(turn[:, 0])
+    # its lower face is 0.005 below the axis; it touches at the tip, below the top of the circle
+    drop = radius + 0.005 + gap - np.sqrt(radius**2 - 0.5**2)
+    assert -tip[1] == pytest.approx(drop - 0.005, rel=1e-3)

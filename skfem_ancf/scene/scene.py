@@ -799,7 +799,8 @@ class Scene(Model):
         state
             An equilibrium whose loads are constant, as dead loads: the factors are those on the
             loads of this scene, added to it. It may be one of a scene with the same beams, supports
-            and joints and other loads. By default the reference configuration.
+            and joints and other loads. By default the equilibrium without loads, in which
+            prestressed springs act, and energies with ``scaled=False``.
 
         Examples
         --------

@@ -16,6 +16,9 @@ from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
 from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
+from .increment import Route
+from .newton import Search, Steps
+from .outcome import StepFailed
 
 DENSE = 600  # largest number of free DOFs for the dense solver
 WINDOW = 1e-8  # smallest relative eigenvalue that is taken from an inverse
@@ -251,12 +254,14 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
     (divergence) are found.
 
     With a state, which may have other loads, K_0 is its tangent: its loads are constant, those of
-    the system are added.
+    the system are added. Without one, the state is that without loads, in which prestressed springs
+    and energies that are not scaled may push.
 
     Raises InputError if the loads cause no buckling, if the beam touches an obstacle first, if
-    springs are one-sided, or prestressed without a state, or if the state is not stable.
+    springs are one-sided, or if the state is not stable.
     """
     system.constraints.require_supports()
+    state = state or _prestressed(system)
     tangent, loads, du, stress, multipliers = _linear_response(system, state)
     n, m = tangent.size
     k = _count(k, n - m)
@@ -289,14 +294,15 @@ def _linear_response(system, state):
     """Tangents with the loads before, and with those of the system; the response to these."""
     if state is None:
         zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
-        _require_unstressed(system, zero)
         tangent = StrainTangent(system, zero, 0.0, None, none)
         return tangent, tangent, *tangent.response()
     if not np.array_equal(state.system.constraints.fixed, system.constraints.fixed):
         raise InputError("the state has other supports than the scene: buckling() adds loads to "
                          "those of the state, and supports and joints stay")
     if state.stability == "unstable":
-        raise InputError("the state is unstable: its own loads are beyond the buckling load")
+        raise InputError("the state is unstable: its own loads are beyond the buckling load"
+                         if state.load else "the scene is unstable before there is any load: what "
+                         "load factors do not scale is beyond the buckling load")
     tangent = StrainTangent(state.system, state.u, state.load, state.t, state.multipliers)
     loads = StrainTangent(system, state.u, 0.0, None, state.multipliers)
     return tangent, loads, *tangent.added(system.external_force(state.u))
@@ -314,17 +320,27 @@ def _geometric_of_domains(system, tangent, du):
     return K[tangent.free][:, tangent.free]
 
 
-def _require_unstressed(system, zero):
-    """Raise InputError if force elements are prestressed."""
+def _prestressed(system):
+    """The equilibrium without loads if force elements push then, or None."""
+    zero, c = np.zeros(system.N), system.constraints
     if not len(system.forces.elements):
-        return
-    push = np.abs(system.internal_force(zero, 0.0, 0.0) * system.constraints.mask).max()
+        return None
+    push = np.abs(system.internal_force(zero, 0.0, 0.0) * c.mask).max()
     springs = abs(system.stiffness_at_rest())
-    if push > UNSTRESSED * (springs.max() if springs.nnz else 0.0) * system.size:
+    if push <= UNSTRESSED * (springs.max() if springs.nnz else 0.0) * system.size:
+        return None
+    if c.moves or c.drives:
         raise InputError(
-            "springs push before there is any load: buckling() starts from the unstressed "
-            "reference configuration and scales all loads. Use state.stability of "
-            "scene.solve_static(stable=False), or scene.modes(k, state), for prestressed scenes")
+            "springs or energies push before there is any load, and supports move: buckling() "
+            "starts from the equilibrium without loads, and knows one of them. Use state.stability "
+            "of scene.solve_static(stable=False), or scene.modes(k, state)")
+    search = Search(system, None, None, Steps("newton", 1e-8, 30, 1.0, 1e-4), True, False)
+    try:
+        found = search.load_steps("newton", Route(zero, loads=(0.0, 0.0), times=(0.0, 0.0)))
+    except StepFailed as failure:
+        raise InputError("no equilibrium without loads was found for what springs and energies "
+                         f"push then: {failure}. Give buckling() a state") from None
+    return State(system, found.u, 0.0, found.force, multipliers=found.multipliers)
 
 
 def _require_same_springs(system, before, u):

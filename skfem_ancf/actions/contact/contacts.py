@@ -131,10 +131,8 @@ class Contacts:
         return pair_of(self.tables, k)
 
     def numbers(self, k: int) -> Array:
-        """Parameters of the shape of obstacle k, with corners relative to the origin."""
-        numbers = self.obstacles[k].shape.numbers.copy()
-        numbers[3:].reshape(-1, 5)[:, :2] -= self.origin
-        return numbers
+        """Parameters of the shape of obstacle k, relative to the origin."""
+        return self.obstacles[k].shape.numbers_about(self.origin)
 
     def pose(self, k: int, t: float, rates: bool = True) -> Array:
         """Pose of obstacle k, with its pivot relative to the origin; shape (10,)."""

@@ -14,6 +14,8 @@ from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE
 TINY = 1e-200
 #: The least square of a slope: sections have none, and levers of no length.
 SHORT = 1e-30
+#: Number of parameters of a circle.
+DISC = 5
 
 
 @source
@@ -85,9 +87,10 @@ def levers(pair, at, z, lever):
 @source
 def carried(q, p, x, y):
     """Points that move with an obstacle from pose p to pose q."""
-    cos, sin = q[2] * p[2] + q[3] * p[3], q[3] * p[2] - q[2] * p[3]
+    # x + (turn - 1) (x - pivot): a pivot far away adds no round-off
+    cos, sin = q[2] * p[2] + q[3] * p[3] - 1.0, q[3] * p[2] - q[2] * p[3]
     a, b = x - p[0] - p[4], y - p[1] - p[5]
-    return q[0] + q[4] + cos * a - sin * b, q[1] + q[5] + sin * a + cos * b
+    return x + (q[0] - p[0]) + cos * a - sin * b, y + (q[1] - p[1]) + sin * a + cos * b
 
 
 @source
@@ -96,8 +99,9 @@ def distances(pair, which, whole, x, out):
     pose, y, side = pair.poses[which], np.empty(x.shape), pair.numbers[SIDE]
     cos, sin = pose[2], pose[3]
     for i in indices(x.shape[1]):
-        a, b = x[0, i] - pose[0] - pose[4], x[1, i] - pose[1] - pose[5]
-        y[0, i], y[1, i] = cos * a + sin * b + pose[4], cos * b - sin * a + pose[5]
+        p, q = x[0, i] - pose[0], x[1, i] - pose[1]
+        a, b = p - pose[4], q - pose[5]
+        y[0, i], y[1, i] = p + (cos - 1.0) * a + sin * b, q + (cos - 1.0) * b - sin * a
     if pair.header[KIND] == CUSTOM:
         custom_distance(pair.custom, pair.header[OBSTACLE], pose[9], y, out)
     else:
@@ -117,13 +121,35 @@ def distances(pair, which, whole, x, out):
 
 
 @source
+def disc(shape, whole, y, out):
+    """Gap of a circle, from its radius and a point of its surface with the normal there.
+
+    The difference of squares is zero at that point, so that a circle far larger than the scene has
+    gaps without the round-off of its radius.
+    """
+    radius, px, py, nx, ny = shape[0], shape[1], shape[2], shape[3], shape[4]
+    for i in indices(y.shape[1]):
+        a, b = y[0, i] - px, y[1, i] - py
+        gx, gy = a + radius * nx, b + radius * ny
+        size = np.maximum(np.sqrt(gx * gx + gy * gy), TINY)
+        out[0, i] = (a * a + b * b + 2.0 * radius * (nx * a + ny * b)) / (size + radius)
+        if whole:
+            gx, gy = gx / size, gy / size
+            out[1, i], out[2, i] = gx, gy
+            out[3, i], out[4, i], out[5, i] = gy * gy / size, -gx * gy / size, gx * gx / size
+
+
+@source
 def outline(shape, whole, y, out):
     """Closest point projection on a polygon with rounded corners.
 
     Parameters of the shape: radius of the corners, relative ends of the edges, then for each
     corner: position, vector to the next one, 1 or -1 for convex or not. The surface is a line near
-    an edge, a circle near a corner.
+    an edge, a circle near a corner. A circle alone has five parameters, see :func:`disc`.
     """
+    if shape.size == DISC:
+        disc(shape, whole, y, out)
+        return
     radius, low, high = shape[0], shape[1], shape[2]
     n, best = (shape.size - 3) // 5, np.empty(y.shape[1])
     for i in indices(y.shape[1]):

@@ -254,10 +254,11 @@ def _settle(pair, same, at, w, out):
         lost[i] = T * gone
         if augmented:
             lost[i] += w[PRESSURE, i] * (w[DEPTH + 1, i] - w[DEPTH, i])
-        x, y = x + after * ny - pose[0] - pose[4], y - after * nx - pose[1] - pose[5]
+        x, y = x + after * ny - pose[0], y - after * nx - pose[1]
+        a, b, cos, sin = x - pose[4], y - pose[5], pose[2] - 1.0, pose[3]
         memory[SLIP, at[i]] = after
-        memory[ANCHOR_X, at[i]] = pose[2] * x + pose[3] * y + pose[4]
-        memory[ANCHOR_Y, at[i]] = pose[2] * y - pose[3] * x + pose[5]
+        memory[ANCHOR_X, at[i]] = x + cos * a + sin * b
+        memory[ANCHOR_Y, at[i]] = y + cos * b - sin * a
     add_each(out, where, lost)
 
 

@@ -57,9 +57,9 @@ def return_mapping(trial, limit):
 @source
 def slip_of(pose, nx, ny, x, y, anchor_x, anchor_y):
     """Distance of a point from its anchor along the surface."""
-    p, q = x - pose[0] - pose[4], y - pose[1] - pose[5]
+    p, q, cos, sin = x - pose[0] - anchor_x, y - pose[1] - anchor_y, pose[2] - 1.0, pose[3]
     a, b = anchor_x - pose[4], anchor_y - pose[5]
-    return (q - pose[3] * a - pose[2] * b) * nx - (p - pose[2] * a + pose[3] * b) * ny
+    return (q - sin * a - cos * b) * nx - (p - cos * a + sin * b) * ny
 
 
 @source

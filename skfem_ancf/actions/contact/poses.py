@@ -9,11 +9,15 @@ from ...core.types import Array
 
 def carried(pose: Array, x: Array) -> Array:
     """Points x, shape (2, n), moved with an obstacle."""
-    turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
-    return turn @ (x - pose[4:6, None]) + pose[4:6, None] + pose[:2, None]
+    return x + pose[:2, None] + _turned(pose[2], pose[3], x - pose[4:6, None])
 
 
 def taken_back(pose: Array, x: Array) -> Array:
     """The inverse of :func:`carried`."""
-    turn = np.array([[pose[2], pose[3]], [-pose[3], pose[2]]])
-    return turn @ (x - pose[4:6, None] - pose[:2, None]) + pose[4:6, None]
+    x = x - pose[:2, None]
+    return x + _turned(pose[2], -pose[3], x - pose[4:6, None])
+
+
+def _turned(cos, sin, arm):
+    """The change of a lever (2, n); a pivot far away adds no round-off without rotation."""
+    return np.array([[cos - 1.0, -sin], [sin, cos - 1.0]]) @ arm

@@ -69,6 +69,10 @@ class Shape(Immutable):
         """Signed distance (...) of points from the surface, negative in the solid."""
         raise NotImplementedError
 
+    def numbers_about(self, origin: Array) -> Array:
+        """:attr:`numbers` in coordinates relative to an origin (2,)."""
+        return self.numbers
+
     def landmarks(self) -> Array:
         """Points of its surface that no beam may contain at the start; shape (2, n)."""
         return np.zeros((2, 0))
@@ -89,6 +93,11 @@ class Outline(Shape):
     """A polygon with rounded corners; circles and lines are special cases."""
 
     kind = OUTLINE
+
+    def numbers_about(self, origin: Array) -> Array:
+        numbers = self.numbers.copy()
+        numbers[3:].reshape(-1, 5)[:, :2] -= origin
+        return numbers
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
         x = np.asarray(x, dtype=float)
@@ -154,9 +163,15 @@ class Circle(Outline):
         self.radius = require_positive("radius", radius)
         self.hollow = require_flag("hollow", hollow)
         self.pivot = self.center
-        self.numbers = np.array([self.radius, 0.0, 1.0, *self.center, 0.0, 0.0, 1.0])
+        self.numbers = self.numbers_about(np.zeros(2))
         self.bend = self.radius
         self.inner = np.inf if self.hollow else self.radius
+
+    def numbers_about(self, origin: Array) -> Array:
+        far = origin - self.center  # from the centre
+        size = np.hypot(*far)
+        normal = far / size if size > 0.0 else np.array([1.0, 0.0])
+        return np.array([self.radius, *(self.radius * normal - far), *normal])
 
     def landmarks(self) -> Array:
         points, _ = circle(self.center, self.radius, 8)
