@@ -107,7 +107,7 @@ def test_cubic_cables_do_not_lock(slenderness):
                     StVenantKirchhoff(E * (0.01 / h) ** 3, NU, RHO * 0.01 / h), B)
         state = Scene(beam).clamp("left").gravity((0, -9.81)).solve_static()
         tips.append(state.displacement((1, 0)))
-        assert len(state.steps) == 1 or degree == 5
+        assert len(state.steps) == 1 or slenderness > 1e5
     assert np.max(np.abs(tips[0] - tips[1])) < 3e-4
 
 
