@@ -1,6 +1,6 @@
 # make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png; nothing else is installed
 # make test    the tests, on two processes; ARGS="..." goes to pytest
-# make test-settings   most of them as on an old processor, and without Numba and with least versions
+# make test-settings   most of them as on an old processor, and without Numba, with least versions and noise
 # make test-noise   all that solves, with noise in the last digits, in compiled code and in NumPy
 # make test-least   the tests, with the least versions that pyproject.toml promises
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
@@ -41,11 +41,11 @@ test: $(VENV)/test.stamp
 	$(PY) -m pytest -n 2 $(ARGS)
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
-# the code that Numba compiles for it is kept apart, and checks every index. Then, without Numba
-# and with the least versions of all others, all that solves.
+# the code that Numba compiles for it is kept apart, and checks every index. Then, without Numba,
+# with the least versions of all others and with noise in the last digits, all that solves.
 LEAST := $(VENV)/least
 GENERIC := compiled doors locking stability statics
-ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io items mapping mesh package \
+ONCE := bad_arguments basis bench calls demos docstrings elements forms fuzz io items mapping mesh package \
   paper places points pulleys pyvista readme rooms stress units verification visuals
 
 test-settings: $(VENV)/test.stamp $(LEAST)/stamp
@@ -53,11 +53,11 @@ test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic; \
 	  $(PY) -m skfem_ancf compile && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
-	  $(LEAST)/bin/python -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
+	  $(LEAST)/bin/python -m pytest -n 2 --noise 1 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
 
 # each number that processors round differently is changed by a few units in the last place
 SEEDS := 1 2 3
-QUIET := bad_arguments basis bench docstrings elements forms io items mapping mesh mutation near_misses \
+QUIET := bad_arguments basis bench calls docstrings elements forms io items mapping mesh mutation near_misses \
   package paper prose pyvista readme reference rooms search typing verification visuals
 # without Numba ten minutes
 LONG := stepsize sweep
