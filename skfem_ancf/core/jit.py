@@ -48,7 +48,8 @@ def register() -> None:
 
 
 def _register(function, found):
-    @overload(function, jit_options=OPTIONS, strict=False)
+    @overload(function, jit_options=OPTIONS, strict=False,
+              inline="never" if callable(found) else "always")
     def choose(*args):
         return found if callable(found) else found[len(args)]
 

@@ -5,10 +5,17 @@ A number is one word; an array is its address and shape; a tuple is the words of
 
 from __future__ import annotations
 
+from ctypes import addressof, c_char
 from functools import cache
+from struct import Struct
 from typing import Any, get_type_hints
 
 import numpy as np
+
+
+_DTYPES, _FLOAT, _INTEGER = (np.dtype(float), np.dtype(np.int64)), Struct("d"), Struct("q")
+#: A ctypes array that may lie anywhere.
+_NOTHING = c_char * 0
 
 
 class Words:
@@ -33,12 +40,18 @@ def hints(kind: Any) -> tuple[Any, ...]:
 def _collect(x, found):
     for value, hint in zip(x, hints(type(x))):
         if isinstance(value, np.ndarray):
-            if not value.flags.c_contiguous or value.dtype not in (float, np.int64):
+            if value.dtype not in _DTYPES or not value.flags.c_contiguous:
                 raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
-            found += [value.__array_interface__["data"][0], *value.shape]
+            found += _address(value), *value.shape
         elif isinstance(value, tuple):
             _collect(value, found)
         elif hint is float:
-            found.append(int(np.float64(value).view(np.int64)))
+            found += _INTEGER.unpack(_FLOAT.pack(value))
         else:
             found.append(int(value))
+
+
+def _address(x):
+    if x.flags.writeable:  # several times as fast
+        return addressof(_NOTHING.from_buffer(x))
+    return x.ctypes.data

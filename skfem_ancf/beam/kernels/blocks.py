@@ -3,6 +3,9 @@
 t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``first`` is the number of the
 first element. Arrays have the elements last: unknowns U and forces F (m, 2 W); rows r, their change
 d and forces B (rows, 2 W); directions X; strains E and stresses T (ns, W).
+
+Loops over elements end at ``t.width``, which is W: LLVM unrolls those whose length it knows, which
+prevents vectors. So do too many arrays in one loop, whose addresses it compares.
 """
 
 import numpy as np
@@ -23,24 +26,24 @@ def block(x, first):
 def gather(t, first, u, U):
     """DOFs relative to the left node, scaled."""
     m, start = len(U), t.start
-    for e in range(W):
+    for e in range(t.width):
         v = u[start[min(first + e, len(start) - 1)]:]
         for k in range(m):
             U[k, e], U[k, W + e] = v[2 * k + 2], v[2 * k + 3]
         U[m // 2, e] -= v[0]
         U[m // 2, W + e] -= v[1]
     if len(t.D) > 0:
-        stretch(block(t.D, first), U)
+        multiply(block(t.D, first), U)
 
 
 @source
-def stretch(D, X):
-    """X *= D for both components."""
-    for k in range(len(D)):
-        c, x = D[k], X[k]
-        for e in range(W):
-            x[e] *= c[e]
-            x[W + e] *= c[e]
+def multiply(C, X):
+    """X *= C for all components."""
+    for s in range(len(X)):
+        c, x = C[s], X[s]
+        for i in range(0, len(x), len(c)):
+            for e in range(len(c)):
+                x[i + e] *= c[e]
 
 
 @source
@@ -48,8 +51,8 @@ def add_to_nodes(t, first, F, f):
     """Add the forces of elements, scaled."""
     m, start = len(F), t.start
     if len(t.D) > 0:
-        stretch(block(t.D, first), F)
-    for e in range(min(W, len(start) - first)):
+        multiply(block(t.D, first), F)
+    for e in range(min(t.width, len(start) - first)):
         v = f[start[first + e]:]
         for i in range(2):
             v[i] -= F[m // 2, i * W + e]
@@ -68,7 +71,7 @@ def to_rows(t, first, U, d):
     for n in range(len(G)):
         if used[n]:
             a, x, y = G[n], U[n % m], d[n // m]
-            for e in range(W):
+            for e in range(t.width):
                 y[e] += a[e] * x[e]
                 y[W + e] += a[e] * x[W + e]
 
@@ -84,7 +87,7 @@ def from_rows(t, first, B, F):
     for n in range(len(G)):
         if used[n]:
             a, x, y = G[n], B[n // m], F[n % m]
-            for e in range(W):
+            for e in range(t.width):
                 y[e] += a[e] * x[e]
                 y[W + e] += a[e] * x[W + e]
 
@@ -97,7 +100,7 @@ def displaced(t, first, u, U, d, r):
     x = block(t.x, first)
     for g in range(len(d)):
         a, b, c = x[g], d[g], r[g]
-        for e in range(2 * W):
+        for e in range(len(c)):
             c[e] = a[e] + b[e]
 
 
@@ -109,27 +112,28 @@ def strains(t, first, d, r, E):
     """Strains of the samples."""
     rows, x = t.rows, block(t.x, first)
     if t.kind != SECTION:
-        cable_strains(x, d, r, E)
+        cable_strains(block(t.rest, first), d, r, E)
         return
     for s in range(len(E)):
         g, h = rows[0, s], rows[1, s]
         c, p, q, a, b, o = 0.5 if g == h else 1.0, r[g], x[h], d[g], d[h], E[s]
-        for e in range(W):
+        for e in range(len(o)):
             o[e] = c * (p[e] * b[e] + p[W + e] * b[W + e] + a[e] * q[e] + a[W + e] * q[W + e])
 
 
 @source
-def cable_strains(x, d, r, E):
-    """Extension and change of curvature."""
-    n = len(E) // 2
+def cable_strains(rest, d, r, E):
+    """Extension and change of curvature; ``rest`` are |r_X| and the curvature of the reference."""
+    n, flat = len(E) // 2, r.reshape(r.size)
     for p in range(n):
-        for e in range(W):
-            x0, y0, a, b = x[p, e], x[p, W + e], r[p, e], r[p, W + e]
-            square0, square = x0 * x0 + y0 * y0, a * a + b * b
-            E[p, e] = ((a + x0) * d[p, e] + (b + y0) * d[p, W + e]) / (
-                np.sqrt(square) + np.sqrt(square0))
-            E[n + p, e] = ((a * r[n + p, W + e] - b * r[n + p, e]) / square
-                           - (x0 * x[n + p, W + e] - y0 * x[n + p, e]) / square0)
+        change, x, h, k, still = d[2 * p], flat[4 * p * W:], E[p], E[n + p], rest[p]
+        for e in range(len(h)):
+            a, b, c, f = x[e], x[W + e], change[e], change[W + e]
+            square = a * a + b * b
+            size = np.sqrt(square) + still[e]
+            y = 1.0 / (square * size)  # one division is faster than two
+            h[e] = ((2.0 * a - c) * c + (2.0 * b - f) * f) * square * y
+            k[e] = (a * x[3 * W + e] - b * x[2 * W + e]) * size * y - still[W + e]
 
 
 @source
@@ -139,40 +143,38 @@ def directions(t, r, dd, X):
     They are derivatives without dd. Those of sections are means of the rows.
     """
     if t.kind != SECTION:
-        cable_directions(r, dd, X)
+        cable_directions(r, r if len(dd) == 0 else r + dd, X)
         return X
     if len(dd) == 0:
         return r
     for g in range(len(r)):
         a, b, c = r[g], dd[g], X[g]
-        for e in range(2 * W):
+        for e in range(len(c)):
             c[e] = a[e] + 0.5 * b[e]
     return X
 
 
 @source
-def cable_directions(r, dd, X):
-    """Those of extensions by r_X, then those of curvatures by r_X and by r_XX."""
-    n = len(r) // 2
-    for p in range(n):
-        q, z = n + p, 2 * n + p
-        for e in range(W):
-            a, b, ax, ay = r[p, e], r[p, W + e], r[q, e], r[q, W + e]
-            square = a * a + b * b
-            length, kappa = np.sqrt(square), (a * ay - b * ax) / square
-            if len(dd) == 0:
-                one, two, kappa = 1.0 / length, 1.0 / square, 2.0 * kappa
-                X[p, e], X[p, W + e] = one * a, one * b
-            else:
-                c, d = a + dd[p, e], b + dd[p, W + e]
-                cx, cy = ax + dd[q, e], ay + dd[q, W + e]
-                other = c * c + d * d
-                kappa += (c * cy - d * cx) / other
-                one, two = 1.0 / (length + np.sqrt(other)), 2.0 / (square + other)
-                a, b, ax, ay = 0.5 * (a + c), 0.5 * (b + d), 0.5 * (ax + cx), 0.5 * (ay + cy)
-                X[p, e], X[p, W + e] = 2.0 * one * a, 2.0 * one * b
-            X[q, e], X[q, W + e] = two * (ay - kappa * a), -two * (ax + kappa * b)
-            X[z, e], X[z, W + e] = -two * b, two * a
+def cable_directions(r, s, X):
+    """Those of the extension, and of the curvature by r_X and r_XX, at each point, from r to s."""
+    start, end, out = r.reshape(r.size), s.reshape(s.size), X.reshape(X.size)
+    width = r.shape[1] // 2
+    for p in range(len(r) // 2):
+        a, b, c = start[4 * p * W:], end[4 * p * W:], out[6 * p * W:]
+        for e in range(width):
+            x0, y0, u0, v0 = a[e], a[W + e], a[2 * W + e], a[3 * W + e]
+            x1, y1, u1, v1 = b[e], b[W + e], b[2 * W + e], b[3 * W + e]
+            one, two = x0 * x0 + y0 * y0, x1 * x1 + y1 * y1
+            length, square, x, y = np.sqrt(one) + np.sqrt(two), one + two, x0 + x1, y0 + y1
+            h = 1.0 / (one * two * length * square)  # one division is faster than four
+            kappa = ((x0 * v0 - y0 * u0) * two + (x1 * v1 - y1 * u1) * one) * length * square * h
+            k = h * one * two
+            h = k * square
+            k *= length
+            c[e], c[W + e] = h * x, h * y
+            c[2 * W + e] = k * (v0 + v1 - kappa * x)
+            c[3 * W + e] = -k * (u0 + u1 + kappa * y)
+            c[4 * W + e], c[5 * W + e] = -k * y, k * x
 
 
 @source
@@ -181,11 +183,11 @@ def changes(t, X, d, E):
     rows, ways = t.rows, t.ways
     for s in range(len(E)):
         a, x, o = d[rows[0, s]], X[ways[0, s]], E[s]
-        for e in range(W):
+        for e in range(len(o)):
             o[e] = a[e] * x[e] + a[W + e] * x[W + e]
         if ways[1, s] >= 0:
             b, y = d[rows[1, s]], X[ways[1, s]]
-            for e in range(W):
+            for e in range(len(o)):
                 o[e] += b[e] * y[e] + b[W + e] * y[W + e]
 
 
@@ -208,10 +210,10 @@ def times(pairs, H, E, T):
     for q in range(len(H)):
         s, t, h = pairs[0, q], pairs[1, q], H[q]
         a, b, x, y = T[s], T[t], E[s], E[t]
-        for e in range(W):
+        for e in range(len(a)):
             a[e] += h[e] * y[e]
         if s != t:
-            for e in range(W):
+            for e in range(len(b)):
                 b[e] += h[e] * x[e]
 
 
@@ -221,16 +223,7 @@ def at_points(t, first, E):
     x = E.copy()
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), x)
-    return np.dot(t.along, x).reshape(3, t.weights.shape[1], W)
-
-
-@source
-def multiply(C, X):
-    """X *= C."""
-    for s in range(len(X)):
-        c, x = C[s], X[s]
-        for e in range(W):
-            x[e] *= c[e]
+    return np.dot(t.along, x).reshape(3, t.weights.shape[1], t.width)
 
 
 @source
@@ -239,7 +232,7 @@ def from_points(t, first, S, T):
     w = block(t.weights, first)
     for c in range(3):
         multiply(w, S[c])
-    np.dot(t.along.T, S.reshape(3 * len(w), W), T)
+    np.dot(t.along.T, S.reshape(3 * len(w), t.width), T)
     if len(t.sigma) > 0:
         multiply(block(t.sigma, first), T)
 
@@ -265,7 +258,7 @@ def law_stresses(t, first, E, change, T):
 @source
 def put_law_stresses(t, first, E, change, T):
     """:func:`stresses` of a nonlinear law, by address."""
-    S, x = np.empty((3, t.weights.shape[1], W)), at_points(t, first, E)
+    S, x = np.empty((3, t.weights.shape[1], t.width)), at_points(t, first, E)
     law_evaluate(t.law, x, S)
     if len(change) > 0:
         conserve(t.law, x, at_points(t, first, change), S)
@@ -277,7 +270,7 @@ def moduli(t, first, E):
     """Weighted moduli between samples, (nq, W)."""
     if t.law.kind == LINEAR:
         return block(t.H, first)
-    H = np.empty((t.pairs.shape[1], W))
+    H = np.empty((t.pairs.shape[1], t.width))
     law_moduli(t, first, E, H)
     return H
 
@@ -291,7 +284,7 @@ def law_moduli(t, first, E, H):
 @source
 def put_law_moduli(t, first, E, H):
     """:func:`moduli` of a nonlinear law, by address."""
-    M = np.empty((9, t.weights.shape[1], W))
+    M = np.empty((9, t.weights.shape[1], t.width))
     law_evaluate(t.law, at_points(t, first, E), M)
     between_samples(t, first, M, H)
 
@@ -308,11 +301,11 @@ def between_samples(t, first, M, H):
                 x = along[c // 3 * points + p, s] * along[c % 3 * points + p, r]
                 if x != 0.0:
                     a, b = w[p], M[c, p]
-                    for e in range(W):
+                    for e in range(t.width):
                         h[e] += x * a[e] * b[e]
         if len(t.sigma) > 0:
             a, b = block(t.sigma, first)[s], block(t.sigma, first)[r]
-            for e in range(W):
+            for e in range(t.width):
                 h[e] *= a[e] * b[e]
 
 
@@ -320,7 +313,7 @@ def between_samples(t, first, M, H):
 def take(t, first, given, T):
     """Given stresses, scaled."""
     ns, ne = len(T), len(t.start)
-    for e in range(W):
+    for e in range(t.width):
         one = given[min(first + e, ne - 1) * ns:]
         for s in range(ns):
             T[s, e] = one[s]
@@ -332,7 +325,7 @@ def take(t, first, given, T):
 def put(t, first, T, more, out):
     """Write stresses, plus ``more`` if not empty."""
     ns = len(T)
-    for e in range(min(W, len(t.start) - first)):
+    for e in range(min(t.width, len(t.start) - first)):
         at = (first + e) * ns
         for s in range(ns):
             out[at + s] = T[s, e]
@@ -355,12 +348,12 @@ def push(t, first, X, T, U, B, F, f):
     B[:] = 0.0
     for s in range(len(T)):
         a, x, c = B[rows[0, s]], X[ways[0, s]], T[s]
-        for e in range(W):
+        for e in range(t.width):
             a[e] += c[e] * x[e]
             a[W + e] += c[e] * x[W + e]
         if ways[1, s] >= 0:
             b, y = B[rows[1, s]], X[ways[1, s]]
-            for e in range(W):
+            for e in range(t.width):
                 b[e] += c[e] * y[e]
                 b[W + e] += c[e] * y[W + e]
     from_rows(t, first, B, F)
@@ -375,22 +368,23 @@ def add_constant(coupled, K, Z, U, F):
     for n in range(coupled.shape[1]):
         k, l = coupled[0, n], coupled[1, n]
         a, x, y, X, Y = K[k * (k + 1) // 2 + l], U[k], U[l], F[k], F[l]
-        for e in range(W):
+        for e in range(len(x)):
             X[e] += a[e] * y[e]
-            X[W + e] += a[W + e] * y[W + e]
         if k != l:
-            for e in range(W):
+            for e in range(len(x)):
                 Y[e] += a[e] * x[e]
-                Y[W + e] += a[W + e] * x[W + e]
-        if coupled[2, n] > 0 and k == l:
-            for e in range(W):
-                X[e] += a[2 * W + e] * x[W + e]
-                X[W + e] += a[2 * W + e] * x[e]
-        elif coupled[2, n] > 0:
-            z = Z[k * (k - 1) // 2 + l]
-            for e in range(W):
-                xy, yx = a[2 * W + e] + z[e], a[2 * W + e] - z[e]
-                X[e] += xy * y[W + e]
-                X[W + e] += yx * y[e]
-                Y[e] += yx * x[W + e]
-                Y[W + e] += xy * x[e]
+        if coupled[2, n] > 0:
+            add_crossed(a[2 * W:], 1.0, 1.0, y, X)
+            if k != l:
+                z = Z[k * (k - 1) // 2 + l]
+                add_crossed(a[2 * W:], 1.0, 1.0, x, Y)
+                add_crossed(z, 1.0, -1.0, y, X)
+                add_crossed(z, -1.0, 1.0, x, Y)
+
+
+@source
+def add_crossed(c, one, two, x, y):
+    """Add c times component x to y with a factor, and the other way round."""
+    for e in range(len(x) // 2):
+        y[e] += one * c[e] * x[W + e]
+        y[W + e] += two * c[e] * x[e]

@@ -6,7 +6,7 @@ and the first moment S of the section about the axis. Both are sampled at 2 m - 
 an axis of degree 2 m - 1. Those of the cubic axis miss a mode (equal axial slopes at both nodes),
 which gets a third point in the middle with a weight that decreases with the slenderness.
 
-Rows are d/dX, then d^2/dX^2, at the points.
+Rows are d/dX and d^2/dX^2 at each point.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ class CableKernel(ElementKernel):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
         ne, nb, n = mesh.nelements, self.nd, self.points_number
         L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
-        unit = np.concatenate([element.axis(self.points, d).T for d in (1, 2)])
-        scale = np.repeat(np.concatenate([1.0 / L, 1.0 / L**2], axis=1), n, axis=1)
+        unit = np.stack([element.axis(self.points, d).T for d in (1, 2)], axis=1).reshape(2 * n, -1)
+        scale = np.tile(np.concatenate([1.0 / L, 1.0 / L**2], axis=1), n)
         G = unit * (scale[:, :, None] * (L ** np.tile(np.arange(float(nb // 2)), 2))[:, None])
         EA, ES, EI = self._across.moments(
             self.points, np.zeros(1, int) if same and self._across.constant else None)
@@ -92,7 +92,9 @@ class CableKernel(ElementKernel):
         pairs = np.concatenate([[c * n + s, d * n + s] for c, d, _ in coupled], axis=1)
         H, order = [x * self._rule[1] * L for *_, x in coupled], np.lexsort(pairs[::-1])
         pairs, H = pairs[:, order], np.concatenate(H, axis=1)[:, order]
-        rows, frame = np.array([[*s, *s], [*s, *(n + s)]]), self._frame(mesh, element, n, G)
+        rows = 2 * np.array([[*s, *s], [*s, *s]])
+        rows[1, n:] += 1
+        frame = self._frame(mesh, element, n, G)
         C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
              self.constant[:, 2:, 2:])
         each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
@@ -107,7 +109,7 @@ class CableKernel(ElementKernel):
         if mesh.is_straight:
             p, k = mesh.p, 1 if mesh.is_uniform else mesh.nelements
             e, frame = (p[:, mesh.t[1]] - p[:, mesh.t[0]]) / mesh.lengths, np.zeros((k, 2 * n, 2))
-            frame[:, :n] = e.T[:k, None]
+            frame[:, ::2] = e.T[:k, None]
             return frame
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
@@ -138,7 +140,7 @@ class CableKernel(ElementKernel):
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
         t, (eps, kappa) = self.tables[0], first_order(self.strain(u))
-        a, b = np.split(t.frame, 2, axis=1)
+        a, b = t.frame[:, ::2], t.frame[:, 1::2]
         kappa0 = (cross(a, b) / np.sum(a * a, axis=-1)).T
         Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
         return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])

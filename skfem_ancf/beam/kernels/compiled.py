@@ -29,6 +29,7 @@ class CompiledTables(NamedTuple):
 
     kernels: I1  # addresses of compiled functions
     kind: int  # SECTION or CABLE
+    width: int  # W, as a number that LLVM does not know
     start: I1  # first DOF of each element, (ne,)
     G: F2  # derivatives of the functions but the first, (rows, m)
     own: F3  # or those of each element, (n, rows m, W), else empty
@@ -36,6 +37,7 @@ class CompiledTables(NamedTuple):
     D: F3  # factors of the unknowns, (n, m, W), or empty
     sigma: F3  # factors of the strains, (n, ns, W), or empty
     x: F3  # rows in the reference configuration, (n, rows, 2 W)
+    rest: F3  # of cables: |r_X| and curvature there, (n, points, 2 W), or empty
     rows: I2  # g and h of each sample, (2, ns)
     ways: I2  # the directions in which they change its strain; -1 if g = h, (2, ns)
     pairs: I2  # samples s <= t of each modulus, (2, nq)
@@ -63,27 +65,35 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
         return x[t.at[:, column]] if len(x) > 1 else x
 
     G, R, D = scaled(each(t.G, OF_G))
-    own, (g, h) = len(G) > 1, t.rows
+    own, (g, h), frame = len(G) > 1, t.rows, each(t.frame, OF_FRAME) / R[:, :, None]
     section = t.kind == SECTION
     sigma = R[:, g] * R[:, h] if section else np.concatenate(
         [R[:, g[:ns // 2]], R[:, h[ns // 2:]] / R[:, g[ns // 2:]]], axis=1)
-    first = h if section else np.arange(ns)
-    second = np.where(g == h, -1, g if section else ns // 2 + np.arange(ns))
+    s = np.arange(ns)  # three directions at each point of cables
+    first = h if section else 3 * (s % (ns // 2)) + 2 * s // ns
+    second = np.where(g == h, -1, g if section else first + 1)
     number, (p, a, b, q) = np.concatenate([first, second]), t.terms
     k, l = t.products
     skew = np.cumsum(k != l) - 1
     skew[k == l] = -1
     K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
     return CompiledTables._make((
-        kernels, t.kind, t.start, *map(np.ascontiguousarray, (
+        kernels, t.kind, W, t.start, *map(np.ascontiguousarray, (
             G[0], _blocks(G.reshape(ne, -1) if own else G[:0, 0]),
             G.any(axis=0).ravel().astype(np.int64), _scales(D), _scales(sigma),
-            _blocks(each(t.frame, OF_FRAME) / R[:, :, None]), t.rows, np.array([first, second]),
-            t.pairs, _blocks(each(t.H, OF_H) * sigma[:, t.pairs[0]] * sigma[:, t.pairs[1]]),
+            _blocks(frame), np.zeros((0, 0, 0)) if section else _rest(frame), t.rows,
+            np.array([first, second]), t.pairs,
+            _blocks(each(t.H, OF_H) * sigma[:, t.pairs[0]] * sigma[:, t.pairs[1]]),
             np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None], t.of,
             t.products, t.products[:, k != l], *_products(G[0], t.products, own), K, Z,
             _coupled(K, Z, D.shape[1]))),
         t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS))))
+
+
+def _rest(x):
+    """|r_X| and the curvature of rows (k, 2 points, 2) of a cable."""
+    (a, b), (c, d) = x[:, ::2].T, x[:, 1::2].T
+    return _blocks(np.array([np.hypot(a, b), (a * d - b * c) / (a * a + b * b)]).T)
 
 
 def _blocks(x):

@@ -153,8 +153,9 @@ class Elements:
         """
         if self.t.kind != CABLE:
             return r
-        z, n = r[:, 0] + 1j * r[:, 1], len(r) // 2
-        return z[:n], z[n:], np.abs(z[:n]), (z[n:] / z[:n]).imag
+        z = r[:, 0] + 1j * r[:, 1]
+        a, b = z[::2], z[1::2]
+        return a, b, np.abs(a), (b / a).imag
 
     def at(self, u: Array) -> tuple[Array, Array, Any]:
         """Relative DOFs, changes of the rows and measures at u."""

@@ -22,7 +22,7 @@ def force(t, u, given, out, f):
     Without ``out``, given stresses act without the constant stiffness.
     """
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * W)), np.empty((2, ns, W))
+    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
     U, F, d, r, B, X = (work[:m], work[m:2 * m], work[2 * m:2 * m + R],
                         work[2 * m + R:2 * m + 2 * R], work[2 * m + 2 * R:2 * m + 3 * R],
                         work[2 * m + 3 * R:])
@@ -44,7 +44,7 @@ def force(t, u, given, out, f):
 def mean(t, u, v, given, out, f):
     """As :func:`force`, but means from u to v whose work is the change of the energy."""
     R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v - u
-    work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * W)), np.empty((3, ns, W))
+    work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
     U, V, F, rows = work[:m], work[m:2 * m], work[2 * m:3 * m], work[3 * m:]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
     E, C, T, whole = samples[0], samples[1], samples[2], out.size > 0 or given.size == 0
@@ -70,7 +70,7 @@ def mean(t, u, v, given, out, f):
 def linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    work, samples = np.empty((2 * m + 4 * R + 3 * R // 2, 2 * W)), np.empty((2, ns, W))
+    work, samples = np.empty((2 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
     for first in range(0, len(t.start), W):
@@ -92,10 +92,10 @@ def linearised(t, u, du, given, out, f):
 def tangent(t, u, given, out, f, A, ld):
     """Tangent, force and stresses at u; the geometric part has the given stresses, if any."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * W)), np.empty((2, ns, W))
+    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
     d, r, B, Y = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:]
-    w, z = np.empty((t.products.shape[1], 3 * W)), np.empty((t.skew.shape[1], W))
+    w, z = np.empty((t.products.shape[1], 3 * t.width)), np.empty((t.skew.shape[1], t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
@@ -119,11 +119,11 @@ def tangent(t, u, given, out, f, A, ld):
 def unsymmetric(t, u, v, A, ld):
     """Add ``B(u)^T H (B(v) - B(u))`` to a matrix in two halves."""
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.rows.shape[1], 3 * t.G.shape[0] // 2
-    U, d, r, s = (np.empty((m, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W)),
-                  np.empty((R, 2 * W)))
-    E, X, Y = np.empty((ns, W)), np.empty((n, 2 * W)), np.empty((n, 2 * W))
-    w, z = np.empty((t.products.shape[1], 4 * W)), np.empty((t.skew.shape[1], 4 * W))
-    K, Z = np.empty((m * (m + 1) // 2, 4 * W)), np.empty((m * (m - 1) // 2, 4 * W))
+    work = np.empty((m + 3 * R + 2 * n, 2 * t.width))
+    U, d, r, s = work[:m], work[m:m + R], work[m + R:m + 2 * R], work[m + 2 * R:m + 3 * R]
+    E, X, Y = np.empty((ns, t.width)), work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
+    w, z = np.empty((t.products.shape[1], 4 * t.width)), np.empty((t.skew.shape[1], 4 * t.width))
+    K, Z = np.empty((m * (m + 1) // 2, 4 * t.width)), np.empty((m * (m - 1) // 2, 4 * t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
@@ -132,6 +132,7 @@ def unsymmetric(t, u, v, A, ld):
         s[:] = r
         add(1.0, d, s)
         one, two = directions(t, r, d[:0], X), directions(t, s, d[:0], Y)
+        add(-1.0, one, two)
         w[:] = 0.0
         z[:] = 0.0
         add_difference(t, moduli(t, first, E), one, two, w, z)
@@ -143,21 +144,21 @@ def unsymmetric(t, u, v, A, ld):
 
 
 @source
-def add_difference(t, H, X, Y, w, z):
-    """Coefficients xx, xy, yx, yy of ``X^T H (Y - X)``, symmetric and skew in the functions."""
+def add_difference(t, H, X, D, w, z):
+    """Coefficients xx, xy, yx, yy of ``X^T H D``, symmetric and skew in the functions."""
     terms, factors = t.terms, t.factors[0]
     for k in range(len(factors)):
         n, p, a, b, h = terms[1, k], terms[0, k], terms[2, k], terms[3, k], H[terms[4, k]]
-        for i in range(2):
-            for j in range(2):
-                at = (2 * i + j) * W
-                for e in range(W):
-                    x = X[a, i * W + e] * (Y[b, j * W + e] - X[b, j * W + e])
-                    y = X[b, i * W + e] * (Y[a, j * W + e] - X[a, j * W + e])
-                    c = 0.5 * factors[k] * h[e]
-                    w[p, at + e] += c * (x + y)
-                    if n >= 0:
-                        z[n, at + e] += c * (x - y)
+        x, y, X0, Y0, c = X[a], D[b], X[b], D[a], 0.5 * factors[k]
+        for i in range(0, 2 * W, W):
+            for j in range(0, 2 * W, W):
+                o = w[p, 2 * i + j:]
+                for e in range(t.width):
+                    o[e] += c * h[e] * (x[i + e] * y[j + e] + X0[i + e] * Y0[j + e])
+                if n >= 0:
+                    o = z[n, 2 * i + j:]
+                    for e in range(t.width):
+                        o[e] += c * h[e] * (x[i + e] * y[j + e] - X0[i + e] * Y0[j + e])
 
 
 @source
@@ -187,9 +188,9 @@ def gradients(t, u, out):
     """Write the derivatives of strains and of weighted stresses, (2, ne, ns, 2 nb)."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
     both = out.reshape(2, len(t.start), ns, 2 * m + 2)
-    U, d, r = np.empty((m, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W))
-    E, Y = np.empty((ns, W)), np.empty((3 * R // 2, 2 * W))
-    B, C = np.empty((ns, 2 * m * W)), np.empty((ns, 2 * m * W))
+    U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
+    E, Y = np.empty((ns, t.width)), np.empty((3 * R // 2, 2 * t.width))
+    B, C = np.empty((ns, 2 * m * t.width)), np.empty((ns, 2 * m * t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
@@ -199,10 +200,10 @@ def gradients(t, u, out):
         for q in range(len(H)):
             s, p, h = pairs[0, q], pairs[1, q], H[q]
             for i in range(2 * m):
-                for e in range(W):
+                for e in range(t.width):
                     C[s, i * W + e] += h[e] * B[p, i * W + e]
                 if s != p:
-                    for e in range(W):
+                    for e in range(t.width):
                         C[p, i * W + e] += h[e] * B[s, i * W + e]
         put_columns(t, first, B, 1, both[0])
         put_columns(t, first, C, -1, both[1])
@@ -212,9 +213,9 @@ def gradients(t, u, out):
 def put_derivatives(t, first, X, B):
     """Derivatives of the strains by the scaled unknowns, (ns, 2 m W)."""
     rows, ways, m, shared = t.rows, t.ways, t.G.shape[1], len(t.own) == 0
-    G = np.empty((t.G.size, W))
+    G = np.empty((t.G.size, t.width))
     for n in range(len(G)):
-        for e in range(W):
+        for e in range(t.width):
             G[n, e] = t.G[n // m, n % m] if shared else t.own[first // W, n, e]
     B[:] = 0.0
     for s in range(len(B)):
@@ -223,9 +224,9 @@ def put_derivatives(t, first, X, B):
                 x = X[ways[i, s]]
                 for k in range(m):
                     g = G[rows[i, s] * m + k]
-                    for e in range(W):
-                        B[s, 2 * k * W + e] += g[e] * x[e]
-                        B[s, (2 * k + 1) * W + e] += g[e] * x[W + e]
+                    for j in range(0, 2 * W, W):
+                        for e in range(t.width):
+                            B[s, 2 * k * W + j + e] += g[e] * x[j + e]
 
 
 @source
@@ -259,7 +260,7 @@ def shifted(t, first, E, change, shift, S):
     points = x.shape[1]
     for c in range(3):
         for p in range(points):
-            for e in range(W):
+            for e in range(t.width):
                 x[c, p, e] += shift[(c * points + p) * ne + min(first + e, ne - 1)]
     law_evaluate(t.law, x, S)
     if change.size > 0:
@@ -273,10 +274,10 @@ def shifted(t, first, E, change, shift, S):
 def eigen_mean(t, u, v, shift, f):
     """Change of the mean force from u to v by eigenstrains (3, points, ne) of a nonlinear law."""
     R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v - u
-    U, d, dd, r, B = (np.empty((m, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W)),
-                      np.empty((R, 2 * W)), np.empty((R, 2 * W)))
-    E, C, T = np.empty((ns, W)), np.empty((ns, W)), np.empty((ns, W))
-    X, S = np.empty((3 * R // 2, 2 * W)), np.empty((3, t.weights.shape[1], W))
+    work, samples = np.empty((m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
+    U, rows, E, C, T = work[:m], work[m:], samples[0], samples[1], samples[2]
+    d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
+    S = np.empty((3, t.weights.shape[1], t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         gather(t, first, du, U)
@@ -294,9 +295,9 @@ def eigen_mean(t, u, v, shift, f):
 def eigen_tangent(t, u, given, A, ld):
     """Change of the tangent at u by eigenstrains: stresses for linear laws, else strains."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    U, d, r = np.empty((m, 2 * W)), np.empty((R, 2 * W)), np.empty((R, 2 * W))
-    E, T = np.empty((ns, W)), np.empty((ns, W))
-    w, z = np.empty((t.products.shape[1], 3 * W)), np.empty((t.skew.shape[1], W))
+    U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
+    E, T = np.empty((ns, t.width)), np.empty((ns, t.width))
+    w, z = np.empty((t.products.shape[1], 3 * t.width)), np.empty((t.skew.shape[1], t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         w[:] = 0.0
@@ -305,11 +306,12 @@ def eigen_tangent(t, u, given, A, ld):
             take(t, first, given, T)
         else:
             strains(t, first, d, r, E)
-            S, M = np.empty((3, t.weights.shape[1], W)), np.empty((9, t.weights.shape[1], W))
+            points = t.weights.shape[1]
+            S, M = np.empty((3, points, t.width)), np.empty((9, points, t.width))
             shifted(t, first, E, E[:0], given, S)
             from_points(t, first, S, T)
             shifted(t, first, E, E[:0], given, M)
-            H = np.empty((t.pairs.shape[1], W))
+            H = np.empty((t.pairs.shape[1], t.width))
             between_samples(t, first, M, H)
             add_material(t, H, r, w, z)
         add_geometric(t, r, T, w)

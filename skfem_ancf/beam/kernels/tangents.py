@@ -19,13 +19,13 @@ def add_material(t, H, X, w, z):
     for k in range(len(factors)):
         n, c = terms[1, k], factors[k]
         o, x, y, h = w[terms[0, k]], X[terms[2, k]], X[terms[3, k]], H[terms[4, k]]
-        for e in range(W):
+        for e in range(t.width):
             o[e] += c * h[e] * x[e] * y[e]
             o[W + e] += c * h[e] * x[W + e] * y[W + e]
             o[2 * W + e] += 0.5 * c * h[e] * (x[e] * y[W + e] + x[W + e] * y[e])
         if n >= 0:
             o = z[n]
-            for e in range(W):
+            for e in range(t.width):
                 o[e] += 0.5 * c * h[e] * (x[e] * y[W + e] - x[W + e] * y[e])
 
 
@@ -38,7 +38,7 @@ def add_geometric(t, r, T, w):
         return
     for s in range(len(T)):
         c, o, x = 0.5 if rows[0, s] == rows[1, s] else 1.0, w[of[s]], T[s]
-        for e in range(W):
+        for e in range(len(x)):
             o[e] += c * x[e]
             o[W + e] += c * x[e]
 
@@ -46,22 +46,20 @@ def add_geometric(t, r, T, w):
 @source
 def add_cable_geometric(of, r, T, w):
     """That of extensions and curvatures."""
-    n = len(T) // 2
+    n, flat = len(T) // 2, r.reshape(r.size)
     for p in range(n):
-        q = n + p
-        one, two = w[of[p]], w[of[q]]
-        for e in range(W):
-            a, b, ax, ay = r[p, e], r[p, W + e], r[q, e], r[q, W + e]
-            square = a * a + b * b
-            kappa = (a * ay - b * ax) / square
-            N, M = 0.5 * T[p, e] / (square * np.sqrt(square)), T[q, e] / (square * square)
-            c, y = 4.0 * kappa * M, kappa * square
-            one[e] += c * a * a + N * b * b - M * (2.0 * ay * a + y)
-            one[W + e] += c * b * b + N * a * a + M * (2.0 * ax * b - y)
-            one[2 * W + e] += (c - N) * a * b - M * (ay * b - ax * a)
-            two[e] += 2.0 * M * a * b
-            two[W + e] -= 2.0 * M * a * b
-            two[2 * W + e] += M * (b * b - a * a)
+        x, one, two, N, M = flat[4 * p * W:], w[of[p]], w[of[n + p]], T[p], T[n + p]
+        for e in range(len(N)):
+            a, b, c, d = x[e], x[W + e], x[2 * W + e], x[3 * W + e]
+            y = 1.0 / (a * a + b * b)
+            s, t, k = 0.5 * N[e] * y * np.sqrt(y), M[e] * y * y, a * d - b * c
+            z = 4.0 * k * y * t
+            one[e] += z * a * a + s * b * b - t * (2.0 * d * a + k)
+            one[W + e] += z * b * b + s * a * a + t * (2.0 * c * b - k)
+            one[2 * W + e] += (z - s) * a * b - t * (d * b - c * a)
+            two[e] += 2.0 * t * a * b
+            two[W + e] -= 2.0 * t * a * b
+            two[2 * W + e] += t * (b * b - a * a)
 
 
 @source
@@ -79,8 +77,8 @@ def products(t, first, w, z, K, Z):
 @source
 def own_products(G, used, m, rows, w, sign, K):
     """Sums of ``w[p] (G_g G_h^T + sign G_h G_g^T)``, lower halves; skew ones without diagonal."""
-    p, size = 0, w.shape[1] // W
-    v, top = np.empty((m, w.shape[1])), 1 if sign > 0 else 0
+    p, width, size = 0, G.shape[1], w.shape[1]
+    v, top = np.empty((m, size)), 1 if sign > 0 else 0
     K[:] = 0.0
     for g in range(len(G) // m):
         v[:] = 0.0
@@ -90,18 +88,18 @@ def own_products(G, used, m, rows, w, sign, K):
                 n = rows[1, p] * m + l
                 if used[n]:
                     a, y = G[n], v[l]
-                    for c in range(size):
-                        for e in range(W):
-                            y[c * W + e] += a[e] * x[c * W + e]
+                    for c in range(0, size, width):
+                        for e in range(width):
+                            y[c + e] += a[e] * x[c + e]
             p += 1
         n = 0
         for k in range(m):
             for l in range(k + top):
                 a, b, x, y, o = G[g * m + k], G[g * m + l], v[l], v[k], K[n]
                 if used[g * m + k] or used[g * m + l]:
-                    for c in range(size):
-                        for e in range(W):
-                            o[c * W + e] += a[e] * x[c * W + e] + sign * b[e] * y[c * W + e]
+                    for c in range(0, size, width):
+                        for e in range(width):
+                            o[c + e] += a[e] * x[c + e] + sign * b[e] * y[c + e]
                 n += 1
 
 
@@ -112,9 +110,9 @@ def scale_products(D, K, top):
     for k in range(len(D)):
         for l in range(k + top):
             a, b, o = D[k], D[l], K[n]
-            for c in range(len(o) // W):
-                for e in range(W):
-                    o[c * W + e] *= a[e] * b[e]
+            for c in range(0, len(o), len(a)):
+                for e in range(len(a)):
+                    o[c + e] *= a[e] * b[e]
             n += 1
 
 
@@ -150,8 +148,8 @@ def add_to_band(start, first, ld, m, K, Z, A):
 @source
 def add_matrices(t, first, w, z, constant, ld, A):
     """Add the matrices of coefficients to a lower half."""
-    m = t.G.shape[1]
-    K, Z = np.empty((m * (m + 1) // 2, 3 * W)), np.empty((m * (m - 1) // 2, W))
+    m, n = t.G.shape[1], t.width
+    K, Z = np.empty((m * (m + 1) // 2, 3 * n)), np.empty((m * (m - 1) // 2, n))
     products(t, first, w, z, K, Z)
     if constant and len(t.K) > 0:
         add(1.0, block(t.K, first), K)
