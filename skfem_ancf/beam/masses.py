@@ -24,7 +24,7 @@ class Masses(NamedTuple):
     """Masses at points of the elements, or of one element if all are equal.
 
     ``functions`` are shape functions (nb, nelements, npoints), ``mass`` the masses, (nelements,
-    npoints). For cables with rotary inertia, with velocity ``v + Y v_X`` turned by 90 degrees off
+    npoints). For cables, with velocity ``v + Y v_X`` turned by 90 degrees off
     the axis, ``slopes`` are axial derivatives of the functions, and ``moments`` masses times Y and
     Y^2, (2, nelements, npoints).
     """
@@ -86,22 +86,21 @@ def masses_of(beam: Any) -> Masses:
 
 
 def _of_cable(beam):
-    """The Masses of a cable; without rotary inertia for a plain rectangle."""
+    """The Masses of a cable, with rotary inertia."""
     across, mapping = beam.across, beam.mesh.mapping()
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
     N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
-    if across.simple and beam.mesh.is_straight:
+    mass, first, second = across.moments(xi, tind, "mass") * w
+    if beam.mesh.is_straight:
         length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
-        return Masses(N, across.moments(xi, tind, "mass")[0] * w * length)
-    eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
+        return Masses(N, mass * length, d_xi / length, np.array([first, second]) * length)
+    eta = np.array([0.5, 0.0, 1.0])
     J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
     # arc length, since the interpolated tangent is shorter than one
     speed = np.hypot(*J[:, 0, ..., :len(xi)])
-    mass, first, second = across.moments(xi, tind, "mass") * w * speed
-    if across.simple:
-        return Masses(N, mass)
+    mass, first, second = mass * speed, first * speed, second * speed
     # volume of a curved beam: that of its axis times 1 - Y / R
     middle, bottom, top = np.split(cross(J[:, 0], J[:, 1]), 3, axis=-1)
     bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])

@@ -19,7 +19,6 @@ from ..core.caching import cached_property
 from ..core.errors import AncfError
 from ..core.quadrature import gauss, lagrange
 from ..core.types import Array
-from ..formulations.ecm import AXIS as WHOLE
 from ..mesh.mapping import MappingBeam, cross
 from ..sections.jumps import beside, jumps
 
@@ -119,7 +118,7 @@ class SectionForces:
         if any(load is None for _, load in loads):
             raise NotRecovered("a load has only a force on the degrees of freedom: its "
                                "distribution across the section is unknown")
-        self.lifted = not (beam.has_sections or beam.across.simple)
+        self.lifted = not beam.has_sections
         self.q = beam.kernel.gather(beam.q0_local + u)
         self._acceleration = None if acceleration is None else beam.kernel.gather(acceleration)
         self._body, self._gravity = (
@@ -179,13 +178,11 @@ class SectionForces:
         beam, ne, (x, w) = self.beam, self.beam.mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
         parts = [self.face(side, e, xi) for side in self.sides]
-        whole = not (beam.has_sections or self.lifted)
         for layer, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
-            eta, v = WHOLE if whole else (eta, v)
             inside = Sections(beam, e, xi, eta, self.lifted)
             body = self.body(inside)
             if np.any(body):
-                size = beam.across.breadth(layer, inside.X, e, whole) * v * inside.full_volume
+                size = beam.across.breadth(layer, inside.X, e) * v * inside.full_volume
                 parts.append((inside, size * body))
         middle = Sections(beam, e, xi)
         axis = middle.field(self.q)
