@@ -22,6 +22,7 @@ concrete = StVenantKirchhoff(E=3e10, nu=0.2, density=2500)
 girder = Beam(MeshBeam.init_line(np.linspace(0, 3 * span, 13), height), ElementBeamCable(5),
               concrete, width=width)
 frequency = np.pi / (2 * span**2) * np.sqrt(concrete.E * height**2 / (12 * concrete.density))
+frequency /= np.sqrt(1 + (np.pi * height / span)**2 / 12)           # by rotary inertia, Rayleigh
 way = 3 * span + (bogies - 1) * gap
 
 

@@ -49,9 +49,10 @@ static = load * span**3 / (48 * EI)
 def krylov(speed, t):
     """The sag of the middle, over the static one."""
     n = np.arange(1, 40)[:, None]
-    passing, own = n * np.pi * speed / span, (n * np.pi / span)**2 * np.sqrt(EI / mass)
+    rotary = 1 + (n * np.pi * height / span)**2 / 12               # by rotary inertia
+    passing, own = n * np.pi * speed / span, (n * np.pi / span)**2 * np.sqrt(EI / mass / rotary)
     swing = (np.sin(passing * t) - passing / own * np.sin(own * t)) / (own**2 - passing**2)
-    return np.sum(2 * load / (mass * span) * swing * np.sin(n * np.pi / 2), axis=0) / static
+    return np.sum(2 * load / (mass * rotary * span) * swing * np.sin(n * np.pi / 2), axis=0) / static
 
 
 ratios = np.array([0.15, 0.3, 0.45, 0.6, 0.75, 0.95])
