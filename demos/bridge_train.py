@@ -1,8 +1,7 @@
 r"""A train on a bridge of three spans
 ==================================
 
-A train crosses a bridge of three spans, at low speed and at the speed where its bogies excite the
-lowest mode.
+A train crosses a bridge of three spans, slowly and at the speed where its bogies excite resonance.
 
 The bogies follow each other at equal distances, so they load the bridge periodically. If the period
 is that of the lowest mode, the vibration grows with each bogie.
@@ -21,8 +20,8 @@ span, height, width, gap, bogies, load = 25.0, 1.6, 3.0, 18.7, 10, 3e5      # m,
 concrete = StVenantKirchhoff(E=3e10, nu=0.2, density=2500)
 girder = Beam(MeshBeam.init_line(np.linspace(0, 3 * span, 13), height), ElementBeamCable(5),
               concrete, width=width)
-frequency = np.pi / (2 * span**2) * np.sqrt(concrete.E * height**2 / (12 * concrete.density))
-frequency /= np.sqrt(1 + (np.pi * height / span)**2 / 12)           # by rotary inertia, Rayleigh
+inertia = 12 * concrete.density * (1 + (np.pi * height / span)**2 / 12)     # with rotary inertia
+frequency = np.pi * height / (2 * span**2) * np.sqrt(concrete.E / inertia)
 way = 3 * span + (bogies - 1) * gap
 
 

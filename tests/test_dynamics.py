@@ -323,6 +323,9 @@ def test_a_base_that_starts_at_once_moves_its_beam_by_an_impulse(scheme, rtol):
     m = rho * h**2 * l / 420 * np.array([
         [156, 22 * l, 54, -13 * l], [22 * l, 4 * l**2, 13 * l, -3 * l**2],
         [54, 13 * l, 156, -22 * l], [-13 * l, -3 * l**2, -22 * l, 4 * l**2]])
+    m += rho * h**4 / 12 / (30 * l) * np.array([  # rotary inertia
+        [36, 3 * l, -36, 3 * l], [3 * l, 4 * l**2, -3 * l, -l**2],
+        [-36, -3 * l, 36, -3 * l], [3 * l, -l**2, -3 * l, 4 * l**2]])
     k = E * h**4 / 12 / l**3 * np.array([
         [12, 6 * l, -12, 6 * l], [6 * l, 4 * l**2, -6 * l, 2 * l**2],
         [-12, -6 * l, 12, -6 * l], [6 * l, 2 * l**2, -6 * l, 4 * l**2]])

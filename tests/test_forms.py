@@ -9,7 +9,8 @@ from skfem import Basis, BilinearForm, LinearForm, asm
 from skfem.helpers import ddot, dot
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, ElementBeamPatelShabana, MeshBeam,
-                        NeoHookean, Scene, StVenantKirchhoff, forms, reference_coordinates)
+                        NeoHookean, Scene, Section, StVenantKirchhoff, forms,
+                        reference_coordinates)
 from skfem_ancf.actions.loads import EndMoment, Pressure
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
@@ -263,6 +264,24 @@ def test_an_arc_weighs_what_its_area_and_length_say(element):
         forces = state.resultants()
         assert_allclose(forces.force[:, 0], [0, -g * mass], rtol=4e-6, atol=1e-3)
         assert_allclose(forces.M[0], g * mass * (1 - np.sin(1.0)), rtol=1e-2)
+
+
+@pytest.mark.parametrize("options", [
+    {"width": 0.05}, {"width": lambda x, y: 0.05 + 0.0 * x},
+    {"section": Section.profile("rectangle", width=0.05)}], ids=["number", "function", "section"])
+def test_a_curved_cable_weighs_at_its_centroid_and_a_form_acts_on_its_axis(options):
+    """Slices of an arc of radius 1 have their centroid h^2 / 12 outside of the axis."""
+    weight, couple = 7800.0 * 0.05 * 0.1 * 9.81, 0.1**2 / 12 * np.sin(1.0)
+    own = LinearForm(lambda v, w: -7800.0 * 0.05 * 9.81 * v[1])
+    scene = Scene(Beam(ARC, ElementBeamCable(5), STEEL, **options)).clamp("left")
+    for loaded, arm in ((scene.replace().gravity((0, -9.81)), 1 - np.sin(1.0) - couple),
+                        (scene.replace().load(own), 1 - np.sin(1.0))):
+        state = loaded.solve_static()
+        assert state.recovered == {0: ""}
+        forces = state.resultants()
+        assert_allclose(forces.force[:, 0], [0, -weight], rtol=4e-6, atol=1e-6 * weight)
+        assert_allclose(forces.M[0], weight * arm, rtol=1e-4)  # the couple is 4.4e-3 of it
+        assert_allclose(state.reactions("left").force, [0, weight], rtol=4e-6, atol=1e-6 * weight)
 
 
 # follower loads

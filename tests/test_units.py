@@ -5,7 +5,8 @@ import pytest
 
 from noise import alike
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+                        ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, Section,
+                        StVenantKirchhoff)
 from skfem_ancf.actions.joints import JOINTS
 
 #: Lengths of a beam in metres, beside one metre.
@@ -123,8 +124,8 @@ def test_verdicts_of_beams_of_any_size(L):
 def test_becks_column_flutters_in_any_unit(unit):
     """Loads without a potential are seen where coordinates have units of 1e-12 to 1e12."""
     mesh = MeshBeam.init_line(unit * np.linspace(0, 1, 7), 1e-2 * unit)
-    column = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(12e6 / unit, 0, 1e2 / unit**3),
-                  width=unit)
+    column = Beam(mesh, ElementBeamCable(5), section=Section.numbers(
+        EA=1.2e5 * unit, EI=unit**3, rhoA=1.0 / unit, rhoI=1e-9 * unit))
     scene = Scene(column).clamp("left").follower_force((-20.5 * unit, 0), at=(unit, 0))
     state = scene.solve_static()
     modes = scene.modes(2, state)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        Scene, StVenantKirchhoff)
+                        Scene, Section, StVenantKirchhoff)
 from skfem_ancf.dynamics import Gauss
 
 from .problems import GRAVITY, THROW_ALONG, arm_angle, throw
@@ -19,7 +19,12 @@ def scene(problem, element, n, formulation="assumed", compiled=True, grade=1.0):
     mesh = MeshBeam.init_line(p.L * grading(n, grade), height=p.h)
     thick = p.load == "traction"
     material = StVenantKirchhoff(p.E, p.nu, p.rho, shear_correction=1.0 if thick else "auto")
-    s = Scene(Beam(mesh, element, material, p.b, formulation, compiled=compiled))
+    rod: dict = dict(material=material, width=p.b)
+    if isinstance(element, ElementBeamCable) and p.t_end is not None:  # no rotary inertia
+        A = p.b * p.h
+        rod = dict(section=Section.numbers(EA=p.E * A, EI=p.E * A * p.h**2 / 12, rhoA=p.rho * A,
+                                           rhoI=1e-9 * p.rho * A * p.h**2))
+    s = Scene(Beam(mesh, element, formulation=formulation, compiled=compiled, **rod))
     if p.support == "clamp":
         s.clamp("left", thickness="fixed" if thick else "free")
     elif p.support in ("pin", "arm"):

@@ -11,7 +11,7 @@ from skfem.assembly import BilinearForm, FacetBasis, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from ..beam.distribution import BODY, Distribution, Sampled, facets_along
+from ..beam.distribution import AXIS, BODY, Distribution, Sampled, facets_along
 from ..beam.domain import Domain
 from ..beam.layout import WhichMember
 from ..core.errors import (CallbackError, InputError, explained, require_finite, require_flag,
@@ -237,9 +237,12 @@ class FormLoad(Density):
             per_xi = f * basis.dx / basis.W
             return Distribution(stations=stations, sampled=tuple(
                 Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+        xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
+        if not self.beam.has_sections:
+            return Distribution(sampled=(
+                Sampled(AXIS, np.arange(f.shape[1]), xi, f * basis.dx / basis.W),))
         if not self.beam.across.plain:
             return None
-        xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
         values = (f / self.beam.across.layers[0].width).reshape(*f.shape[:2], len(xi), len(eta))
         return Distribution(sampled=(Sampled(BODY, np.arange(f.shape[1]), xi, values, eta),))
 

@@ -11,7 +11,6 @@ from ..core.linalg import BandMatrix
 from ..core.quadrature import gauss, product_rule, tensor
 from ..core.types import Array, Rule
 from ..formulations.ecm import AXIS
-from ..mesh.mapping import cross
 
 #: Additional points along an element of variable section.
 MORE = 4
@@ -96,14 +95,13 @@ def _of_cable(beam):
     if beam.mesh.is_straight:
         length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
         return Masses(N, mass * length, d_xi / length, np.array([first, second]) * length)
-    eta = np.array([0.5, 0.0, 1.0])
-    J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
     # arc length, since the interpolated tangent is shorter than one
-    speed = np.hypot(*J[:, 0, ..., :len(xi)])
+    speed = np.hypot(*mapping.DF(X, tind)[:, 0])
     mass, first, second = mass * speed, first * speed, second * speed
     # volume of a curved beam: that of its axis times 1 - Y / R
-    middle, bottom, top = np.split(cross(J[:, 0], J[:, 1]), 3, axis=-1)
-    bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])
+    faces = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], len(xi))])
+    bottom, top = np.split(mapping.full_volume(faces, tind), 2, axis=-1)
+    bend = 2.0 * (bottom - top) / ((bottom + top) * mapping.height(xi, tind)[0])
     return Masses(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
 
