@@ -318,15 +318,6 @@ def test_a_shaken_cantilever_vibrates_as_its_modes():
     assert_allclose(found, tip, rtol=0, atol=2e-3 * np.abs(tip).max())
 
 
-@pytest.mark.parametrize("k", [1e-6, lambda angle: 1e-6 * angle], ids=["number", "function"])
-def test_a_torsional_spring_beyond_half_a_turn_says_so(k):
-    scene = Scene(beam_of()).pin("left").torsional_spring(k, "left")
-    scene.initial_velocity(lambda x: np.array([0 * x[0], 6.0 * x[0]]))
-    with pytest.warns(ModelWarning, match="half a turn"):
-        scene.integrate(0.7, 5e-3)
-    scene.integrate(0.4, 5e-3)
-
-
 class Wrong(ForceElement):
     def __init__(self, links=None, force=None):
         self.given, self.value = links, force

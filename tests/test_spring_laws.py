@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, RigidBody,
+                        Scene, StVenantKirchhoff)
 from skfem_ancf.actions.forces.laws import Law
 
 E, B, H, G = 2e8, 0.01, 0.01, 9.81
@@ -108,3 +108,101 @@ def test_a_spring_that_only_pulls():
 def test_bad_laws(add, message):
     with pytest.raises(InputError, match=message):
         add(Scene(beam_of()))
+
+
+# whole turns
+
+STIFF, INERTIA, MOST = 2.0, 0.5, 5.37
+TURNING = {"number": STIFF, "function": lambda a: STIFF * a,
+           "pair": (lambda a: STIFF * a, lambda a: 0.5 * STIFF * a**2)}
+
+
+def wheel(law, **options):
+    """A wheel on a torsional spring, which turns as MOST sin 2 t from where the spring is free."""
+    body = RigidBody(INERTIA, INERTIA, (0.3, 0.2))
+    scene = Scene(body).pin(body).torsional_spring(law, body, **options)
+    return scene.initial_velocity(
+        lambda x: 2.0 * MOST * np.array([0.2 - x[1], x[0] - 0.3]), beam=body)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("law", TURNING.values(), ids=TURNING)
+@pytest.mark.parametrize("scheme, rtol", [("energy-momentum", 5e-3), ("generalized-alpha", 1e-2),
+                                          ("hht", 1e-2), ("newmark", 1e-2), ("radau", 1e-6)])
+def test_a_wheel_on_a_torsional_spring_turns_by_more_than_half_a_turn(law, scheme, rtol):
+    scene = wheel(law)
+    history = scene.integrate(3.0, 0.01, scheme=scheme)
+    exact = MOST * np.sin(2.0 * history.t)
+    assert_allclose(history.angle(0), exact, atol=rtol * MOST)
+    assert_allclose(history.spring_force(0), STIFF * exact, atol=rtol * STIFF * MOST)
+    assert_allclose(history.total_energy, history.total_energy[0],
+                    rtol=1e-11 if scheme == "energy-momentum" else rtol)
+    # a state far from the start knows its turns, and a motion goes on from it
+    middle = history.state(70)
+    assert middle.spring_force(0) == pytest.approx(STIFF * history.angle(0)[70], rel=1e-12)
+    again = scene.integrate(3.0, 0.01, scheme=scheme, start=middle)
+    assert_allclose(again.angle(0)[-1] - 0.0, history.angle(0)[-1], rtol=1e-6)
+    assert_allclose(again.u[-1], history.u[-1], atol=1e-9)
+
+
+def test_a_wheel_turns_on_in_a_scheme_of_order_4_and_in_automatic_steps():
+    for options, atol in (({"dt": 0.01, "scheme": "energy-momentum-4"}, 1e-5),
+                          ({"dt": "auto", "scheme": "auto"}, 1e-3)):
+        history = wheel(STIFF).integrate(3.0, **options)
+        assert_allclose(history.angle(0), MOST * np.sin(2.0 * history.t), atol=atol)
+
+
+@pytest.mark.parametrize("law", TURNING.values(), ids=TURNING)
+def test_two_wheels_on_one_spring_turn_against_each_other(law):
+    """The relative angle has half the inertia."""
+    a, b = (RigidBody(INERTIA, INERTIA, (x, 0.0)) for x in (0.0, 1.0))
+    scene = Scene(a, b).pin(a).pin(b).torsional_spring(law, a, other=b, angle=0.5)
+    for body, sign in ((a, 1.0), (b, -1.0)):
+        scene.initial_velocity(lambda x, at=body, sign=sign: 12.0 * sign * np.array(
+            [-x[1], x[0] - at.position[0]]), beam=body)
+    history = scene.integrate(2.0, 4e-3)
+    rate = np.sqrt(2.0 * STIFF / INERTIA)
+    exact = 0.5 - 0.5 * np.cos(rate * history.t) + 24.0 / rate * np.sin(rate * history.t)
+    assert exact.max() > 8.0
+    assert_allclose(history.angle(a) - history.angle(b), exact, atol=5e-3 * 8.0)
+    assert np.ptp(history.total_energy) < 1e-11 * history.total_energy[0]
+
+
+@pytest.mark.parametrize("law", TURNING.values(), ids=TURNING)
+def test_a_run_winds_a_spring_up_and_back(law):
+    """From an angle of 0.4, by a moment of 30 and back to -20: moment over stiffness."""
+    def wound(t):
+        return 30.0 * t if t < 1.0 else 80.0 - 50.0 * t
+
+    body = RigidBody(1.0, 1.0)
+    scene = Scene(body).pin(body).torsional_spring(law, body, angle=0.4).moment(
+        body, 1.0, amplitude=wound)
+    history = scene.run([1.0, 2.0], increments=20)
+    moment = np.array([wound(t) for t in history.t])
+    assert_allclose(history.spring_force(0), moment, atol=1e-9)
+    assert_allclose(history.angle(0), 0.4 + moment / STIFF, atol=1e-9)
+    # parts of it go on
+    half = scene.run([1.0], increments=20).state(-1)
+    rest = scene.run([2.0], increments=20, start=half)
+    assert rest.spring_force(0)[-1] == pytest.approx(-20.0, rel=1e-9)
+    near = Scene(body).pin(body).torsional_spring(law, body, angle=0.4).moment(body, 29.0)
+    assert near.solve_static(start=half).spring_force(0) == pytest.approx(29.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", TURNING.values(), ids=TURNING)
+def test_a_bar_is_swung_round_by_more_than_two_turns(law):
+    """A stiff bar, pinned at its end, against m L^2 / 3"""
+    rho, rate = 7800.0, 30.0
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.01, angle=0.7), ElementBeamCable(5),
+                StVenantKirchhoff(2e13, 0.0, rho), 0.01)
+    stiff = STIFF / 2.0
+    k = stiff if isinstance(law, float) else (lambda a: stiff * a)
+    scene = Scene(beam).pin("left").torsional_spring(k, "left")
+    scene.initial_velocity(lambda x: rate * np.array([-x[1], x[0]]))
+    history = scene.integrate(1.5, 2e-3)
+    inertia = rho * 1e-4 * (1 / 3 + 1e-4 / 12)
+    own = np.sqrt(stiff / inertia)
+    exact = rate / own * np.sin(own * history.t)
+    assert exact.max() > 4 * np.pi
+    assert_allclose(history.spring_force(0), stiff * exact, atol=2e-3 * stiff * exact.max())
+    assert np.ptp(history.total_energy) < 1e-9 * history.total_energy[0]

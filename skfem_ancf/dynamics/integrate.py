@@ -158,14 +158,14 @@ def _goes_on(system, scheme, start, t):
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:
-    """Take all steps of a Run; warn about inverted elements, deep contact and jumps of springs."""
+    """Take all steps of a Run; warn about inverted elements and deep contact."""
     history, inverted = _go(run, file, progress)
     contacts = run.system.forces.contacts
     texts = [] if inverted is None else [
         f"elements are turned inside out at t = {inverted:.6g} or before: the compression or "
         "bending is too large, and results after that time are meaningless. Use NeoHookean, more "
         "elements, a smaller load or shorter steps"]
-    texts += filter(None, [_jump_of_a_turn(history), contacts.sweep.deep()])
+    texts += filter(None, [contacts.sweep.deep()])
     with run.system.histories.lent(run.y.history):
         texts += contacts.sunk(run.y.u, run.y.t)
     for text in texts:
@@ -211,16 +211,3 @@ def _of_samples(run):
     return (f". The energy reached {energy:.3g}. If the motion does not explain that, the sampled "
             f"force of {shown(run.system.forces.sampled[0])} excites vibrations: sample more "
             "often, add damping, or use scheme='energy-momentum'")
-
-
-def _jump_of_a_turn(history):
-    """Warning if a torsional spring turned by more than half a turn, or ""."""
-    forces = history.system.forces
-    turns = forces.turns(history.u) if forces.elements else ()
-    if not len(turns):
-        return ""
-    jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]
-    return "" if not len(jumps) else (
-        f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more than half a "
-        "turn: its angle is limited to (-pi, pi], so that its moment jumps there and the energy is "
-        "not conserved")

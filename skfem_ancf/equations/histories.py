@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ..actions.contact.contacts import Contacts
+from ..actions.contact.tables import TURNS
+from ..actions.forces.system import Forces
 from ..beam.beam import Beam
 from ..core.types import Array
 
 
 class Histories:
-    """The history of a scene: anchors and multipliers of obstacles, variables of materials.
+    """The history of a scene: anchors and multipliers of obstacles, whole turns of torsional
+    springs, variables of materials.
 
     A history is a value, an array (n,). Forces, tangents and energies depend on the one that is
     set, and do not change it; :meth:`accept` replaces it at the end of an increment. To start again
@@ -23,20 +25,23 @@ class Histories:
     Attributes
     ----------
     values
-        The history that is set, shape (n,): first that of the obstacles, then that of the beams.
+        The history that is set, shape (n,): first that of the obstacles
+        and springs, then that of the beams.
     span
         Time since then, shape (1,), for laws with rates; 0 in statics.
-    lasting
-        True if steps change it.
+    lasting, dissipates
+        True if steps change it; if energy may be lost by that.
     """
 
-    def __init__(self, contacts: Contacts, beams: Sequence[Beam]) -> None:
+    def __init__(self, forces: Forces, beams: Sequence[Beam]) -> None:
+        self._forces, contacts = forces, forces.contacts
         self._contacts = contacts
-        first = contacts.tables.memory.size if contacts.obstacles else 0
+        first = contacts.tables.memory.size if contacts.keeps else 0
         self.values, self.span = np.zeros(first), np.zeros(1)
         if first:
             contacts.tables = contacts.tables._replace(memory=self.values[:first])
         self.lasting = contacts.tables.lasting > 0
+        self.dissipates = contacts.tables.lasting not in (0, TURNS)
 
     @contextmanager
     def lent(self, history: Array | None = None, span: float = 0.0) -> Iterator[None]:
@@ -70,7 +75,7 @@ class Histories:
     def accept(self, u0: Array, u: Array, t: float) -> float:
         """Set the history after an increment in statics from u0 to u; returns what it dissipates.
         """
-        return self._contacts.settle(u, t)
+        return self._forces.settle(u, t)
 
     def of_state(self, state: Any) -> Array | None:
         """The history of a State, as far as the obstacles are those of its scene, or None."""

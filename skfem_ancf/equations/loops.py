@@ -7,7 +7,7 @@ import numpy as np
 
 from ..actions.contact.kernels import of_contacts
 from ..actions.contact.tables import ContactTables, Question
-from ..actions.forces.kernels import Kinds, of_kinds
+from ..actions.forces.kernels import Kinds, of_kinds, turns_of
 from ..beam.kernels import blocks, loops as kernels
 from ..beam.kernels.compiled import CompiledTables, compiled_tables
 from ..beam.kernels.law import LINEAR, point_of
@@ -133,7 +133,7 @@ def custom_evaluate(handle, strain, out):
 
 def run_kinds(tables, what, y, w, factor, out):
     if tables.number > 0:
-        kinds = Kinds(tables.number, tables.ends, tables.numbers)
+        kinds = Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
         _call_kinds(tables.address, (kinds, what, y, w, factor, out))
 
 

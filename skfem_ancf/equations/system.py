@@ -109,7 +109,7 @@ class System:
         self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
                                            for domain in domains)], self.N, self.bandwidth,
                              None if self.constraints.frame is None else chain_places(self.beams))
-        self.histories = Histories(self.forces.contacts, self.beams)
+        self.histories = Histories(self.forces, self.beams)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         if self.damping.stiffness and domains:

@@ -16,6 +16,8 @@ class SpringForces:
     u: Any
     v: Any
     base: Any = None
+    memory: Any = None
+    _columns: Any
 
     def spring_force(self, spring: Any = 0) -> Any:
         """Tension of a spring, or moment of a torsional spring against its rotation.
@@ -38,7 +40,15 @@ class SpringForces:
         >>> round(state.spring_force(), 2)
         10.0
         """
-        found, base = spring_of(self.system.forces.elements, spring), self.base
+        forces, base = self.system.forces, self.base
+        found = spring_of(forces.elements, spring)
+
+        def at(u, v, memory, start=None):
+            with self.system.histories.lent(memory):
+                forces.recall()
+                return spring_force(found, u, v, start)
+
         if self.u.ndim > 1:
-            return np.array([spring_force(found, u, v) for u, v in zip(self.u, self.v)])
-        return spring_force(found, self.u, self.v, None if base is None else base.u)
+            memories = (one if one.size else None for one in self._columns["history"])
+            return np.array([at(*row) for row in zip(self.u, self.v, memories)])
+        return at(self.u, self.v, self.memory, None if base is None else base.u)

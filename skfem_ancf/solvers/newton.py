@@ -152,7 +152,7 @@ class Search:
         memory = system.histories.begin(np.zeros(system.N) if u is None else u,
                                         times[u is not None], memory)
         self._start, self._times, self._memory = u, times, memory
-        if contacts.obstacles:
+        if contacts.keeps:
             _ = self.route  # with the contact history of the start
 
     @cached_property

@@ -21,7 +21,7 @@ from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
-                     POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, ContactTables,
+                     POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, TURNS, ContactTables,
                      Pair, Question, pair_of, transition)
 
 
@@ -82,6 +82,9 @@ class Contacts:
     Arguments are displacements and velocities ``u, v``, shape (N,), and the time ``t``, in statics
     the load factor.
 
+    Their history data include the angles of torsional springs, of which ``springs`` (k, n) are all
+    numbers.
+
     Attributes
     ----------
     obstacles, groups
@@ -89,9 +92,11 @@ class Contacts:
     moving, custom, anchored, augmented
         True if an obstacle moves, has a user-defined shape, has friction, or uses the augmented
         Lagrangian.
+    keeps
+        True if there are history data.
     """
 
-    def __init__(self, elements: Sequence[Any]) -> None:
+    def __init__(self, elements: Sequence[Any], springs: Sequence[Array] = ()) -> None:
         self.obstacles = [element for element in elements if element.groups]
         groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
         self.origin = np.zeros(2)
@@ -104,7 +109,12 @@ class Contacts:
         self.custom = any(one.shape.kind == CUSTOM for one in self.obstacles)
         self.anchored = any(one.friction > 0.0 for one in self.obstacles)
         self.augmented = any(one.method == "augmented" for one in self.obstacles)
-        self.tables = self._tables() if groups else NO_CONTACTS
+        tables = self._tables() if groups else NO_CONTACTS
+        if springs:
+            tables = tables._replace(
+                floats=np.concatenate([tables.floats, *springs]),
+                memory=np.zeros(tables.memory.size + len(springs)), lasting=tables.lasting | TURNS)
+        self.tables, self._springs, self.keeps = tables, len(springs), bool(groups or springs)
         self.put(0.0, 0.0, self.tables.poses)
 
     def _tables(self):
@@ -139,6 +149,12 @@ class Contacts:
         pose = self.obstacles[k].pose(t, rates)
         pose[4:6] -= self.origin
         return pose
+
+    @property
+    def turns(self) -> Array:
+        """Angles of torsional springs at the end of the last step, (k,), a view."""
+        memory = self.tables.memory
+        return memory[memory.size - self._springs:]
 
     # callbacks of kernels
 

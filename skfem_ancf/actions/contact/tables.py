@@ -36,10 +36,10 @@ POSE, POSES = 10, 30
 NOW, BEGIN, END = map(np.int64, range(3))
 #: History data of all pairs: 1 if points stick to anchors; 1 / dt^2 of the last time step; 1 if
 #: points with multipliers are bilateral; for each pair the largest multiplier, then the factor of
-#: hardening; then the data of the points.
+#: hardening; then the data of the points; at the end the angles of torsional springs.
 ANCHORED, RATE, BILATERAL, LARGEST = range(4)
-#: Flags of history data: anchors, multipliers.
-ANCHORS, PRESSURES = 1, 2
+#: Flags of history data: anchors, angles of torsional springs, multipliers.
+ANCHORS, TURNS, PRESSURES = 1, 2, 4
 #: The row of projections of points that is the gap, behind place and slope and the surface.
 GAP = 6
 
@@ -70,7 +70,7 @@ class ContactTables(NamedTuple):
     ``ints`` and ``floats`` are headers of pairs, DOFs, and parameters of points and shapes;
     ``poses`` those of obstacles at the last time; ``memory`` history data. ``moving`` tells whether
     poses depend on time, ``custom`` is the handle for poses and user-defined shapes, ``lasting``
-    the sum of flags of history data: ANCHORS, PRESSURES. ``address`` is that of the compiled
+    the sum of flags of history data: ANCHORS, TURNS, PRESSURES. ``address`` is that of the compiled
     function, 0 in NumPy.
     """
 

@@ -128,7 +128,7 @@ class Control(ForceElement):
             k += 1
         for (name, _), start in zip(self.sections, self._starts):
             y, angle, g = np.append(x[k], start)[:, None], np.empty(1), np.empty((4, 1))
-            turned(np.array([[0.0], [0.0], [1.0], [0.0]]), y, angle)
+            turned(np.array([[0.0], [0.0], [1.0], [0.0]]), y, np.zeros(1), angle)
             turning(y, g)
             out[name] = MeasuredSection(float(angle[0]), float(g[:2, 0] @ v[k]))
             k += 1

@@ -17,7 +17,7 @@ from ...core.source import F1, I1, indices, primitive, shaped, source
 from ..tables import add_products
 from ..contact.kernels import run_contacts
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
-                              ContactTables, Question)
+                              TURNS, ContactTables, Question)
 from ..contact.tables import RESISTING as RUBBING
 
 #: Kinds of elements.
@@ -28,6 +28,7 @@ SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))
 #: Then rows of the vectors, and of the derivatives by them. Numba compiles for each int.
 NUMBERS, VECTORS, BLOCK = map(np.int64, (5, 4, 16))
 TINY = 1e-200
+TURN = 2.0 * np.pi
 #: For the layout of a band where there is none.
 NONE = np.int64(0)
 #: The span of a mean between two states at one time.
@@ -35,11 +36,16 @@ AT_ONCE = 1e-300
 
 
 class Kinds(NamedTuple):
-    """Elements of the kinds above: their number, the first of each kind, and their parameters."""
+    """Elements of the kinds above.
+
+    Their number, the first of each kind, their parameters, and the angles of torsional springs at
+    the end of the last step, with whole turns.
+    """
 
     number: int
     ends: I1
     numbers: F1
+    turns: F1
 
 
 class ForceTables(NamedTuple):
@@ -104,13 +110,20 @@ def _of(kinds, kind, y, w, rows, out):
 
 
 #: Values of ``what``.
-ELASTIC, RESISTING, DERIVATIVES = range(3)
+ELASTIC, RESISTING, DERIVATIVES, TURNED = range(4)
+
+
+@source
+def turns_of(tables):
+    """The angles of torsional springs of the kinds, the last of the history data; a view."""
+    memory = tables.contacts.memory
+    return memory[memory.size - tables.ends[TORSION + 1] + tables.ends[TORSION]:]
 
 
 @primitive("skfem_ancf.equations.loops")
 def run_kinds(tables, what, y, w, factor, out):
     """As :func:`of_kinds`; compiled once for all kernels that call it."""
-    of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)
+    of_kinds(Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables)), what, y, w, factor, out)
 
 
 @source
@@ -210,9 +223,19 @@ def augment_contact(tables, t, u, out):
 
 @source
 def settle_contact(tables, t, span, u0, u1, out):
-    """Update friction anchors at the end of a step; the dissipated energy goes to out, (1,)."""
+    """Update the history data at the end of a step; the dissipated energy goes to out, (1,)."""
     out[0] = 0.0
+    follow_turns(tables, u1)
     add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
+
+
+@source
+def follow_turns(tables, u):
+    """Keep the angles of torsional springs at u, less than half a turn from the last ones."""
+    if tables.contacts.lasting & TURNS:
+        y = np.empty(tables.start.size)
+        vectors_of(tables, u, 1.0, y)
+        _evaluate(tables, np.int64(TURNED), 0.0, 0.0, y, y, y)
 
 
 @source
@@ -276,8 +299,11 @@ def of_kinds(kinds, what, y, w, factor, out):
         elastic(kinds, y, w, out)
     elif what == RESISTING:
         resisting(kinds, y, w, out)
-    else:
+    elif what == DERIVATIVES:
         derivatives(kinds, y, w, factor, out)
+    else:
+        turned(_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, VECTORS, y),
+               kinds.turns, kinds.turns)
 
 
 @source
@@ -290,7 +316,7 @@ def elastic(kinds, y0, y1, F):
         c = 0.5 * p[0, e] * (1.0 - 2.0 * p[1, e] / np.maximum(length, TINY))
         f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
     p, a, b, f = _of(kinds, TORSION, y0, y1, VECTORS, F)
-    mean_moments(p, a, b, f)
+    mean_moments(p, a, b, kinds.turns, f)
     p, a, b, f = _of(kinds, FOUNDATION, y0, y1, VECTORS, F)
     for e in indices(p.shape[1]):
         s0 = pressed(p[2, e], p[3, e], a[0, e], a[1, e])
@@ -305,11 +331,11 @@ def elastic(kinds, y0, y1, F):
 
 
 @source
-def mean_moments(p, a, b, f):
+def mean_moments(p, a, b, last, f):
     """Mean forces of torsional springs between two states."""
     turn = np.empty((2, a.shape[1]))
-    turned(p, a, turn[0])
-    turned(p, b, turn[1])
+    turned(p, a, last, turn[0])
+    turned(p, b, last, turn[1])
     mean_turning(a, b, f)
     for i in indices(4):
         for e in indices(p.shape[1]):
@@ -323,12 +349,13 @@ def pressed(nx, ny, x, y):
 
 
 @source
-def turned(p, y, out):
-    """Angle from e to d minus the one without moment, in (-pi, pi]."""
+def turned(p, y, last, out):
+    """Angle from e to d minus the one without moment, less than half a turn from the last one."""
     for e in indices(out.size):
         cross = y[2, e] * y[1, e] - y[3, e] * y[0, e]
         dot = y[0, e] * y[2, e] + y[1, e] * y[3, e]
-        out[e] = np.arctan2(p[2, e] * cross - p[3, e] * dot, p[2, e] * dot + p[3, e] * cross)
+        angle = np.arctan2(p[2, e] * cross - p[3, e] * dot, p[2, e] * dot + p[3, e] * cross)
+        out[e] = angle + TURN * np.rint((last[e] - angle) / TURN)
 
 
 @source
@@ -381,7 +408,7 @@ def derivatives(kinds, y, w, factor, D):
         s[1, e] = c * d[0, e] * d[1, e]
         s[4, e] = c * d[0, e] * d[1, e]
     p, d, v, s = _of(kinds, TORSION, y, w, BLOCK, D)
-    moment_derivatives(p, d, factor, s)
+    moment_derivatives(p, d, kinds.turns, factor, s)
     p, d, v, s = _of(kinds, FOUNDATION, y, w, BLOCK, D)
     for e in indices(p.shape[1]):
         apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
@@ -399,11 +426,11 @@ def derivatives(kinds, y, w, factor, D):
 
 
 @source
-def moment_derivatives(p, d, factor, s):
+def moment_derivatives(p, d, last, factor, s):
     """Derivatives of torsional springs."""
     g, turn = np.empty(d.shape), np.empty(d.shape[1])
     turning(d, g)
-    turned(p, d, turn)
+    turned(p, d, last, turn)
     for i in range(4):
         for j in range(4):
             for e in indices(p.shape[1]):
@@ -424,7 +451,7 @@ def potential(tables: ForceTables, y: np.ndarray) -> float:
     total = 0.5 * np.sum(p[0] * (np.hypot(d[0], d[1]) - p[1]) ** 2)
     p, d = _part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, VECTORS, y)
     angle = np.empty(p.shape[1])
-    turned(p, d, angle)
+    turned(p, d, turns_of(tables), angle)
     total += 0.5 * np.sum(p[0] * angle**2)
     p, d = _part(tables, FOUNDATION, NUMBERS, tables.numbers), _part(tables, FOUNDATION, VECTORS, y)
     s = pressed(p[2], p[3], d[0], d[1])

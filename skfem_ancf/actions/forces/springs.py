@@ -127,8 +127,9 @@ class TorsionalSpring(ForceElement):
     """A torsional spring on a section, with a parallel dashpot.
 
     The moment is ``k (phi - angle) + damping dphi / dt``, phi the rotation from the reference
-    configuration relative to the ground or another section, taken in (-pi, pi] about ``angle``; or
-    ``k(phi - angle) + damping(dphi / dt)`` where these are functions.
+    configuration relative to the ground or another section; or ``k(phi - angle) + damping(dphi /
+    dt)`` where these are functions. At the start phi is taken in (-pi, pi] about ``angle``. Motions
+    and runs count whole turns, from steps or increments of less than half a turn.
 
     Parameters
     ----------
@@ -159,6 +160,9 @@ class TorsionalSpring(ForceElement):
                              "section is known up to whole turns only. Of a spring wound by "
                              "more, add the moment of the turns, 2 pi k each, by scene.moment")
 
+    #: The angle at the end of the last step.
+    _last = 0.0
+
     def bind(self, layout: Layout) -> list[Vector]:
         self._d = section(layout, self.beam, self.at)[1]
         self._e = Vector(self._d.start) if self.other is None else section(layout, *self.other)[1]
@@ -172,14 +176,21 @@ class TorsionalSpring(ForceElement):
         return [Part(TORSION, self._d, self._e, (self.k, self.damping, *self.numbers[2:]))]
 
     @property
+    def key(self) -> Array:
+        """Numbers that differ for springs on other sections or with other free angles, (n,)."""
+        links = [np.concatenate([np.ravel(one.dofs), np.ravel(one.weights)])
+                 for one in (self._d, self._e)]
+        return np.concatenate([*links, self.numbers])
+
+    @property
     def numbers(self) -> tuple[float, ...]:
         """Parameters of the kernel of angles."""
         return 0.0, 0.0, float(np.cos(self._start)), float(np.sin(self._start)), 0.0
 
-    def _angle(self, x):
-        """The angle for directions d and e, (2, 2)."""
+    def angle_of(self, x: Array) -> float:
+        """The angle for directions d and e, (2, 2), less than half a turn from the last one."""
         out = np.empty(1)
-        turned(np.array(self.numbers)[:, None], x.reshape(4, 1), out)
+        turned(np.array(self.numbers)[:, None], x.reshape(4, 1), np.array([self._last]), out)
         return float(out[0])
 
     @staticmethod
@@ -191,25 +202,25 @@ class TorsionalSpring(ForceElement):
 
     def amount(self, x: Array, v: Array) -> float:
         """The moment against the rotation."""
-        return float(self.k(self._angle(x)) + self.damping(float(np.sum(self._turning(x) * v))))
+        return float(self.k(self.angle_of(x)) + self.damping(float(np.sum(self._turning(x) * v))))
 
     def rate(self, x: Array) -> Array:
         """Derivative of the moment at rest by both directions, (2, 2)."""
-        return self.k.slope(self._angle(x)) * self._turning(x)
+        return self.k.slope(self.angle_of(x)) * self._turning(x)
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         return -self.amount(x, v) * self._turning(np.asarray(x))
 
     def potential(self, x: Array) -> float:
-        return self.k.potential(self._angle(x))
+        return self.k.potential(self.angle_of(x))
 
     def gain(self, x: Array, y: Array, t: float) -> float:
-        return self.k.work(self._angle(x), self._angle(y))
+        return self.k.work(self.angle_of(x), self.angle_of(y))
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         g = np.empty((4, 1))
         mean_turning(x.reshape(4, 1), y.reshape(4, 1), g)
-        return -self.k.mean(self._angle(x), self._angle(y)) * g.reshape(2, 2)
+        return -self.k.mean(self.angle_of(x), self.angle_of(y)) * g.reshape(2, 2)
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         g = self._turning(np.asarray(x))

@@ -16,7 +16,7 @@ from .base import ForceElement, Part
 from .control import Control
 from .springs import TorsionalSpring
 from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
-                      potential, run_kinds, turned, vectors_of)
+                      potential, run_kinds, vectors_of)
 
 #: Kinds that the kernels know.
 KINDS = 4
@@ -68,7 +68,10 @@ class Forces:
                      for i, j, _, _ in self._couplings]
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
-        self.contacts = Contacts(self.elements)
+        # those of user-defined laws first, then in the order of the parts
+        self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
+                               key=lambda e: -1 if e in self.custom else self.rows_of(e)[0])
+        self.contacts = Contacts(self.elements, [e.key for e in self._springs])
         self.resists = (any(e.resists for e in self.custom) or any(map(_resists, self.parts))
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
@@ -175,6 +178,7 @@ class Forces:
     def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
         """Potential of all elements; zero for those without one."""
         y = self.vectors(tables, u)
+        self.recall()
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices))
@@ -234,17 +238,21 @@ class Forces:
         return self.part_forces(tables, base, 0.0 * base) + np.einsum(
             "ijk,jk->ik", D[:2, :2], w[:2 * n].reshape(2, n))
 
-    def turns(self, u: Array) -> Array:
-        """Angles of torsional springs relative to the free angles, in (-pi, pi]."""
-        springs = [(part.d, part.e, part.numbers) for part in self.parts
-                   if part.kind == TORSION and part.numbers[0] > 0.0]
-        springs += [(*one.links, one.numbers) for one in self.custom
-                    if isinstance(one, TorsionalSpring)]
-        out = np.empty((len(springs), len(u)))
-        for row, (*links, numbers) in zip(out, springs):
-            y = [(one.start + np.sum(u[:, one.dofs] * one.weights, axis=2)).T for one in links]
-            turned(np.repeat(np.reshape(numbers, (-1, 1)), len(u), axis=1), np.concatenate(y), row)
-        return out
+    def recall(self) -> None:
+        """Tell the torsional springs the angles of the history data."""
+        for spring, angle in zip(self._springs, self.contacts.turns):
+            spring._last = float(angle)
+
+    def angles(self, u: Array) -> Array:
+        """Angles of torsional springs at u, less than half a turn from the last ones; (k,)."""
+        self.recall()
+        return np.array([one.angle_of(np.array([link(u) for link in one.links]))
+                         for one in self._springs])
+
+    def settle(self, u: Array, t: float) -> float:
+        """Update the history data at the end of an increment; returns the work of friction."""
+        self.contacts.turns[:] = self.angles(u)
+        return self.contacts.settle(u, t)
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
@@ -274,8 +282,9 @@ class Forces:
 
         ``what`` is 0: the mean force at zero velocity between positions a and b; 1: the force at a
         due to velocities b; 2: the derivatives by positions, plus a factor times those by
-        velocities.
+        velocities; 3: keep the angles of torsional springs at a.
         """
+        self.recall()
         for element, (rows, places) in zip(self.custom, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
             if what == 0:
@@ -284,6 +293,9 @@ class Forces:
                 if element.resists and np.any(y):
                     out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
                                           - element.force(x, 0.0 * y, t))
+            elif what == 3:
+                if isinstance(element, TorsionalSpring):
+                    self.contacts.turns[self._springs.index(element)] = element.angle_of(x)
             else:
                 found = np.array(element.stiffness(x, y, t))
                 if element.resists and factor != 0.0:
