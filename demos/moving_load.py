@@ -52,7 +52,8 @@ def krylov(speed, t):
     rotary = 1 + (n * np.pi * height / span)**2 / 12               # by rotary inertia
     passing, own = n * np.pi * speed / span, (n * np.pi / span)**2 * np.sqrt(EI / mass / rotary)
     swing = (np.sin(passing * t) - passing / own * np.sin(own * t)) / (own**2 - passing**2)
-    return np.sum(2 * load / (mass * rotary * span) * swing * np.sin(n * np.pi / 2), axis=0) / static
+    swing *= 2 * load / (mass * rotary * span) / static
+    return np.sum(swing * np.sin(n * np.pi / 2), axis=0)
 
 
 ratios = np.array([0.15, 0.3, 0.45, 0.6, 0.75, 0.95])

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, MeshError, ModelWarning, RigidBody, Scene, StVenantKirchhoff)
+                        MeshBeam, MeshError, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.forces import ForceElement, point
 from skfem_ancf.actions.forces.kernels import add_elastic_force, add_resisting_force
 from skfem_ancf.core.quadrature import gauss

@@ -123,7 +123,8 @@ def turns_of(tables):
 @primitive("skfem_ancf.equations.loops")
 def run_kinds(tables, what, y, w, factor, out):
     """As :func:`of_kinds`; compiled once for all kernels that call it."""
-    of_kinds(Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables)), what, y, w, factor, out)
+    kinds = Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
+    of_kinds(kinds, what, y, w, factor, out)
 
 
 @source
