@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                         ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff)
@@ -124,3 +125,72 @@ def test_smooth_functions_do_not_jump():
         lambda x: np.array([x[0], np.sin(9.0 * x[0])]))
     state = scene.solve_static()
     assert list(state.recovery().forces.cuts) == [0.0, 16.0]
+
+
+# jumps inside elements
+
+
+def patch(x):
+    """A load from 0.1234 to 0.4321, which grows along x, in elements of 0.2."""
+    return np.array([0.0 * x[0], -(1.0 + x[0]) * ((x[0] > 0.1234) & (x[0] < 0.4321))])
+
+
+@pytest.mark.parametrize("kind", ["force", "force in time", "traction"])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCF(3), ElementBeamCable(3),
+                                     ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=repr)
+def test_a_load_may_begin_and_end_inside_elements(element, angle, kind):
+    """Its section forces are integrals of it, in linear and in static solutions."""
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 6), height=H, angle=angle)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    scene = Scene(Beam(mesh, element, StVenantKirchhoff(1e9, 0.3), B)).clamp("left")
+
+    def turned(x):
+        return np.tensordot(turn, patch(np.tensordot(turn.T, x, 1)), 1)
+
+    if kind == "traction":
+        scene.traction("top", lambda x: turned(x) / B)
+    elif kind == "force":
+        scene.line_load(turned)
+    else:
+        scene.line_load(lambda x, t: t * turned(x))
+    x = np.array([0.0, 0.1, 0.123, 0.13, 0.25, 0.35, 0.41, 0.43, 0.44, 0.8])
+    a, b = np.clip(x, 0.1234, 0.4321), 0.4321
+    Q = (b + b**2 / 2) - (a + a**2 / 2)
+    M = -((b**2 / 2 + b**3 / 3) - (a**2 / 2 + a**3 / 3) - x * Q)
+    for state, rtol in ((scene.solve_linear(), 1e-10), (scene.solve_static(), 1e-5)):
+        assert state.recovered == {0: ""}
+        found = state.resultants(turn @ np.array([x, 0.0 * x]))
+        assert_allclose(found.M, M, atol=rtol * np.max(-M))
+        assert_allclose(np.abs(found.Q), Q, atol=rtol * np.max(Q))
+        assert_allclose(turn.T @ state.reactions("left").force, [0.0, Q[0]], atol=1e-9 * Q[0])
+
+
+def test_the_stress_under_a_load_that_ends_inside_an_element():
+    """S_yy at the face, and S_xx by the bending moment on both sides of the place."""
+    q, a = 50.0, 0.53
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 9), height=H)
+    scene = Scene(Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(1e9, 0.0), B)).clamp("left")
+    scene.traction("top", lambda x: np.array([0.0 * x[0], -q * (x[0] < a)]))
+    x = np.array([0.3, 0.45, 0.527, 0.533, 0.6])
+    S = scene.solve_linear().stress(np.array([x, 0.0 * x + H / 2]))
+    assert_allclose(S[1], -q * (x < a), atol=2e-2 * q)
+    bent = 0.5 * q * B * np.maximum(a - x, 0.0)**2 / (B * H**3 / 12) * H / 2
+    assert_allclose(S[0], bent, atol=1e-3 * bent[0] + 0.25 * q)
+
+
+def test_a_load_that_moves_over_a_bridge_is_right_at_every_instant():
+    """A patch of 0.17 on a hinged beam: reactions and bending moment by the lever."""
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 5), height=0.02)
+    beam = Beam(mesh, ElementBeamCable(3), StVenantKirchhoff(1e9, 0.3), 0.02)
+    scene = Scene(beam).pin("left").fix("right", "r^2").line_load(
+        lambda x, t: np.array([0.0 * x[0], -1.0 * (np.abs(x[0] - t) < 0.085)]))
+    history = scene.run(np.linspace(0.1, 0.9, 8), increments=1)
+    centre, size = history.t[1:], 0.17
+    expected = np.array([size * (1.0 - centre), size * centre]).T
+    found = np.array([history.reactions(end).force[1:, 1] for end in ("left", "right")]).T
+    assert_allclose(found, expected, rtol=1e-6)
+    M = history.resultants((0.5, 0)).M[1:]
+    inside = np.array([quad(lambda s: np.maximum(0.5 - s, 0.0), c - 0.085, c + 0.085, points=[0.5])[0]
+                       for c in centre])
+    assert_allclose(M, expected[:, 0] * 0.5 - inside, rtol=1e-5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +16,11 @@ from ..beam.kernels.section import beam_gradients
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.points import Points
 from ..beam.rigid import RigidBody, on_body
+from ..beam.surfaces import add_nodal
 from ..core.errors import ask_field, require_finite
 from ..core.quadrature import gauss
 from ..core.types import Array, TimeFunction
+from ..sections.jumps import Pieces, pieces
 from ..mesh.places import as_point
 from .item import Item
 from .loads import DeadLoad, Load, number_at
@@ -134,58 +136,47 @@ class LineLoad(Load):
         self.per_length = force if callable(force) else require_finite("force", force, (2,))
 
     def bind(self, beam: Beam) -> Load:
-        points, given = _axis_points(beam, self.chains), self.per_length
+        given = self.per_length
         if of_place_and_time(given):
-            return LineLoadInTime(beam, points, given, self.amplitude)
-        values = (ask_field("force(x)", given, points.x) if callable(given) else
-                  np.broadcast_to(given[:, None, None], points.x.shape))
-        vector, distribution = points.load(beam, values)
+            return LineLoadInTime(beam, self.chains, given, self.amplitude)
+        vector, distribution = _along_axis(beam, self.chains, given, "force(x)")
         return DeadLoad(beam, vector, self.amplitude, distribution)
 
 
-class _AxisPoints(NamedTuple):
-    """Quadrature points of the axis.
-
-    xi (np,), positions (2, ne, np), lengths per xi and weights, zero where nothing acts, (ne, np),
-    and the local functions, (nb, ne, np).
-    """
-
-    xi: Array
-    x: Array
-    speed: Array
-    lengths: Array
-    functions: Array
-
-    def load(self, beam: Beam, values: Array) -> tuple[Array, Distribution]:
-        """Force (N,) of forces per length at the points, (2, ne, np), and its distribution."""
-        vector = beam.kernel.scatter(
-            np.einsum("kep,iep->eki", self.functions, self.lengths * values))
-        return vector, Distribution(sampled=(Sampled(AXIS, np.arange(len(self.lengths)), self.xi,
-                                               values * self.speed),))
-
-
-def _axis_points(beam, chains):
-    """Quadrature points on some chains of elements, or on all."""
+def _along_axis(beam, chains, given, name):
+    """Force (N,) and distribution of a force per length, on some chains of elements or on all."""
     mapping, (xi, w) = beam.mesh.mapping(), gauss(beam.element.axis_degree + 5)
-    X = np.array([xi, 0.5 + 0.0 * xi])
-    speed = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))
-    if chains is not None:
-        speed = speed * np.isin(beam.mesh.chains, chains)[:, None]
-    return _AxisPoints(xi, np.asarray(mapping.F(X)), speed, speed * w,
-                       beam.element.of_mesh(mapping, X)[0])
+    e = np.arange(beam.mesh.nelements)
+    e = e if chains is None else e[np.isin(beam.mesh.chains, chains)]
+    part, size = Pieces(e, np.zeros(len(e)), np.ones(len(e))), np.ones((len(e), 1))
+
+    def at(X, e):
+        return ask_field(name, given, mapping.F(X, e))
+
+    if callable(given):
+        part = pieces(at, e)
+        size = (part.end - part.begin)[:, None]
+    x = part.begin[:, None] + size * xi
+    X = np.array([x, 0.5 + 0.0 * x])
+    values = at(X, part.elements) if callable(given) else given[:, None, None]
+    values = values * np.hypot(*mapping.DF(X, part.elements)[:, 0])
+    vector = np.zeros(beam.N)
+    functions = beam.element.of_mesh(mapping, X, part.elements)[0]
+    add_nodal(beam, part.elements, np.einsum("kep,iep->eik", values * size * w, functions), vector)
+    return vector, Distribution(sampled=(Sampled(
+        AXIS, part.elements, xi, values, parts=np.array([part.begin, part.end])),))
 
 
 class LineLoadInTime(TimedLoad):
-    """A time-dependent force per length at the quadrature points of a beam, bound."""
+    """A time-dependent force per length of a beam, bound."""
 
-    def __init__(self, beam: Beam, points: Any, force: Any,
+    def __init__(self, beam: Beam, chains: Any, force: Any,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
-        self.points, self.per_length = points, force
+        self.chains, self.per_length = chains, force
 
     def at(self, t: float) -> tuple[Array, Distribution]:
-        values = ask_field("force(x, t)", lambda x: self.per_length(x, t), self.points.x)
-        return self.points.load(self.beam, values)
+        return _along_axis(self.beam, self.chains, lambda x: self.per_length(x, t), "force(x, t)")
 
 
 def of_place_and_time(force: Any) -> bool:

@@ -17,7 +17,7 @@ from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
-from ..beam.surfaces import add_nodal, surfaces_of
+from ..beam.surfaces import add_nodal, divided, surfaces_of
 from ..core.errors import (AncfError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_finite_scalar, require_function,
                            require_slope, shown, warn)
@@ -328,9 +328,14 @@ class Traction(Load):
         t, vector, mapping = self.t, np.zeros(beam.N), beam.mesh.mapping()
         found = surfaces_of(beam, self.boundary, 7 if callable(t) else beam.element.facet_points)
         forces: list[Array] = []
+
+        def at(X, e):
+            return ask_field("t(x)", t, mapping.F(X, e))
+
+        if callable(t):
+            found = [divided(beam, one, at) for one in found]
         for one in found:
-            density = ask_field("t(x)", t, mapping.F(one.X, one.elements)) if callable(t) else (
-                t[:, None, None])
+            density = at(one.X, one.elements) if callable(t) else t[:, None, None]
             functions = beam.element.of_mesh(mapping, one.X, one.elements)[0]
             forces.append(density * one.areas)
             add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions, forces[-1]), vector)

@@ -21,6 +21,9 @@ from .kinematics import direction_weights, probe_reference
 #: Points closer to a node than this fraction of an element are at the node.
 SNAP = 1e-5
 
+#: The largest xi inside an element of a beam.
+LAST = 1.0 - 1e-9
+
 #: Tolerance of a shape function of ``r``, which is flat at the nodes.
 FLAT = 1e-11
 
@@ -38,7 +41,8 @@ class Sampled:
 
     It acts on ``where`` (BOTTOM, TOP, AXIS or BODY) of ``elements`` (n,). ``values`` at the points
     ``xi`` (p,) are force per xi, (2, ..., n, p); for a body, with points ``eta`` (q,) across, force
-    per volume, (2, ..., n, p, q).
+    per volume, (2, ..., n, p, q). ``parts`` (2, n) are begin and end of parts of elements, in
+    order, between which the points lie; None for whole elements.
     """
 
     where: int
@@ -46,6 +50,7 @@ class Sampled:
     xi: Array
     values: Array
     eta: Array | None = None
+    parts: Array | None = None
 
     def times(self, factor: Any) -> Sampled:
         """The density times a factor or several, shape (...)."""
@@ -54,12 +59,19 @@ class Sampled:
 
     def at(self, e: Array, xi: Array, eta: Array, nelements: int) -> Array:
         """The density (2, ..., n, k) on sections e, xi (n,) at points eta (n, k) across them."""
-        row = np.full(nelements, -1)
-        row[self.elements] = np.arange(len(self.elements))
-        along = lagrange(self.xi, xi) * (row[e] >= 0)[:, None]
+        if self.parts is None:
+            rows = np.full(nelements, -1)
+            rows[self.elements] = np.arange(len(self.elements))
+            row, here = rows[e], xi
+        else:
+            begin, end = self.parts
+            row = np.searchsorted(self.elements + begin, e + np.minimum(xi, LAST), "right") - 1
+            row[self.elements[row] != e] = -1
+            here = (xi - begin[row]) / (end - begin)[row]
+        along = lagrange(self.xi, here) * (row >= 0)[:, None]
         if self.eta is None:
-            return np.einsum("...np,np->...n", self.values[..., row[e], :], along)[..., None]
-        here = np.einsum("...npq,np->...nq", self.values[..., row[e], :, :], along)
+            return np.einsum("...np,np->...n", self.values[..., row, :], along)[..., None]
+        here = np.einsum("...npq,np->...nq", self.values[..., row, :, :], along)
         if np.all(eta == eta[:1]):
             return here @ lagrange(self.eta, eta[0]).T
         across = lagrange(self.eta, eta.ravel()).reshape(eta.shape + (-1,))
@@ -68,7 +80,8 @@ class Sampled:
     def changes(self, nelements: int) -> Array:
         """Axial coordinates at which it begins or ends."""
         on = np.isin(np.arange(nelements), self.elements)
-        return np.nonzero(on[1:] != on[:-1])[0] + 1.0
+        inside = [] if self.parts is None else (self.elements + self.parts[0])[self.parts[0] > 0]
+        return np.append(np.nonzero(on[1:] != on[:-1])[0] + 1.0, inside)
 
     def jumps(self, nelements: int) -> Array:
         """Axial coordinates of jumps by more than a tenth of the largest value.

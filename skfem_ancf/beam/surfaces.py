@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from ..core.quadrature import gauss
 from ..core.types import Array, Place
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.places import facets_of
+from ..sections.jumps import pieces
 from .beam import Beam
 from .distribution import Facets, station_of_node
 
@@ -54,9 +55,7 @@ def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
         on = found[(found >= first) & (found < first + ne)]
         if len(on):
             X = np.array([rule[0], np.full(points, 0.5 * side)])
-            width = across.layers[0].width if across.plain else (
-                across.face(side // TOP, X, on - first))
-            out.append(_surface(beam, side, on, on - first, X, width * rule[1]))
+            out.append(_along(beam, side, on, on - first, X, rule[1]))
     for side, on, elements in _sections(mesh, found[found < n]):
         for layer, (eta, w) in [(None, rule)] if across.plain else (
                 across.rules(beam.element.order + 3)):
@@ -64,6 +63,17 @@ def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
             width = across.layers[0].width if layer is None else across.breadth(layer, X, elements)
             out.append(_surface(beam, side, on, elements, X, width * w))
     return out
+
+
+def divided(beam: Beam, one: Surface, ask: Callable[[Array, Array], Array]) -> Surface:
+    """A surface in parts, where a function jumps inside elements; ``ask`` as for pieces()."""
+    if one.side not in (BOTTOM, TOP):
+        return one
+    part, (x, w) = pieces(ask, one.elements, 0.5 * one.side), gauss(one.X.shape[-1])
+    size = (part.end - part.begin)[:, None]
+    xi = part.begin[:, None] + size * x
+    return _along(beam, one.side, part.elements + one.facets[0] - one.elements[0], part.elements,
+                  np.array([xi, np.full(xi.shape, 0.5 * one.side)]), size * w)
 
 
 def groups_of(mesh: MeshBeam, surfaces: Sequence[Surface]
@@ -88,6 +98,12 @@ def _sections(mesh, nodes):
     for side, on, of in ((RIGHT, nodes[ends], right), (LEFT, nodes[~ends], left)):
         if len(on):
             yield side, on, of[on]
+
+
+def _along(beam, side, facets, elements, X, weights):
+    across = beam.across
+    width = across.layers[0].width if across.plain else across.face(side // TOP, X, elements)
+    return _surface(beam, side, facets, elements, X, width * weights)
 
 
 def _surface(beam, side, facets, elements, X, weights):

@@ -20,7 +20,7 @@ from ..core.errors import AncfError
 from ..core.quadrature import gauss, lagrange
 from ..core.types import Array
 from ..mesh.mapping import MappingBeam, cross
-from ..sections.jumps import beside, jumps
+from ..sections.jumps import beside, jumps, pieces
 
 #: Quadrature points along an element for its loads.
 ALONG = 8
@@ -135,8 +135,12 @@ class SectionForces:
         self._points = [(e, float(station), factor * f)
                         for factor, load in loads for e, xi, f in load.points
                         if (station := _snapped(e + xi)) % 1.0]
-        self._balance(u)
         self._cut(loads, stations)
+        self._divide()
+        self._balance(u)
+        inside = self._unknown.astype(int)
+        for e in inside:
+            self._pass_on(e, inside)
         self._check()
 
     # densities of force
@@ -173,10 +177,21 @@ class SectionForces:
             on = breadth * on
         return at, on + self.sampled(at, side)
 
+    def _divide(self):
+        """Divide elements at cuts inside them: ends of the parts, (ne, parts + 1), some empty."""
+        inside = self.cuts[(self.cuts % 1.0) != 0]
+        e = inside.astype(int)
+        order = np.arange(len(e)) - np.searchsorted(e, e)
+        self._ends = np.ones((self.beam.mesh.nelements, 3 + np.max(order, initial=-1)))
+        self._ends[:, 0] = 0.0
+        self._ends[e, 1 + order] = inside % 1.0
+
     def _balance(self, u):
         """Set section forces at both ends of each element, and the loads along it."""
         beam, ne, (x, w) = self.beam, self.beam.mesh.nelements, gauss(ALONG)
-        e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
+        size = np.diff(self._ends)
+        xi = (self._ends[:, :-1, None] + size[..., None] * x).ravel()
+        e, w = np.repeat(np.arange(ne), ALONG * size.shape[1]), (size[..., None] * w).ravel()
         parts = [self.face(side, e, xi) for side in self.sides]
         for layer, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
             inside = Sections(beam, e, xi, eta, self.lifted)
@@ -190,8 +205,8 @@ class SectionForces:
         force = sum(f.sum(axis=-1) for _, f in parts)
         moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
         self._r, self._force, self._moment = (
-            x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
-        load = sum(at.nodal(f * np.tile(w, ne)[:, None]) for at, f in parts)
+            x.reshape(x.shape[:-1] + (ne, -1)) for x in (axis[..., 0], force, moment))
+        load = sum(at.nodal(f * w[:, None]) for at, f in parts)
         for e, _, f in self._points:
             load[e] = load[e] + f
         internal = (beam.kernel.small_forces if self.small else beam.kernel.forces)(u)
@@ -234,9 +249,11 @@ class SectionForces:
         side = np.full(len(e), 0.5)
         for cut in self._unknown:
             side[e == int(cut)] = np.where(begin[e == int(cut)] >= cut, 1.0, 0.0)
-        x, w = gauss(ALONG)
-        inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
-        till = xi[:, None] * np.einsum("q,nqk->nk", w, inner)  # the integral from 0 to xi
+        (x, w), starts, size = gauss(ALONG), self._ends[e, :-1], np.diff(self._ends[e])
+        z = np.clip((xi[:, None] - starts) / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
+        inner = lagrange(x, np.outer(z, x).ravel()).reshape(*z.shape, ALONG, ALONG)
+        till = np.einsum("np,q,npqk->npk", size * z, w, inner)  # the integral from 0 to xi
+        till, w = (np.reshape(v, (len(e), -1)) for v in (till, size[..., None] * w))
         r = Sections(self.beam, e, xi).field(self.q)[..., 0]
         f, m = self._force[:, e], self._moment[e]
         turning = cross(self._r[:, e] - r[..., None], f) + m
@@ -272,8 +289,10 @@ class SectionForces:
             for side, face in enumerate(load.faces):
                 stations += list(np.nonzero(face[1:] != face[:-1])[0] + 1.0)
                 if callable(load.traction) and np.any(face):
-                    stations += list(jumps(partial(_traction, self.beam, load.traction), ne,
-                                           np.array([float(side)])))
+                    ask = partial(_traction, self.beam, load.traction)
+                    stations += list(jumps(ask, ne, np.array([float(side)])))
+                    part = pieces(ask, np.flatnonzero(face), float(side))
+                    stations += list(part.elements + part.begin)
         for s in self._sampled:
             stations += [*s.changes(ne), *s.jumps(ne)]
         for _, eigen in self.eigen:
@@ -283,9 +302,6 @@ class SectionForces:
         #: Stations of unknown forces inside elements.
         self._unknown = np.unique(self._acted[(self._acted % 1.0 != 0)
                                               & ~np.isin(self._acted, known)])
-        inside = self._unknown.astype(int)
-        for e in inside:
-            self._pass_on(e, inside)
 
     def _pass_on(self, e, inside):
         """Take the end forces of an element with an unknown point load from its neighbours."""

@@ -12,7 +12,7 @@ from ..core.caching import cached_property
 from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array
 from ..mesh.mapping import cross
-from ..sections.jumps import beside
+from ..sections.jumps import SIDE, beside
 from .section_forces import NotFound, Sections
 from .sections_along import SectionsAlong
 
@@ -72,6 +72,9 @@ class Segment:
         """Set points, stiffness and loads of the sections."""
         r, across, mapping = self.recovery, self.beam.across, self.beam.mesh.mapping()
         self.s = r.arc.at(e, xi)
+        moved = np.zeros(len(xi))  # loads may jump at ends inside elements
+        moved[0], moved[-1] = SIDE, -SIDE
+        xi = xi + moved * ((xi > 0.0) & (xi < 1.0))
         self.points = at = r.points(e, xi)
         sections = Sections(self.beam, e, xi, at.eta, self.forces.lifted, r.geometry)
         axis = Sections(self.beam, e, xi, mapping=r.geometry)
