@@ -1,10 +1,10 @@
-"""Forces on the face of a cable: fixed and moving ones have the couple of their distance."""
+"""Forces on the face of a cable: fixed, moving and follower forces have the couple of their distance."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf import Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.actions.point_force import PointForce
 
 H, E = 0.1, 2e9
@@ -92,3 +92,69 @@ def test_energy_is_conserved():
 def test_it_is_drawn_and_found():
     scene = cantilever().add(PointForce((1, 0), at=(0.5, H / 2)))
     assert scene.plot() is not None
+
+
+# follower forces
+
+
+@pytest.mark.parametrize("angle", [0.0, 2.1])
+@pytest.mark.parametrize("Y, F, x", [(H / 2, (-150.0, 0.0), 1.0), (-H / 2, (60.0, 250.0), 0.63),
+                                     (0.3 * H, (100.0, -200.0), 0.5)])
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamCable(3), ElementBeamANCF(2)],
+                         ids=repr)
+def test_a_follower_force_on_a_face_keeps_its_lever(element, Y, F, x, angle):
+    """Moment and force of the clamp are those of the turned force at its place, as it lies."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 17), H, angle=angle)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    cable = not element.order
+    scene = Scene(Beam(mesh, element, StVenantKirchhoff(E, 0.0, 1000.0), width=H)).clamp("left")
+    scene.moment("right", 1.2 * EI)
+    state = scene.follower_force(turn @ F, at=turn @ (x, Y)).solve_static()
+    r = state.position(turn @ (x, 0.0 if cable else Y))
+    a, b = (turn.T @ state.position(turn @ (z, 0.0)) for z in (x - 1e-5, min(x + 1e-5, 1.0)))
+    a = np.arctan2(b[1] - a[1], b[0] - a[0])
+    if cable:
+        r = r + Y * turn @ [-np.sin(a), np.cos(a)]
+    c, s = np.cos(a), np.sin(a)
+    force = turn @ [c * F[0] - s * F[1], s * F[0] + c * F[1]]
+    assert a > 0.4
+    clamp = state.reactions("left")
+    assert_allclose(clamp.force, -force, atol=5e-5 * np.hypot(*F))
+    assert_allclose(clamp.moment, -1.2 * EI - (r[0] * force[1] - r[1] * force[0]),
+                    atol=5e-5 * 1.2 * EI)
+
+
+def test_the_couple_of_a_follower_force_bends_by_the_closed_form():
+    """A couple -F h / 2 at x, in linear theory."""
+    F, x = 20.0, 0.5
+    linear = cantilever().follower_force((F, 0), at=(x, H / 2)).solve_linear()
+    tip = -F * H / 2 * x * (2 - x) / (2 * EI)
+    assert_allclose(linear.displacement((1, 0)), [F * x / EA, tip], rtol=1e-9)
+    found = linear.resultants([(0.1, 0), (0.45, 0), (0.9, 0)])
+    assert found.recovered
+    assert_allclose(found.M, [-F * H / 2, -F * H / 2, 0.0], atol=1e-9 * F * H)
+
+
+@pytest.mark.parametrize("at", [(0.63, -H / 2), (1.0, 0.2 * H)])
+def test_the_tangent_of_a_follower_force_on_a_face(at):
+    load, = cantilever().follower_force((30.0, -50.0), at=at).loads
+    rng = np.random.default_rng(1)
+    u, d = 0.1 * rng.standard_normal((2, load.beam.N))
+    i, j, v = load.stiffness(u)
+    K = np.zeros((load.beam.N, load.beam.N))
+    np.add.at(K, (i, j), v)
+    slope = (load.force(u + 1e-6 * d) - load.force(u - 1e-6 * d)) / 2e-6
+    assert_allclose(K @ d, slope, atol=1e-7 * np.abs(slope).max())
+
+
+def test_a_push_along_a_face_moves_the_angular_momentum_of_a_free_cable():
+    """Force times distance from the centre of mass, while the force turns with the end."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), H)
+    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(1e3 * E, 0.0, 1000.0), width=H)
+    F, mass = 400.0, 1000.0 * H**2
+    history = Scene(beam).follower_force((F, 0.0), at=(0.5, H / 2)).integrate(0.2, 1e-3)
+    inertia = mass / 12 * (1 + H**2)
+    angle = -0.5 * F * H / 2 / inertia * history.t**2
+    assert abs(angle[-1]) > 0.4
+    ends = history.displacement((1, 0)) - history.displacement((0, 0)) + [1.0, 0.0]
+    assert_allclose(np.arctan2(ends[:, 1], ends[:, 0]), angle, atol=2e-4)

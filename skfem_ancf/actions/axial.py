@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, Distribution, Sampled
-from ..beam.kinematics import probe
+from ..beam.kinematics import probe_reference
 from ..beam.kernels.section import beam_gradients
+from ..beam.masses import TURN
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.points import Points
 from ..beam.rigid import RigidBody, on_body
@@ -25,12 +26,14 @@ from ..mesh.places import as_point
 from .item import Item
 from .loads import DeadLoad, Load, number_at
 from .moving import TimedLoad
+from .off_axis import is_off_axis
 
 
 class FollowerForce(Load):
     """A point force that rotates with the tangent of the axis, or with a rigid body.
 
-    It has no potential and may cause flutter.
+    It has no potential and may cause flutter. On the face of a cable it has the couple of its
+    distance from the axis.
 
     Parameters
     ----------
@@ -55,6 +58,7 @@ class FollowerForce(Load):
     _slopes: Any
     _start: Any
     _turn: Any
+    _couple: float = 0.0
 
     def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
                  amplitude: TimeFunction = None, line: int | None = None) -> None:
@@ -75,7 +79,8 @@ class FollowerForce(Load):
             found = Points([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
                                                          self.line, ask=True).parts[0]
             e, X = int(found.e[0]), found.X[:, 0]
-            bound._dofs, weights = probe(beam, self.at, (e, X))
+            off_axis = is_off_axis(beam, X)
+            bound._dofs, weights = probe_reference(beam, e, np.array([X[0], 0.5]) if off_axis else X)
             bound._place, bound._along = (e, float(X[0])), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
                                            np.array([e]))
@@ -85,6 +90,9 @@ class FollowerForce(Load):
         (x, y), n = self.total, bound._start / np.hypot(*bound._start)
         a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
         bound._turn = np.array([[a, b], [-b, a]])
+        if bound._place is not None and off_axis:  # the component along the axis keeps its lever
+            bound._couple = -a * float(
+                beam.mesh.mapping().offset(X.reshape(2, 1, 1), np.array([e]))[0, 0])
         return bound
 
     def _tangent(self, u):
@@ -92,7 +100,10 @@ class FollowerForce(Load):
 
     def _force(self, u):
         d = self._tangent(u)
-        return (self._turn @ d / np.hypot(*d))[:, None] * self._weights
+        force = (self._turn @ d / np.hypot(*d))[:, None] * self._weights
+        if self._couple:
+            force = force + self._couple * (TURN @ d / (d @ d))[:, None] * self._slopes
+        return force
 
     def force(self, u: Array) -> Array:
         out = np.zeros(self.beam.N)
@@ -104,6 +115,9 @@ class FollowerForce(Load):
         size = np.hypot(*d)
         D = self._turn @ (np.eye(2) - np.outer(d, d) / size**2) / size
         values = np.einsum("ij,ik,l->ikjl", D, self._weights, self._slopes)
+        if self._couple:
+            D = self._couple * (TURN - 2.0 * np.outer(TURN @ d, d) / size**2) / size**2
+            values += np.einsum("ij,k,l->ikjl", D, self._slopes, self._slopes)
         rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
         columns = np.broadcast_to(self._along[None, None], values.shape)
         return rows.ravel(), columns.ravel(), values.ravel()

@@ -292,7 +292,7 @@ class SectionForces:
                     ask = partial(_traction, self.beam, load.traction)
                     stations += list(jumps(ask, ne, np.array([float(side)])))
                     part = pieces(ask, np.flatnonzero(face), float(side))
-                    stations += list(part.elements + part.begin)
+                    stations += list((part.elements + part.begin)[part.begin > 0.0])
         for s in self._sampled:
             stations += [*s.changes(ne), *s.jumps(ne)]
         for _, eigen in self.eigen:
