@@ -1,4 +1,4 @@
-"""Forces on the face of a cable: fixed, moving and follower forces have the couple of their distance."""
+"""Forces on the face of a cable: fixed, moving and follower ones have its couple."""
 
 import numpy as np
 import pytest

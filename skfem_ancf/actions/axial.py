@@ -80,7 +80,8 @@ class FollowerForce(Load):
                                                          self.line, ask=True).parts[0]
             e, X = int(found.e[0]), found.X[:, 0]
             off_axis = is_off_axis(beam, X)
-            bound._dofs, weights = probe_reference(beam, e, np.array([X[0], 0.5]) if off_axis else X)
+            at = np.array([X[0], 0.5]) if off_axis else X
+            bound._dofs, weights = probe_reference(beam, e, at)
             bound._place, bound._along = (e, float(X[0])), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
                                            np.array([e]))

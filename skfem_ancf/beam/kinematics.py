@@ -55,9 +55,9 @@ def locate(beam: Any, point: Any) -> tuple[int, Array]:
     return int(e[0]), X[:, 0]
 
 
-def probe(beam: Any, point: Any, at: tuple[int, Array] | None = None) -> tuple[Array, Array]:
-    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`; ``at`` is the result of :func:`locate`."""
-    e, X = locate(beam, point) if at is None else at
+def probe(beam: Any, point: Any) -> tuple[Array, Array]:
+    """As :meth:`Beam.probe <skfem_ancf.Beam.probe>`."""
+    e, X = locate(beam, point)
     if not beam.has_sections and abs(X[1] - 0.5) > beam.finder.allowed:
         raise InputError(
             f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, where "
