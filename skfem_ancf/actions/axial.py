@@ -70,7 +70,7 @@ class FollowerForce(Load):
         return (self._with(beam=number_at(layout, self.at, self.beam)),)
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        bound = cast("FollowerForce", super().bind(cast("Beam", beam)))
+        bound, lever = cast("FollowerForce", super().bind(cast("Beam", beam))), 0.0
         if isinstance(beam, RigidBody):
             bound._dofs, weights = beam.probe(self.at)
             bound._place, bound._start = None, beam.q0[2:]
@@ -79,9 +79,10 @@ class FollowerForce(Load):
             found = Points([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
                                                          self.line, ask=True).parts[0]
             e, X = int(found.e[0]), found.X[:, 0]
-            off_axis = is_off_axis(beam, X)
-            at = np.array([X[0], 0.5]) if off_axis else X
-            bound._dofs, weights = probe_reference(beam, e, at)
+            if is_off_axis(beam, X):
+                lever = float(beam.mesh.mapping().offset(X.reshape(2, 1, 1), np.array([e]))[0, 0])
+                X = np.array([X[0], 0.5])
+            bound._dofs, weights = probe_reference(beam, e, X)
             bound._place, bound._along = (e, float(X[0])), bound._dofs
             slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
                                            np.array([e]))
@@ -91,9 +92,7 @@ class FollowerForce(Load):
         (x, y), n = self.total, bound._start / np.hypot(*bound._start)
         a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
         bound._turn = np.array([[a, b], [-b, a]])
-        if bound._place is not None and off_axis:  # the component along the axis keeps its lever
-            bound._couple = -a * float(
-                beam.mesh.mapping().offset(X.reshape(2, 1, 1), np.array([e]))[0, 0])
+        bound._couple = -a * lever  # of the component along the axis
         return bound
 
     def _tangent(self, u):
