@@ -31,7 +31,8 @@ from .elements import (ElementBeam, ElementBeamANCF, ElementBeamANCFCubic, Eleme
                        ElementBeamCable, ElementBeamPatelShabana)
 from . import forms
 from .formulations import Formulation
-from .materials import Material, NeoHookean, PointwiseMaterial, StVenantKirchhoff
+from .materials import (ElasticPlastic, HistoryMaterial, Material, NeoHookean, PointwiseMaterial,
+                        Prony, StVenantKirchhoff, Voce)
 from .materials.damping import KelvinVoigt
 from .mesh.mesh_beam import MeshBeam
 from .recovery.resultants import Resultants
@@ -68,6 +69,7 @@ __all__ = [
     "Domain",
     "Drag",
     "EigenStrain",
+    "ElasticPlastic",
     "ElementBeam",
     "ElementBeamANCF",
     "ElementBeamANCFCubic",
@@ -89,6 +91,7 @@ __all__ = [
     "GeneralizedAlpha",
     "Hinge",
     "History",
+    "HistoryMaterial",
     "InputError",
     "Interrupted",
     "Item",
@@ -123,6 +126,7 @@ __all__ = [
     "PrescribedPosition",
     "PrescribedTurn",
     "Pressure",
+    "Prony",
     "Radau",
     "Ramp",
     "Reaction",
@@ -150,6 +154,7 @@ __all__ = [
     "Traction",
     "Train",
     "Verdict",
+    "Voce",
     "Weight",
     "Weld",
     "check_derivatives",

@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from skfem import LinearForm
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, Energy, FormLoad, InputError, Item, MeshBeam,
-                        Scene, StVenantKirchhoff, sweep)
+from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, Energy, FormLoad, InputError,
+                        Item, MeshBeam, Prony, Scene, StVenantKirchhoff, sweep)
 from skfem_ancf.actions.forces import point
 from skfem_ancf.actions.joints import JOINTS, Motor
 from skfem_ancf.dynamics import SCHEMES
@@ -168,10 +168,10 @@ def item_of(name):
     return ITEMS[name](*ARGUMENTS[name]) if name in ITEMS else name()
 
 
-def bare(n=2):
+def bare(n=2, material=MATERIAL):
     """Two beams, the first clamped at its left end, the second at its right end."""
     beams = [Beam(MeshBeam.init_line(x + np.linspace(0.0, 1.0, n + 1), height=0.1),
-                  ElementBeamANCF(2), MATERIAL, width=0.1) for x in (0.0, 0.5)]
+                  ElementBeamANCF(2), material, width=0.1) for x in (0.0, 0.5)]
     return Scene(*beams).clamp("left", 0).clamp("right", 1)
 
 
@@ -203,6 +203,32 @@ def test_items_through_all_solvers(name):
         assert len(history) == 3 and np.all(np.isfinite(history.total_energy))
     again = scene.integrate(2e-3, 1e-3, scheme=scheme, start=history.state(1), t_start=1e-3)
     assert_allclose(again.u[-1], history.u[-1], rtol=0, atol=1e-9)
+
+
+#: Laws with a history, one of which yields under the weight.
+HISTORIES = {"plastic": ElasticPlastic(2e7, 0.3, 2e3, 1e6, 1e6, 1000.0, points=4),
+             "polymer": Prony(StVenantKirchhoff(2e7, 0.3, 1000.0), [0.3], [0.01])}
+
+
+@pytest.mark.parametrize("law", HISTORIES)
+@pytest.mark.parametrize("name", [n for n in [*ITEMS, *CUSTOM]
+                                  if n not in ("temperature", "eigenstrain")])
+def test_items_on_materials_with_a_history(name, law):
+    """Runs and motions go on from a state, its pickle and its copy; what is dissipated grows."""
+    scene = bare(material=HISTORIES[law]).gravity((0.0, -9.81)).add(item_of(name))
+    run = scene.run([0.5, 1.0], increments=2)
+    assert np.all(np.diff(run.dissipated) >= -1e-12) and np.any(run.state(2).memory)
+    state = run.state(2)
+    for one in (state, copy.copy(state), pickle.loads(pickle.dumps(state))):
+        again = scene.run(1.0, increments=2, start=one)
+        assert_allclose(again.u[-1], run.u[-1], rtol=0, atol=1e-6)
+        assert_allclose(again.state(0).memory, state.memory, rtol=1e-5, atol=1e-5)
+    assert np.all(scene.modes(2, state).frequencies > 0)
+    for scheme in ("generalized-alpha", "energy-momentum"):
+        history = scene.integrate(2e-3, 1e-3, scheme=scheme)
+        again = scene.integrate(2e-3, 1e-3, scheme=scheme, start=history.state(1), t_start=1e-3)
+        assert_allclose(again.u[-1], history.u[-1], rtol=0, atol=1e-9)
+        assert history.dissipated[-1] > history.dissipated[0] - 1e-12
 
 
 @pytest.mark.parametrize("name", [*ITEMS, *CUSTOM])

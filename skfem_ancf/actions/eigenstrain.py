@@ -16,6 +16,7 @@ import numpy as np
 from ..beam.beam import Beam
 from ..beam.distribution import Distribution
 from ..beam.kernels.kernel import stresses_of
+from ..beam.remembered import remembers
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.strains import on_grid, strain_at, stretched
@@ -107,6 +108,9 @@ class EigenStrain(Load):
     # the load
 
     def bind(self, beam: Beam) -> Load:
+        if remembers(beam):
+            raise InputError(f"temperature and eigenstrain do not act on {beam!r}: a material of "
+                             "it has a history, and its law takes the whole strain")
         bound = cast("EigenStrain", super().bind(beam))
         bound._distribution = Distribution(eigen=bound)
         function = getattr(self.amplitude, "function", None)

@@ -8,10 +8,12 @@ import numpy as np
 from ..core.band import add_multiple, clear, copy
 from ..core.caching import cached_property
 from ..core.source import I1, I2, primitive, shaped, source
+from ..core.types import Array
 from .beam import Beam
 from .kernels.elements import Elements
+from .kernels.histories import elements_of, remembering
 from .kernels.law import LINEAR
-from .kernels.runs import (add_changes, add_transposed, run_eigen_force, run_eigen_mean,
+from .kernels.runs import (add_changes, add_transposed, run_accept, run_eigen_force, run_eigen_mean,
                            run_eigen_tangent, run_force, run_given,
                            run_gradients, run_linearised, run_mean, run_mean_mixed, run_mixed,
                            run_stress, run_tangent, run_unsymmetric, run_viscous)
@@ -34,7 +36,11 @@ class Body:
     @cached_property
     def elements(self) -> Sequence[Elements]:
         """Their :class:`~skfem_ancf.beam.kernels.elements.Elements`."""
-        return list(map(Elements, self.packs)) if self._kernel is None else self._kernel.elements
+        return list(map(elements_of, self.packs)) if self._kernel is None else self._kernel.elements
+
+    def remember(self, history: Array, span: Array) -> None:
+        """Let the elements have views of a history (n,) and of a time span (1,)."""
+        vars(self)["elements"] = remembering(self.elements, history, span)
 
 
 class FlatBody(NamedTuple):
@@ -243,6 +249,13 @@ def add_force_of(body, u, stresses, f):
     """Add the force at u of given stresses."""
     for k in range(body.table.shape[0]):
         run_given(tables_of(body, k), u, _stress(body, k, stresses), f)
+
+
+@source
+def accept_body(body, u0, u1, out):
+    """Set the histories after an increment from u0 to u1; add what it dissipates to ``out[0]``."""
+    for k in range(body.table.shape[0]):
+        run_accept(tables_of(body, k), u0, u1, out)
 
 
 @source

@@ -13,6 +13,7 @@ from numpy.polynomial.polynomial import polyval
 from ..core.types import Array, Law, Rule
 from ..formulations import COMPONENTS
 from ..formulations.base import Term
+from .remembered import has_history, stress_of_layer
 
 
 # Green-Lagrange strain from the displacement derivatives a along the axis and b across it (pairs of
@@ -179,9 +180,19 @@ def _places(samples, rows, xi):
 def stress_at(beam: Any, u: Array, e: Array, X: Array) -> Array:
     """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), shape (3, n)."""
     E, at = strain_at(beam, u, e, X)[..., None], X[:, :, None]
-    of = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
-          partial(_stress_of_cable, strain=E, X=at, tind=e))
-    return beam.across.of_layers(at, E, lambda k: of(beam.layers[k]), e)[..., 0]
+    law = (partial(beam.formulation.stress, strain=E, u=u, X=at, tind=e) if beam.has_sections else
+           partial(_stress_of_cable, strain=E, X=at, tind=e))
+
+    def of(k):
+        S = law(beam.layers[k])
+        if not has_history(beam, k):
+            return S
+        found = stress_of_layer(beam, k, u.real, e, X)[..., None]
+        if not beam.has_sections:
+            found = np.array([found[0] / stretched(E[0].real)[0], 0.0 * E[0].real, 0.0 * E[0].real])
+        return found + 1j * S.imag if np.iscomplexobj(S) else found
+
+    return beam.across.of_layers(at, E, of, e)[..., 0]
 
 
 def on_grid(of: Any, beam: Any, u: Array, X: Array, tind: Array | None, *more: Any) -> Array:

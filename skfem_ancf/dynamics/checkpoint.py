@@ -42,7 +42,7 @@ def description(system: System, t_start: float, t_end: float) -> dict[str, Array
     times, rng = np.linspace(t_start, t_end, TIMES), np.random.default_rng(0)
     u, v = 1e-3 * rng.standard_normal((2, system.N)) * np.concatenate(
         [member.sizes for member in system.members])
-    with system.forces.without_samples():
+    with system.forces.without_samples(), system.histories.lent(span=t_end - t_start):
         force, inertia = system.internal_force(u, t_start), system.mass.multiply(u)
         damping = system.damping_force(u, v, t_start) if system.damped else np.zeros(1)
     found = {"supports": np.append(system.constraints.fixed, system.constraints.values_at(times)),

@@ -2,6 +2,7 @@
 
 from ..core.band import copy, dot, solve_joined, subtract_rows
 from ..actions.forces.kernels import set_contact_rate, settle_contact
+from ..beam.strain_energy import accept_body
 from ..core.callbacks import call_solver
 from ..core.source import indices, source
 from ..actions.tables import add_constraint_rate
@@ -124,12 +125,14 @@ def begin_step(e, dt):
 
 
 @source
-def settle(forces, rule, s, w, taken):
+def settle(e, rule, s, w, taken):
     """Update the history at the end of the step; ``taken`` is the dissipated work."""
     if rule.conserving > 0:
-        settle_contact(forces, s.acting, s.dt, w.y[0], w.x.u, taken)
+        settle_contact(e.forces, s.acting, s.dt, w.y[0], w.x.u, taken)
     else:
-        settle_contact(forces, s.acting, 0.0, w.x.u, w.x.u, taken)
+        settle_contact(e.forces, s.acting, 0.0, w.x.u, w.x.u, taken)
+    accept_body(e.body, w.y[0], w.x.u, taken)
+    e.span[0] = 0.0
 
 
 @source

@@ -242,11 +242,16 @@ class History(MaterialPoints, SpringForces):
     def strain_energy(self) -> Array:
         """Strain energy and potential of force elements, shape (nt,)."""
         system, memories = self.system, self._columns["history"]
-        out = np.zeros(len(self)) + system.energy_of_beams(self.u)
-        if system.forces.elements:
+        out = np.zeros(len(self))
+        remembers = system.histories.of_beams.size > 0
+        if not remembers:
+            out += system.energy_of_beams(self.u)
+        if system.forces.elements or remembers:
             for k, memory in enumerate(memories):
                 with system.histories.lent(memory if memory.size else None):
                     out[k] += system.energy_of_forces(self.u[k], self.t[k])
+                    if remembers:
+                        out[k] += system.energy_of_beams(self.u[k])
         return out
 
     @cached_property

@@ -54,7 +54,7 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, wo
         if matrices.dampers.active > 0:
             add_work(e, matrices, rule, s, w, state)
         if e.lasting > 0:
-            settle(e.forces, rule, s, w, taken)
+            settle(e, rule, s, w, taken)
             state.dissipated[0] += taken[0]
             copy(e.history, memories[n])
         works[n] = state.dissipated[0]

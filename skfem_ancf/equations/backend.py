@@ -10,7 +10,7 @@ from functools import partial
 from threading import RLock
 from typing import Any, NamedTuple
 
-from ..beam.kernels.law import CUSTOM
+from ..beam.kernels.law import CUSTOM, HISTORY
 from ..core import code_cache
 from ..core.caching import cached_property
 from ..core.interrupts import deferred
@@ -73,6 +73,8 @@ class Backend:
             self._plain = "compiled=False"
         elif system.forces.contacts.custom:
             self._plain = "a user-defined distance (SignedDistance)"
+        elif any(pack.law.kind == HISTORY for pack in self.tables.plain.body.packs):
+            self._plain = "a law with a history"
         elif any(pack.law.kind == CUSTOM
                  for pack in self.tables.plain.body.packs):
             self._plain = ("a user-defined law in Python; a "

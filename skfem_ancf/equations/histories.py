@@ -11,6 +11,9 @@ import numpy as np
 from ..actions.contact.tables import TURNS
 from ..actions.forces.system import Forces
 from ..beam.beam import Beam
+from ..beam.kernels.histories import ElementsWithHistory, history_size
+from ..beam.remembered import remembers, with_history
+from ..core.errors import InputError
 from ..core.types import Array
 
 
@@ -25,38 +28,70 @@ class Histories:
     Attributes
     ----------
     values
-        The history that is set, shape (n,): first that of the obstacles
-        and springs, then that of the beams.
+        The history that is set, shape (n,); its parts are ``of_forces``, of obstacles and springs,
+        and ``of_beams``.
     span
-        Time since then, shape (1,), for laws with rates; 0 in statics.
+        Time since then, shape (1,), for laws with rates; 0 at once.
     lasting, dissipates
         True if steps change it; if energy may be lost by that.
     """
 
-    def __init__(self, forces: Forces, beams: Sequence[Beam]) -> None:
-        self._forces, contacts = forces, forces.contacts
-        self._contacts = contacts
+    def __init__(self, forces: Forces, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
+        self._forces, self._contacts, self._increment = forces, forces.contacts, 0.0
+        contacts, some = forces.contacts, [
+            (beam, s) for beam, s in zip(beams, slices) if remembers(beam)]
         first = contacts.tables.memory.size if contacts.keeps else 0
-        self.values, self.span = np.zeros(first), np.zeros(1)
+        sizes = [sum(map(history_size, beam.kernel.tables)) for beam, _ in some]
+        self.values, self.span = np.zeros(first + sum(sizes)), np.zeros(1)
+        self.of_forces, self.of_beams = self.values[:first], self.values[first:]
         if first:
-            contacts.tables = contacts.tables._replace(memory=self.values[:first])
-        self.lasting = contacts.tables.lasting > 0
-        self.dissipates = contacts.tables.lasting not in (0, TURNS)
+            contacts.tables = contacts.tables._replace(memory=self.of_forces)
+        self.lasting = contacts.tables.lasting > 0 or bool(some)
+        self.dissipates = contacts.tables.lasting not in (0, TURNS) or bool(some)
+        self._parts, self._kernels, at = dict[int, slice](), dict[int, Any](), first
+        self._beams, self._all = some, list(beams)
+        for (beam, _), n in zip(some, sizes):
+            self._parts[id(beam)] = part = slice(at, at + n)
+            self._kernels[id(beam)] = beam.kernel.remembering(self.values[part], self.span)
+            at += n
+
+    def kernel(self, beam: Beam) -> Any:
+        """The kernel of a beam with the history that is set."""
+        return self._kernels.get(id(beam)) or beam.kernel
+
+    def beam(self, beam: Beam, state: Any) -> Beam:
+        """A beam with the history of a State, for stress and element forces.
+
+        It is the beam itself if its laws have no history.
+        """
+        history = (state.base or state).memory
+        if id(beam) not in self._parts:
+            return beam
+        part = self._parts[id(beam)]
+        return with_history(beam, np.zeros(part.stop - part.start) if history is None else
+                            np.array(history[part]))
 
     @contextmanager
     def lent(self, history: Array | None = None, span: float = 0.0) -> Iterator[None]:
-        """Context with the history of a state, or of the reference configuration for None."""
-        before = self.values.copy(), self.span.copy()
+        """Context with the history of a state, or of the reference configuration for None.
+
+        ``span`` is the time of an increment from there.
+        """
+        before = self.values.copy(), self.span.copy(), self._increment
         try:
+            self._increment = span
             self.put(history)
-            self.span[0] = span
             yield
         finally:
-            self.values[:], self.span[:] = before
+            self.values[:], self.span[:], self._increment = before
 
-    def put(self, history: Array | None) -> None:
-        """Set a history; None for that of the reference configuration."""
+    def put(self, history: Array | None, share: float = 1.0) -> None:
+        """Set a history, or None, at the start of an increment.
+
+        It takes a share of the time for which histories are lent.
+        """
         self.values[:] = 0.0 if history is None else history
+        self.span[0] = share * self._increment
 
     def get(self) -> Array | None:
         """A copy of the history that is set; None if nothing has happened."""
@@ -65,7 +100,7 @@ class Histories:
     def begin(self, u: Array, t: float, history: Array | None = None) -> Array | None:
         """Set the history of a start at u and t, or a given one; returns it.
 
-        Without a given one, friction begins at u.
+        Without a given one, friction begins at u, and materials in their natural state.
         """
         self.put(history)
         if self._contacts.obstacles:
@@ -75,12 +110,49 @@ class Histories:
     def accept(self, u0: Array, u: Array, t: float) -> float:
         """Set the history after an increment in statics from u0 to u; returns what it dissipates.
         """
-        return self._forces.settle(u, t)
+        lost = self._forces.settle(u, t)
+        for beam, s in self._beams:
+            for e in self.kernel(beam).elements:
+                if isinstance(e, ElementsWithHistory):
+                    lost += e.accept(u0[s], u[s])
+        return lost
 
     def of_state(self, state: Any) -> Array | None:
-        """The history of a State, as far as the obstacles are those of its scene, or None."""
+        """The history of a State, as far as obstacles and beams are those of its scene, or None."""
         if state is None or state.memory is None:
             return None
-        ours, theirs = self._contacts.tables, state.system.forces.contacts.tables
-        same = np.array_equal(ours.ints, theirs.ints) and np.array_equal(ours.floats, theirs.floats)
-        return state.memory if same else None
+        theirs = state.system.histories
+        if theirs is self:
+            return state.memory
+        out, known = np.zeros(self.values.size), False
+        a, b = self._contacts.tables, theirs._contacts.tables
+        n = self.of_forces.size
+        if n == theirs.of_forces.size and np.array_equal(a.ints, b.ints) and np.array_equal(
+                a.floats, b.floats):
+            out[:n], known = state.memory[:n], n > 0
+        for part, other in self._shared(theirs):
+            out[part], known = state.memory[other], True
+        return out if known else None
+
+    def _shared(self, theirs):
+        """Parts of the same beams: the objects, or those in the same place with such materials."""
+        for k, beam in enumerate(self._all):
+            other = beam if id(beam) in theirs._parts else (
+                theirs._all[k] if k < len(theirs._all) else None)
+            if id(beam) not in self._parts or id(other) not in theirs._parts:
+                continue
+            one, two = self._parts[id(beam)], theirs._parts[id(other)]
+            if one.stop - one.start == two.stop - two.start and _laws(beam) == _laws(other):
+                yield one, two
+
+    def require_none(self, what: str, instead: str) -> None:
+        """Raise InputError if a material has a history."""
+        if self._beams:
+            beam = self._beams[0][0]
+            raise InputError(f"{what} does not know the history of materials, as that of {beam!r}: "
+                             f"{instead}")
+
+
+def _laws(beam):
+    """Kinds of the materials of a beam."""
+    return [type(layer.material) for layer in beam.across.layers]

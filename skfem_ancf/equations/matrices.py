@@ -59,7 +59,7 @@ def _matrices_of(system, state):
     D = sparse.csr_array((system.N, system.N))
     for beam, s in zip(system.beams, system.slices):
         i, j = entries_of(s.start + element_dofs(beam))
-        K = K + _square(system, i, j, beam.kernel.tangents(u[s]))
+        K = K + _square(system, i, j, system.histories.kernel(beam).tangents(u[s]))
     if system.viscous:
         band, none = BandMatrix(system.N, system.bandwidth), tables.stresses
         body_tangent(tables.plain.viscous, u, 0.0 * u, none, True, tables.stresses, band.band)

@@ -47,7 +47,8 @@ class StrainTangent:
                  multipliers: Array) -> None:
         self.system, self.free = system, np.nonzero(system.constraints.free)[0]
         self._at = u, load, t, load if t is None else t
-        parts = [_beam_rows(beam, u[s]) for beam, s in zip(system.beams, system.slices)]
+        parts = [_beam_rows(beam, system.histories.kernel(beam), u[s])
+                 for beam, s in zip(system.beams, system.slices)]
         rigid = system.N - sum(beam.N for beam in system.beams)
         if rigid:  # DOFs without strain
             parts.append((*2 * [sparse.csr_matrix((0, rigid))], np.zeros(0)))
@@ -181,9 +182,9 @@ def _joined(parts):
     return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
 
 
-def _beam_rows(beam, u):
+def _beam_rows(beam, kernel, u):
     """B and C B of a beam, sparse, and its weighted stresses."""
-    B, CB, stress = beam.kernel.gradients(u)
+    B, CB, stress = kernel.gradients(u)
     n, stress = B.shape[2], stress.ravel()
     j = np.broadcast_to(element_dofs(beam)[:, None], B.shape).ravel()
     first = n * np.arange(len(stress) + 1)

@@ -109,7 +109,7 @@ class System:
         self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
                                            for domain in domains)], self.N, self.bandwidth,
                              None if self.constraints.frame is None else chain_places(self.beams))
-        self.histories = Histories(self.forces, self.beams)
+        self.histories = Histories(self.forces, self.beams, self.slices)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         if self.damping.stiffness and domains:
@@ -233,7 +233,8 @@ class System:
 
     def energy_of_beams(self, u: Array) -> Any:
         """Strain energy of the beams: for u (N,) a number, for (k, N) an array (k,)."""
-        return sum(b.kernel.energy(u[..., s]) for b, s in zip(self.beams, self.slices))
+        return sum(self.histories.kernel(b).energy(u[..., s])
+                   for b, s in zip(self.beams, self.slices))
 
     def energy_of_forces(self, u: Array, t: float = 1.0) -> float:
         """Potential of the force elements."""

@@ -12,7 +12,7 @@ from ..core.caching import cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
-from ..beam.kernels.law import LINEAR
+from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import linearised
 from ..core.callbacks import handle_of
@@ -64,14 +64,15 @@ class Tables:
         self._sort(system.loads)
         self.motion_varies = any(joint.moving for joint in system.constraints.joints)
         self.turns = any(joint.turning for joint in system.constraints.joints)
-        joints = self._joints()
+        joints, histories = self._joints(), system.histories
         body = body_of(system.beams, system.slices, joined=not system.viscous)
+        if histories.of_beams.size:
+            body.remember(histories.of_beams, histories.span)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes,
-                               system.histories.values, system.histories.span,
-                               int(system.histories.lasting))
+                               histories.values, histories.span, int(histories.lasting))
 
     @property
     def system(self) -> Any:
@@ -97,9 +98,11 @@ class Tables:
 
     @cached_property
     def linearised(self) -> "Tables | None":
-        """Tables with the linearised laws at zero strain; None if all laws are linear."""
+        """Tables with the linearised laws at zero strain; None if all laws are linear, or
+        one has a history."""
         body = self.plain.body
-        if all(t.law.kind == LINEAR for t in body.packs):
+        kinds = {t.law.kind for t in body.packs}
+        if kinds <= {LINEAR} or HISTORY in kinds:
             return None
         body = Body([linearised(t) for t in body.packs], body.table)
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))

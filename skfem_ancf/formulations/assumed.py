@@ -12,6 +12,7 @@ from ..core.types import Array
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw
 from ..materials.base import Material
+from ..materials.history import AtRest
 from ..mesh.mesh_beam import MeshBeam
 from .base import Formulation, Term
 from .ecm import AXIS, split_moduli
@@ -56,7 +57,7 @@ class Assumed(Formulation):
             raise InputError(f"alpha must not be negative, got {alpha!r}")
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
-        _, section = self.full_rules(element)
+        _, section = self.full_rules(element, material)
         sampling = element.sampling
         axis, samples = gauss(sampling.points), sampling.samples
         require_like("material", material, "Material", "law")
@@ -65,7 +66,12 @@ class Assumed(Formulation):
         whole = Term(law, axis, section, samples)
         if element.order > 1:
             return self._volumetric_apart(whole, element, material, factor) or [whole]
-        if not isinstance(law, LinearLaw):
+        if isinstance(law, AtRest) and element.order == 1:
+            raise InputError(
+                f"{type(material).__name__} has a history, and sections of order 1, which cannot "
+                "contract as they bend, would be 12 to 17 % too stiff with it: use order 2 or "
+                "more, or a cable")
+        if not isinstance(law, LinearLaw) or isinstance(law, AtRest):
             return [whole]
         uncoupled, coupling = split_moduli(self.name, material, element)
         if material.plane == "strain":  # a bent section is as stiff as E / (1 - nu^2)

@@ -136,15 +136,16 @@ class Formulation(Immutable):
         return total
 
     @staticmethod
-    def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:
+    def full_rules(element: ElementBeam, material: Material | None = None) -> tuple[Rule, Rule]:
         """Rules along the axis and across the section that integrate the energy exactly.
 
         They are exact for twice the degree of the strain (St. Venant-Kirchhoff):
         ``element.strain_degree`` along the axis of a straight element, and 2 N across the section.
-        The rule across includes the width of sections that are not rectangles.
+        The rule across includes the width of sections that are not rectangles. A material with a
+        history may ask for more points across.
         """
         require_like("element", element, "beam element", "strain_degree", "order")
-        n = 2 * element.order + 1
+        n = max(2 * element.order + 1, getattr(material, "points", 0))
         return gauss(element.strain_degree + 1), (
             element.across(n) if hasattr(element, "across") else gauss(n))
 

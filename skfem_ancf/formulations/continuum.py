@@ -24,4 +24,5 @@ class Continuum(Formulation):
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         require_like("material", material, "Material", "law")
         require_like("element", element, "beam element", "strain_degree", "order")
-        return [Term(material.law(material.shear_factor(element)), *self.full_rules(element))]
+        law = material.law(material.shear_factor(element))
+        return [Term(law, *self.full_rules(element, material))]

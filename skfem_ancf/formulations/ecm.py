@@ -11,6 +11,7 @@ from ..core.types import Array
 from ..elements.base import ElementBeam
 from ..materials import LinearLaw
 from ..materials.base import Material
+from ..materials.history import AtRest
 from .base import Formulation, Term
 
 #: The rule across the section that is the axis alone, with the weight of the whole section.
@@ -21,7 +22,7 @@ def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[A
     """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D, (3, 3) both."""
     require_like("material", material, "Material", "law")
     law = material.law(material.shear_factor(element))
-    if not isinstance(law, LinearLaw):
+    if not isinstance(law, LinearLaw) or isinstance(law, AtRest):
         raise InputError(
             f"formulation {name!r} needs constant moduli, which {type(material).__name__} does not "
             "have: use StVenantKirchhoff, or another formulation")

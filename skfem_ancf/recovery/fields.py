@@ -17,6 +17,7 @@ import numpy as np
 from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.points import BeamPoints
+from ..beam.remembered import by_history, remembers
 from ..beam.strains import stress_at, stretched
 from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                            require_flag, require_integer, require_label, require_text, shown)
@@ -129,6 +130,8 @@ class Values(Mapping):
         A function that returns the recovered field of the beam, or None; None for element fields.
     eigen
         Factors and loads of eigenstrains.
+    beam
+        The beam with the history of its materials, if they have one.
 
     Attributes
     ----------
@@ -147,9 +150,9 @@ class Values(Mapping):
 
     def __init__(self, part: BeamPoints, u: Array,
                  find: Callable[[], Recovery | None] | None = None,
-                 eigen: Sequence[tuple[Any, Any]] = ()) -> None:
+                 eigen: Sequence[tuple[Any, Any]] = (), beam: Beam | None = None) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
-        self.beam, self.n = part.beam, len(part.e)
+        self.beam, self.n = beam or part.beam, len(part.e)
         #: Linear about the reference configuration.
         self._small = np.iscomplexobj(u) and not u.real.any()
         self._known: dict[str, Array] = {}
@@ -208,6 +211,33 @@ class Values(Mapping):
     def elastic(self) -> Array:
         return self.strain - self._eigenstrain
 
+    def _by_history(self, ask, other):
+        """A field (n,) of ``ask(material, history)``; ``other`` where a material has none."""
+        return by_history(self.beam, self._part.e, self._part.X, ask, other)
+
+    @property
+    def _stored(self):
+        if self.beam.has_sections:
+            return self._by_history(lambda law, history: law.energy(self.strain, history), np.nan)
+        longer = stretched(self.strain[0])[1]
+        return self._by_history(lambda law, history: law.axial_energy(longer, history), np.nan)
+
+    def output(self, name: str, other: float = 0.0) -> Array:
+        """A field (n,) of the history of materials.
+
+        Parameters
+        ----------
+        name
+            Its name in ``outputs`` of a :class:`~skfem_ancf.materials.HistoryMaterial`.
+        other
+            Value where a material does not have it.
+        """
+        if not remembers(self.beam):
+            return np.full(self.n, other)
+        S = self.S if self.beam.has_sections else stretched(self.strain[0])[0] * self.S
+        return self._by_history(lambda law, history: law.outputs(
+            self.strain, history, S).get(name, np.full(self.n, other)), other)
+
     def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
         """A field (n,) that depends on the material at each point.
 
@@ -251,7 +281,9 @@ class Values(Mapping):
     def _volume_of(self, F, elastic):
         with np.errstate(invalid="ignore"):
             return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.of_materials(
-                lambda law: law.thickness_stretch(elastic))
+                lambda law: law.thickness_stretch(elastic)) if not remembers(self.beam) else (
+                F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * np.sqrt(1.0 + 2.0 * self._by_history(
+                    lambda law, history: law.out_of_plane(self.strain, history, self.S)[0], 0.0))
 
     @cached_property
     def sigma(self) -> Array:
@@ -270,6 +302,9 @@ class Values(Mapping):
         """Out-of-plane Cauchy stress, (n,); zero in plane stress."""
         if self.beam.material.plane == "stress":
             return np.zeros(self.n)
+        if remembers(self.beam):
+            return self._by_history(lambda law, history: law.out_of_plane(
+                self.strain, history, self.S)[1], 0.0) / self._volume
         if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
             return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -279,7 +314,9 @@ class Values(Mapping):
 
     @cached_property
     def energy(self) -> Array:
-        """Strain energy per reference volume, (n,)."""
+        """Strain energy per reference volume, (n,); of materials with a history what is stored."""
+        if remembers(self.beam) and not np.iscomplexobj(self._u):
+            return self._stored
         if not self.beam.has_sections and not self._small:
             # cable: half of the nominal stress times the elastic stretch - 1
             stretch, longer = stretched(self.strain[0])
@@ -357,6 +394,10 @@ def _table():
         yield Field(f"sigma_{k + 1}", lambda v, k=k: v.principal_stress[0][k],
                     rf"principal Cauchy stress $\sigma_{k + 1}$", area)
     yield Field("energy", lambda v: v.energy, "strain energy density", "energy / volume", False)
+    yield Field("plastic_strain", lambda v: v.output("plastic_strain"),
+                "accumulated plastic strain", one, False)
+    yield Field("yield_ratio", lambda v: v.output("yield_ratio", np.nan),
+                "von Mises stress over yield stress", one, False)
     yield Field("stretch", _stretch, "stretch along the axis", one, neutral=1.0)
     yield Field("eps_1_direction", lambda v: v.principal[1],
                 "direction of the larger principal strain, reference configuration", one, False, 2,

@@ -31,6 +31,7 @@ from numpy.polynomial.chebyshev import chebint, chebvander
 
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
+from ..beam.remembered import remembers
 from ..beam.strains import on_grid, stress_at
 from ..core.caching import cached_property
 from ..core.linear import largest
@@ -272,6 +273,8 @@ class Recovery:
         self.why = "" if beam.section.has_fields else (
             f"{beam.section!r} has no shape: strain and stress are those of a rectangle with its "
             "stiffnesses; State.resultants() has the section forces")
+        if remembers(beam):
+            self.why = "the stress of its material depends on the path of the strain"
         self.intervals = Intervals(layers, beam.element.order)
         laws = [layer.material.law(layer.shear) for layer in layers]
         if forces.small or not beam.has_sections:  # linearised laws; a cable has no others
@@ -287,6 +290,8 @@ class Recovery:
                            and not isinstance(beam.formulation, EnhancedContinuum))
         self.segments: list[Segment] = []
         self.failed = False
+        if remembers(beam):
+            return
         try:
             self.segments = self._solved()
         except NotRecovered as why:

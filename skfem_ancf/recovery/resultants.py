@@ -10,6 +10,7 @@ import numpy as np
 
 from ..beam import kinematics
 from ..beam.beam import Beam
+from ..beam.remembered import cable_forces, remembers
 from ..beam.strains import cable_axis, on_grid, stress_at
 from ..core.errors import MissingExtra
 from ..core.linear import angle_of, first_order, unwrapped
@@ -157,7 +158,7 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
         (e, xi), after = at, np.zeros(len(at[0]), dtype=bool)
     if recovery is not None:
         values = _recovered(recovery, u, e, xi, after)
-        if not beam.has_sections:
+        if not (beam.has_sections or remembers(beam)):
             values.update(_strains_of_cable(beam, eigen, e, xi, values["N"], values["M"]))
     elif beam.has_sections:
         values = _of_elements(beam, u, eigen, e, xi)
@@ -246,7 +247,8 @@ def _of_elements(beam, u, eigen, e, xi):
 def _across(beam, e, xi):
     """Points across sections, shape (2, n, m), and their areas."""
     eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
-        beam.across.points(layer, e, xi, max(beam.element.order, 1) + 2)
+        beam.across.points(layer, e, xi, max(beam.element.order + 2, 3, getattr(
+            layer.material, "points", 0)))
         for layer in beam.across.layers)))
     X = np.array([xi[:, None] + 0.0 * eta, eta])
     return X, breadth * beam.mesh.mapping().height(X[0], e)[0]
@@ -267,6 +269,9 @@ def _of_cable_elements(beam, u, eigen, e, xi):
 def _forces_of_cable(beam, u, eigen, e, xi):
     """Normal force and moment of a cable, and angle, stretch, shear and curvature of its axis."""
     (_, t), strain, curvature, _ = cable_axis(beam, u, e, xi)
+    if remembers(beam) and not np.iscomplexobj(u):
+        return *cable_forces(beam, u, e, xi), (
+            angle_of(*t), 1.0 + strain, 0.0 * xi, curvature)
     EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
     N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
     return (EA * strain - ES * curvature - N0, EI * curvature - ES * strain - M0,

@@ -101,7 +101,8 @@ def recover(state: Any, number: int, at: list[float], u: Array,
         if state.t is not None and time:
             viscous = beam.kernel.viscous_forces(state.u[s], state.v[s], time)
         with np.errstate(all="ignore"):
-            return Recovery(SectionForces(beam, u, loads, [*at, *places], acceleration, sampled,
-                                          viscous), u)
+            remembering = system.histories.beam(beam, state)
+            return Recovery(SectionForces(remembering, u, loads, [*at, *places], acceleration,
+                                          sampled, viscous), u)
     except NotRecovered as why:
         return why

@@ -319,7 +319,8 @@ class State(Immutable, MaterialPoints, SpringForces):
     def _at_points(self, ask, point, beam, recover, line):
         at, numbers = self._find(point, beam, recover, line)
         return at.gather([ask(Values(part, self._places, partial(self._recovery_of, k) if recover
-                                     else None, self._eigenstrains(part.beam)))
+                                     else None, self._eigenstrains(part.beam),
+                                     self._with_history(part.beam)))
                           for k, part in zip(numbers, at.parts)])
 
     def _find(self, point, beam, recover, line):
@@ -336,7 +337,10 @@ class State(Immutable, MaterialPoints, SpringForces):
             One of the beams, and its points.
         """
         return Values(part, self._places_of(beam), partial(self.recovery, beam) if recover else
-                      None, self._eigenstrains(beam))
+                      None, self._eigenstrains(beam), self._with_history(beam))
+
+    def _with_history(self, beam):
+        return self.system.histories.beam(beam, self)
 
     def _eigenstrains(self, beam):
         return [(self._unit * self.load * load.factor(self.t), load) for load in self.system.loads
@@ -440,7 +444,7 @@ class State(Immutable, MaterialPoints, SpringForces):
                 beam, chain = self.system.points.chain_of(line, beam)
             k = self.beams.index(select_beam(self.beams, beam))
         of = self.beams[k]
-        values = resultants(of, self._places_of(of),
+        values = resultants(self._with_history(of), self._places_of(of),
                             self._recovery_of(k, fields=False) if recover else None,
                             self._eigenstrains(of), places, chain)
         return values.first() if one else values

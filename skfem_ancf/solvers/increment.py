@@ -121,7 +121,7 @@ class Increment:
     def _augmented(self):
         """Repeat with corrected pressures until the penetration is within tolerance."""
         contacts = self.system.forces.contacts
-        self.system.histories.put(self.start.memory)
+        self.system.histories.put(self.start.memory, self.level - self.start.load)
         found = self._touching()
         if not contacts.augmented:
             return found

@@ -139,7 +139,7 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
         with np.errstate(all="ignore"):  # overflow shows in the residual
             return step.reached(step.solve(stable))
 
-    with system.stopped_at(t), system.histories.lent():
+    with system.stopped_at(t), system.histories.lent(span=t - last.t):
         search = Search(system, last.result.u, last.result.memory, rules, stable, False)
         bounded = search.touches or search.stabilised_by_loads
         for method in ("mixed", "descent" if bounded else "newton"):

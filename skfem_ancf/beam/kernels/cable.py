@@ -13,14 +13,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...core.errors import InputError
 from ...core.linear import first_order
 from ...core.quadrature import gauss
 from ...core.types import Array
 from ...formulations.base import Formulation
+from ...materials.history import AtRest
 from ...sections import Across
 from .kernel import ElementKernel, strains
-from .law import NO_LAW
-from .tables import CABLE, StrainTables, products_of
+from .histories import fibres
+from .law import LINEAR, NO_LAW, law_tables
+from .tables import CABLE, OF_WEIGHTS, StrainTables, products_of
 
 #: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
 #: beam; the third point has a quarter of it.
@@ -76,7 +79,11 @@ class CableKernel(ElementKernel):
         self.points_number = len(self.points)
         longest = mesh.lengths.max()
         same = mesh.is_uniform or longest - mesh.lengths.min() <= 1e-13 * longest
-        self.tables = [self._table(mesh, element, same)]
+        laws = [layer.material.law() for layer in across.layers]
+        if any(isinstance(law, AtRest) for law in laws):
+            self.tables = self._with_fibres(mesh, element, same)
+        else:
+            self.tables = [self._table(mesh, element, same)]
 
     def _table(self, mesh, element, same):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
@@ -104,6 +111,38 @@ class CableKernel(ElementKernel):
                 G[:, :, 1:], frame, rows, pairs, *products_of(rows, pairs), H, C)),
             NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
 
+    def _with_fibres(self, mesh, element, same):
+        """A table of fibres for each layer."""
+        if not self._across.constant:
+            raise InputError("a cable whose law has a history needs a constant section: for a "
+                             "taper, or functions of position, use an element with sections")
+        whole, n, L = self._table(mesh, element, same), self.points_number, mesh.lengths[:, None]
+        s = np.arange(n)
+        pairs = np.concatenate([[c * n + s, d * n + s] for c, d in (
+            (0, 0), (0, 1), (1, 1))], axis=1)
+        order = np.lexsort(pairs[::-1])
+        out = []
+        for layer in self._across.layers:
+            Y, A = fibres(self._across, layer, getattr(layer.material, "points", 2))
+            along = np.concatenate([np.repeat(np.eye(n), len(Y), 0), np.kron(
+                np.eye(n), -Y[:, None])], axis=1)
+            weights = (L[:1] if same else L) * np.kron(self._rule[1], A)
+            E = layer.material.axial_modulus
+            H = np.concatenate([E * np.sum(A * Y**k) * (-1.0) ** k * (L[:1] if same else L)
+                                * self._rule[1] for k in range(3)], axis=1)
+            law = law_tables(layer.material.law(), self)
+            if law.kind == LINEAR:
+                along, weights = np.zeros((0, 2 * n)), np.zeros((1, 0))
+            at = whole.at.copy()
+            at[:, OF_WEIGHTS] = np.arange(len(L)) if len(weights) > 1 else 0
+            C = whole.C[:0] if out else whole.C
+            out.append(whole._replace(
+                at=at, pairs=pairs[:, order].copy(), H=np.ascontiguousarray(H[:, order]), C=C,
+                law=law, along=along, weights=weights,
+                **dict(zip(("products", "terms", "of"), products_of(
+                    whole.rows, pairs[:, order])))))
+        return out
+
     def _frame(self, mesh, element, n, G):
         """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
         if mesh.is_straight:
@@ -129,9 +168,11 @@ class CableKernel(ElementKernel):
     @property
     def scale(self) -> float:
         """Modulus times volume."""
-        t, = self.tables
-        own = (t.pairs[0] == t.pairs[1]) & (t.pairs[0] < self.points_number)
-        return float(t.H[:, own].sum()) * (len(t.start) // len(t.H))
+        out = 0.0
+        for t in self.tables:
+            own = (t.pairs[0] == t.pairs[1]) & (t.pairs[0] < self.points_number)
+            out += float(t.H[:, own].sum()) * (len(t.start) // len(t.H))
+        return out
 
     def strain(self, u: Array) -> Array:
         """Extension and change of curvature at the points, (2, points, ne)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from ...core.types import Array
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements
+from .histories import ElementsWithHistory, elements_of, remembering
 from .law import LINEAR, law_evaluate
 from .runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
                    run_gradients, run_mean, run_stress, run_tangent)
@@ -67,6 +69,13 @@ class ElementKernel:
         """True if all moduli are constant."""
         return all(t.law.kind == LINEAR for t in self.tables)
 
+    def remembering(self, history: Array, span: Array) -> ElementKernel:
+        """The kernel with a history (n,) of its laws, of which it has a view, and a time span."""
+        other = copy(self)
+        vars(other).update(elements=remembering(self.elements, history, span),
+                           _apart=remembering(self._apart, history, span))
+        return other
+
     def energy(self, u: Array) -> Any:
         """Strain energy of a displacement (N,), or of several, (k, N): shape () or (k,)."""
         if u.ndim == 1:
@@ -83,7 +92,7 @@ class ElementKernel:
         """Energies (k, ne) of displacements (k, N)."""
         k, out = len(u), np.zeros(u.shape[0] * self.t.shape[1], dtype=u.dtype)
         many = self.elements if k == 1 else [
-            Elements(repeated(t, k, self.N)) for t in self.tables]
+            elements_of(repeated(t, k, self.N)) for t in self.tables]
         for e in many:
             out += energies_of(e, u.ravel())
         return out.reshape(k, -1)
@@ -91,12 +100,12 @@ class ElementKernel:
     @cached_property
     def elements(self) -> list[Elements]:
         """The :class:`~skfem_ancf.beam.kernels.elements.Elements` of :attr:`tables`."""
-        return list(map(Elements, self.tables))
+        return list(map(elements_of, self.tables))
 
     @cached_property
     def _apart(self):
         """The same with separate DOFs for each element."""
-        return [Elements(apart(t)) for t in self.tables]
+        return [elements_of(apart(t)) for t in self.tables]
 
     def force(self, u: Array) -> Array:
         """Internal force of a displacement, shape (N,)."""
@@ -273,6 +282,8 @@ def energies_of(e: Elements, u: Array) -> Array:
 
 def energy_at(e: Elements, E: Array) -> Array:
     """Energy (ne,) of strains (3, points, ne) at the integration points."""
+    if isinstance(e, ElementsWithHistory):
+        return np.sum(e.weights * e.energy(E), axis=0)
     W = np.empty((1, *E.shape[1:]), E.dtype)
     law_evaluate(e.t.law, E, W)
     return np.sum(e.weights * W[0], axis=0)

@@ -8,10 +8,12 @@ import numpy as np
 
 from ...materials import LinearLaw, PointwiseMaterial
 from ...materials.base import ShearCorrected
+from ...materials.history import AtRest
 from ...core.source import F1, F2, indices, primitive, source
 
-#: Kinds of laws: constant moduli, a function of the strain at a point, a law in Python.
-LINEAR, POINTWISE, CUSTOM = 0, 1, 2
+#: Kinds of laws: constant moduli, a function of the strain at a point, a law in Python, one with a
+#: history.
+LINEAR, POINTWISE, CUSTOM, HISTORY = 0, 1, 2, 3
 
 #: Laws by handle, as long as a kernel uses them; compiled code has no Python objects.
 _LAWS: dict[int, Any] = {}
@@ -21,7 +23,7 @@ _handles = count(1)
 class LawTables(NamedTuple):
     """A law for kernels; :func:`law_tables` makes it."""
 
-    kind: int  # LINEAR, POINTWISE or CUSTOM
+    kind: int  # LINEAR, POINTWISE, CUSTOM or HISTORY
     handle: int  # of a law that is not linear
     address: int  # of the compiled law, or 0
     D: F2  # moduli, at zero strain if they vary, (3, 3)
@@ -49,6 +51,11 @@ def evaluate_points(law, strain, out):
 def point_of(law: LawTables) -> Any:
     """The function of a pointwise law, or None."""
     return _LAWS[law.handle].point if law.kind == POINTWISE else None
+
+
+def material_of(law: LawTables) -> Any:
+    """The material of a law that is not linear."""
+    return _LAWS[law.handle]
 
 
 @source
@@ -112,6 +119,11 @@ def conserve(law, middle, change, S):
 def law_tables(law: Any, owner: Any) -> LawTables:
     """The LawTables of a law; a law in Python is registered while its ``owner`` lives."""
     one = np.ones(3)
+    if isinstance(law, AtRest):
+        handle = next(_handles)
+        _LAWS[handle] = law.material
+        weakref.finalize(owner, _LAWS.pop, handle, None)
+        return LawTables(HISTORY, handle, 0, law.D.copy(), np.zeros(3), law.scale)
     if isinstance(law, LinearLaw):
         return LawTables(LINEAR, 0, 0, np.array(law.D, dtype=float), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)

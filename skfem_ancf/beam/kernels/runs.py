@@ -10,7 +10,7 @@ In compiled code the functions of the same names in :mod:`skfem_ancf.equations.l
 import numpy as np
 
 from ...core.source import primitive
-from .law import LINEAR
+from .law import HISTORY, LINEAR
 
 #: Marks kernels with a compiled version.
 kernel = primitive("skfem_ancf.equations.loops")
@@ -178,6 +178,13 @@ def run_eigen_tangent(e, u, given, flat, ld):
         strain = e.strain(d, one)
         T, moduli = e.stress(strain, shift=shift), e.moduli_at(strain, shift)
     e.add_to_band(e.tangent(one, e.directions(one, one), T, moduli), flat, ld)
+
+
+@kernel
+def run_accept(e, u, v, out):
+    """Set the history after an increment from u to v; add what it dissipates to ``out[0]``."""
+    if e.t.law.kind == HISTORY:
+        out[0] += e.accept(u, v)
 
 
 steps = primitive("skfem_ancf.beam.kernels.loops")

@@ -1,0 +1,223 @@
+"""Materials whose stress depends on the path of the strain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import InputError, require_integer, require_positive, require_slope
+from ..core.immutable import rebuilt
+from ..core.types import Array, HasShear, Law
+from .base import LinearLaw, Material, hooke
+
+#: Points across a section without a word from the user: the moment of an ideally plastic rectangle
+#: is right to 1 %; 20 points give 0.4 %, 10 points 1.5 %.
+ACROSS = 14
+#: Newton corrections of the lateral strain of a fibre, and their relative size at the end.
+LATERAL, CLOSE = 50, 1e-13
+#: Step of derivatives, strain and time at which those of a user-defined law are tested.
+TINY, SMALL, SOON = 1e-30, 1e-3, 1.0
+
+
+NO_VARIABLES: Mapping[str, int] = {}
+
+
+class AtRest(LinearLaw):
+    """The moduli of a material with a history at zero strain, for what knows no history.
+
+    ``material`` is the material, ``scale`` (3,) the factors of strain and stress for shear.
+    """
+
+    def __init__(self, material: HistoryMaterial, k_s: float) -> None:
+        self.material, self.scale = material, np.array([1.0, 1.0, np.sqrt(k_s)])
+        super().__init__(material.elastic * np.outer(self.scale, self.scale))
+
+
+class HistoryMaterial(Material):
+    """A material with history variables: plastic or viscoelastic, for example.
+
+    History variables are numbers at each integration point, zero at rest. They are a value that
+    goes in and comes out: a law changes nothing in itself. A subclass defines :attr:`variables` and
+    :meth:`stress`. It runs in NumPy.
+
+    Strain (eps_xx, eps_yy, 2 eps_xy) and stress (S_xx, S_yy, S_xy) are those of
+    :class:`~skfem_ancf.materials.base.Material`, shape (3, ...). E and nu are those of small
+    strains at rest.
+
+    Parameters
+    ----------
+    points
+        Number of points across a section or layer. The default of 14 gives the moment of an ideally
+        plastic rectangle to 1 %, 20 to 0.4 %.
+    E, nu, density, plane, shear_correction, thermal_expansion
+        Those of :class:`~skfem_ancf.materials.base.Material`; E is a number.
+
+    Other Parameters
+    ----------------
+    strain
+        Shape (3, ...).
+    history
+        Variables at the start of the increment, shape (k, ...).
+    stress
+        That at the strain with this history, shape (3, ...).
+    dt
+        Time of the increment; 0 at once.
+
+    Examples
+    --------
+    A bar that is damaged by its largest stretch:
+
+    >>> import numpy as np
+    >>> from skfem_ancf.materials import HistoryMaterial
+    >>> class Damaged(HistoryMaterial):
+    ...     variables = {"largest": 1}
+    ...
+    ...     def stress(self, strain, history, dt):
+    ...         largest = np.maximum(history, strain[:1])
+    ...         return (1.0 - largest) * np.tensordot(self.elastic, strain, 1), largest
+    >>> law = Damaged(E=1.0, nu=0.0)
+    >>> stress, history = law.stress(np.array([0.5, 0.0, 0.0]), np.zeros(1), 0.0)
+    >>> stress.tolist(), history.tolist()
+    ([0.25, 0.0, 0.0], [0.5])
+    """
+
+    #: Names of the history variables, with their numbers of components.
+    variables: Mapping[str, int] = NO_VARIABLES
+
+    def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
+                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
+                 points: int = ACROSS) -> None:
+        if callable(E):
+            raise InputError(f"{type(self).__name__} has a history, and takes a number for E: give "
+                             "layers of other materials by Section.layers")
+        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion)
+        self.points = require_integer("points", points, 2, 200)
+
+    def replace(self, **changes: Any) -> Material:
+        return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction",
+                                       "thermal_expansion", "points"))
+
+    @property
+    def number(self) -> int:
+        """Number of history variables of a point."""
+        return sum(self.variables.values())
+
+    @property
+    def elastic(self) -> Array:
+        """Moduli at rest, (3, 3): those of E and nu."""
+        return hooke(self.E, self.nu, self.plane)
+
+    def rows(self, name: str) -> slice:
+        """The rows of a variable in a history."""
+        first = 0
+        for other, n in self.variables.items():
+            if other == name:
+                return slice(first, first + n)
+            first += n
+        raise InputError(f"{type(self).__name__} has the history variables "
+                         f"{', '.join(self.variables)}, not {name!r}")
+
+    # what a law defines
+
+    def stress(self, strain: Array, history: Array, dt: float  # type: ignore[override]
+               ) -> tuple[Array, Array]:
+        """The stress (3, ...), and the history at the end of the increment, (k, ...).
+
+        At the strain at which a history was found, a further increment of ``dt = 0`` must give the
+        same stress.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must define stress(strain, history, dt)")
+
+    def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
+        """Derivative (3, 3, ...) of the stress by the strain; by default by complex steps.
+
+        Iterations take its symmetric part.
+        """
+        out = []
+        for j in range(3):
+            step = np.zeros((3,) + (1,) * (np.ndim(strain) - 1), dtype=complex)
+            step[j] = 1j * TINY
+            out.append(np.imag(self.stress(strain + step, history, dt)[0]) / TINY)
+        return np.stack(out, 1)
+
+    def evaluate(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
+        """Stress, moduli and history; to be overridden where they are found together."""
+        S, after = self.stress(strain, history, dt)
+        return S, self.moduli(strain, history, dt), after
+
+    def energy(self, strain: Array, history: Array) -> Array:  # type: ignore[override]
+        """Energy per volume that unloading would give back, or that is stored, shape (...).
+
+        By default that of the stress in the elastic law. What else work has done is dissipated.
+        """
+        S = self.stress(strain, history, 0.0)[0]
+        return 0.5 * np.sum(S * np.tensordot(np.linalg.inv(self.elastic), S, 1), axis=0)
+
+    def outputs(self, strain: Array, history: Array, stress: Array) -> dict[str, Array]:
+        """Fields by name, (...): by default the history variables of one component."""
+        return {name: history[self.rows(name)][0] for name, n in self.variables.items() if n == 1}
+
+    def out_of_plane(self, strain: Array, history: Array, stress: Array) -> tuple[Array, Array]:
+        """Strain and stress normal to the plane, by default of Hooke's law."""
+        both = self.nu * (stress[0] + stress[1])
+        return (-both / self.E, 0.0 * both) if self.plane == "stress" else (0.0 * both, both)
+
+    # fibres of a cable
+
+    def axial(self, strain: Array, history: Array, dt: float) -> tuple[Array, Array, Array]:
+        """Stress S_xx (...), its derivative, and history of fibres with S_yy = S_xy = 0.
+
+        ``strain`` (...) is that along the fibre. By default the lateral strain is found by Newton's
+        method.
+        """
+        E = np.zeros((3, *np.shape(strain)))
+        E[0], E[1] = strain, -self.lateral_ratio * strain
+        for _ in range(LATERAL):
+            S, D, after = self.evaluate(E, history, dt)
+            change = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
+                                     np.moveaxis(S[1:], 0, -1)[..., None])[..., 0]
+            if np.max(np.abs(S[1:])) <= CLOSE * (np.max(np.abs(S)) + CLOSE * self.E):
+                break
+            E[1:] -= np.moveaxis(change, -1, 0)
+        side = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
+                               np.moveaxis(D[1:, 0], 0, -1)[..., None])[..., 0]
+        return S[0], D[0, 0] - np.sum(np.moveaxis(D[0, 1:], 0, -1) * side, axis=-1), after
+
+    def axial_energy(self, strain: Array, history: Array) -> Array:
+        """As :meth:`energy` for fibres with S_yy = S_xy = 0."""
+        return 0.5 * self.axial(strain, history, 0.0)[0] ** 2 / self.axial_modulus
+
+    # for what knows no history
+
+    def law(self, k_s: float = 1.0) -> Law:
+        return AtRest(self, require_positive("k_s", k_s))
+
+    @property
+    def is_hooke(self) -> bool:
+        """True: a cable has the axial law of the fibres."""
+        self._require_consistent()
+        return True
+
+    def shear_factor(self, element: HasShear) -> float:
+        self._require_consistent()
+        return super().shear_factor(element)
+
+    def _require_consistent(self):
+        """Raise InputError unless shapes and derivatives fit."""
+        if not hasattr(self, "_consistent"):
+            E, d = np.array([[1.3], [-0.7], [0.9]]), np.array([[0.3], [0.7], [-0.6]])
+            E, d, zero = SMALL * E, 1e-4 * SMALL * d, np.zeros((self.number, 1))
+            S, after = self.stress(E, zero, SOON)
+            if np.shape(S) != E.shape or np.shape(after) != zero.shape:
+                raise InputError(
+                    f"stress(strain, history, dt) of {type(self).__name__} must return arrays of "
+                    f"the shapes of strain and history, {E.shape} and {zero.shape}, got "
+                    f"{np.shape(S)} and {np.shape(after)}")
+            D = self.moduli(E, zero, SOON)
+            low, high = (self.stress(E + s * d, zero, SOON)[0] for s in (-1.0, 1.0))
+            require_slope(f"moduli(strain, history, dt) of {type(self).__name__}",
+                          "stress(strain, history, dt)", high - low,
+                          2.0 * np.einsum("ij...,j...->i...", D, d), 1e-12 * np.abs(S).max())
+            self._consistent = True

@@ -1,0 +1,484 @@
+"""Materials with a history: plasticity and relaxation, against closed forms."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, InputError, MeshBeam, Prony, Scene, Section,
+                        StVenantKirchhoff, Voce)
+from skfem_ancf.materials import HistoryMaterial
+
+E, NU, YIELD, H, B, L = 2e11, 0.3, 2.5e8, 0.01, 0.01, 0.1
+KAPPA = 2.0 * YIELD / (E * H)  # first yielding
+M_Y = E * B * H**3 / 12.0 * KAPPA
+#: Perfect plasticity bends evenly in these: their clamps let the sections contract.
+EVEN = [ElementBeamCable(3), ElementBeamCable(5), ElementBeamANCF(2), ElementBeamANCF(3),
+        ElementBeamANCFCubic(2)]
+
+
+def name(element):
+    return f"{type(element).__name__[11:]}({element.order or element.axis_degree})"
+
+
+def bent(element, material, angles, times=(0.0, 1.0), increments=12, ne=8, width=B):
+    """A cantilever whose end turns; its position is free. Scene, and the run."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, L, ne + 1), height=H), element, material,
+                width=width)
+    scene = Scene(beam).clamp("left")
+    scene.joint("angle", at="right", angle=lambda t: np.interp(t, times, angles))
+    return scene, scene.run(list(times[1:]), increments=increments)
+
+
+def moment(k):
+    """Of an ideally plastic rectangle, over that of first yielding, at a curvature over KAPPA."""
+    k = np.abs(k)
+    return np.where(k < 1.0, k, 1.5 - 0.5 / np.maximum(k, 1.0) ** 2)
+
+
+def states(history, point=(L / 2, 0.0)):
+    """Moment over M_Y, and curvature over KAPPA, at all instants."""
+    found = history.resultants(point, recover=False)
+    return found.M / M_Y, found.curvature / KAPPA
+
+
+# laws
+
+HARDENING = [0.0, 3e9, Voce(1e8, 20.0, 1e8), [[0.0, YIELD], [1e-3, 2.7e8], [5e-3, 2.8e8]]]
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("kinematic", [0.0, 5e9])
+@pytest.mark.parametrize("hardening", HARDENING, ids=["perfect", "linear", "Voce", "table"])
+def test_the_consistent_tangent_and_the_yield_surface(plane, kinematic, hardening):
+    law, rng = ElasticPlastic(E, NU, YIELD, hardening, kinematic, plane=plane), (
+        np.random.default_rng(1))
+    before = law.stress(6e-3 * rng.standard_normal((3, 40)), np.zeros((7, 40)), 0.0)[1]
+    strain, d = 6e-3 * rng.standard_normal((3, 40)), 1e-8 * rng.standard_normal((3, 40))
+    S, D, after = law.evaluate(strain, before, 0.0)
+    high, low = (law.stress(strain + s * d, before, 0.0)[0] for s in (1.0, -1.0))
+    change = 2.0 * np.einsum("ij...,j...->i...", D, d)
+    assert np.max(np.abs(high - low - change)) < 1e-6 * np.max(np.abs(change))
+    ratio = law.outputs(strain, after, S)["yield_ratio"]
+    assert np.all(ratio < 1.0 + 1e-10) and np.sum(ratio > 1.0 - 1e-10) > 20
+    # von Mises of the stress less the back stress, from all components
+    x = S - after[3:6]
+    z = law.out_of_plane(strain, after, S)[1] + (plane == "strain") * (after[3] + after[4])
+    xi = np.array([[x[0], x[2], 0 * z], [x[2], x[1], 0 * z], [0 * z, 0 * z, z]])
+    xi = xi - np.trace(xi) / 3.0 * np.eye(3)[..., None]
+    assert_allclose(np.sqrt(1.5 * np.sum(xi**2, axis=(0, 1))) / law.yield_at(after[6]), ratio,
+                    rtol=1e-10)
+    # a state is the start of the next increment
+    assert_allclose(law.stress(strain, after, 0.0)[0], S, atol=1e-9 * YIELD)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+def test_a_bar_hardens_as_its_table_says(plane):
+    """Axial stress of monotone loading; a plane strain bar yields at 2 / sqrt(3) of the stress."""
+    table = np.array([[0.0, YIELD], [2e-3, 3e8], [8e-3, 3.3e8]])
+    law = ElasticPlastic(E, 0.4999 if plane == "strain" else NU, YIELD, table, plane=plane)
+    history = np.zeros((7, 1))
+    for strain in np.linspace(0.0, 9e-3, 200)[1:]:
+        S, _, history = law.axial(np.array([strain]), history, 0.0)
+    c = 2.0 / np.sqrt(3.0) if plane == "strain" else 1.0
+    assert_allclose(history[6], c * (strain - S[0] / law.axial_modulus), rtol=1e-3)
+    assert_allclose(S[0], c * np.interp(history[6, 0], *table.T), rtol=1e-3)
+
+
+def test_dissipated_work_is_not_negative_and_what_is_stored_comes_back():
+    law, rng = ElasticPlastic(E, NU, YIELD, Voce(1e8, 50.0), 4e9), np.random.default_rng(2)
+    way, n, history = 8e-3 * rng.standard_normal((3, 30)), 1000, np.zeros((7, 30))
+    work, S0 = 0.0, np.zeros((3, 30))
+    for k in range(n):
+        S, history = law.stress(way * (k + 1) / n, history, 0.0)
+        work, S0 = work + 0.5 * np.sum((S + S0) * way / n, axis=0), S
+    lost = work - law.energy(way, history)
+    # plastic work is yield stress times accumulated strain, without what hardening stores
+    assert_allclose(lost, YIELD * history[6], rtol=2e-3)
+
+
+# sections
+
+@pytest.mark.parametrize("element", EVEN, ids=name)
+def test_moment_and_curvature_of_an_ideally_plastic_section(element):
+    """M / M_y = 1.5 - 0.5 (k_y / k)^2, up to six times the curvature of first yielding."""
+    _, run = bent(element, ElasticPlastic(E, NU, YIELD, points=20), [0.0, 6.0 * KAPPA * L])
+    found = np.abs(np.array([state.multipliers[0] for state in run])) / M_Y
+    M, k = states(run)
+    assert_allclose(found[1:], moment(k)[1:], rtol=5e-3)  # no locking, in sections either
+    assert_allclose(M[1:], moment(k)[1:], rtol=2e-2)  # of the stress, linear between points
+    assert np.all(run.iterations_at[1:] < 3 * 6)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=name)
+def test_plane_strain_yields_at_a_higher_moment(element):
+    """At nu = 0.499 first yielding is at 2 / sqrt(3) of the yield stress, and so is the limit."""
+    c, nu, k = 2.0 / np.sqrt(3.0), 0.499, 5.0
+    first = c * KAPPA * (1.0 - nu**2)
+    _, run = bent(element, ElasticPlastic(E, nu, YIELD, 1e-3 * E, plane="strain", points=20),
+                      [0.0, k * first * L], increments=20)
+    found = abs(run.state(-1).multipliers[0]) / (c * M_Y)
+    assert_allclose(found, moment(k), rtol=2e-2)
+
+
+def test_points_across_are_as_many_as_asked():
+    """The default is right to 1 %, 5 points to 6 %."""
+    worst, hard = [], 1e-3 * E
+    part = hard / (E + hard)
+    for points in (None, 5, 24):
+        law = ElasticPlastic(E, NU, YIELD, hard, **({} if points is None else {"points": points}))
+        _, run = bent(ElementBeamCable(3), law, [0.0, 4.0 * KAPPA * L], increments=60, ne=1)
+        M, k = states(run)
+        exact = (1.0 - part) * moment(k) + part * k
+        worst.append(np.max(np.abs(M[5:] / exact[5:] - 1.0)))
+    assert 5e-3 < worst[0] < 1e-2 and 2e-2 < worst[1] < 6e-2 and worst[2] < 4e-3
+
+
+@pytest.mark.parametrize("element", EVEN[1:], ids=name)
+def test_springback_and_residual_stress(element):
+    """Bent to 3 k_y, the end is let go: elastic in all points, from M(k) to zero."""
+    law = ElasticPlastic(E, NU, YIELD, 1e-4 * E, points=20)
+    scene, run = bent(element, law, [0.0, 3.0 * KAPPA * L])
+    held, beam = run.state(-1), scene.system.beams[0]
+    k = states(run)[1][-1]
+    free = Scene(beam).clamp("left").run(2.0, increments=2, start=held)
+    _, after = states(free)
+    assert_allclose(after[-1], k - moment(k), rtol=5e-3)
+    assert free.dissipated[-1] == pytest.approx(free.dissipated[0], rel=1e-6)
+    eta = np.array([-1.0, -0.8, -0.5, 0.5, 0.8, 1.0])
+    S = free.state(-1).stress(np.array([0.0 * eta + L / 2, eta * H / 2]))[0] / YIELD
+    assert_allclose(S, np.clip(-eta * k, -1.0, 1.0) + eta * moment(k), atol=2.5e-2)
+    resultants = free.state(-1).resultants((L / 2, 0.0), recover=False)
+    assert abs(resultants.M) < 3e-3 * M_Y
+
+
+def test_a_cycle_closes_and_is_the_masing_curve():
+    """Bilinear fibres with kinematic hardening: the branch is the first one, magnified by 2."""
+    hard, top = E / 20.0, 4.0 * KAPPA * L
+    law = ElasticPlastic(E, NU, YIELD, kinematic=hard, points=20)
+    _, run = bent(ElementBeamCable(5), law, [0.0, top, -top, top], (0.0, 1.0, 3.0, 5.0), 20, 2)
+    M, k = states(run)
+    first, back, again = (np.argmin(np.abs(run.t - t)) for t in (1.0, 3.0, 5.0))
+    assert_allclose(M[again], M[first], rtol=1e-10)
+    part = hard / (E + hard)  # of the tangent in the stiffness
+    virgin = (1.0 - part) * moment(k[:first + 1]) + part * k[:first + 1]
+    assert_allclose(M[1:first + 1], virgin[1:], rtol=5e-3)
+    branch = slice(first + 1, back + 1)
+    half = 0.5 * (k[first] - k[branch])
+    masing = M[first] - 2.0 * ((1.0 - part) * moment(half) + part * half)
+    assert_allclose(M[branch], masing, atol=8e-3 * M[first])
+    # isotropic hardening instead grows from cycle to cycle
+    _, run = bent(ElementBeamCable(5), ElasticPlastic(E, NU, YIELD, hard, points=20),
+                  [0.0, top, -top, top], (0.0, 1.0, 3.0, 5.0), 20, 2)
+    M, _ = states(run)
+    assert M[again] > 1.02 * M[first]
+
+
+def test_layers_yield_each_on_its_own():
+    """A soft elastic core between plastic faces: the faces' moment, b t y (h - t) at full yield."""
+    t, core = 0.1 * H, StVenantKirchhoff(1e-3 * E, NU)
+    face = ElasticPlastic(E, NU, YIELD, points=8)
+    section = Section.layers((t, face), (H - 2 * t, core), (t, face), width=B)
+    for element in (ElementBeamCable(3), ElementBeamANCF(2)):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, L, 5), height=H), element, section=section)
+        scene = Scene(beam).clamp("left")
+        scene.joint("angle", at="right", angle=lambda t: 10.0 * KAPPA * L * t)
+        state = scene.run(1.0, increments=10).state(-1)
+        elastic = 1e-3 * E * B * (0.8 * H) ** 3 / 12.0 * 10.0 * KAPPA
+        assert_allclose(abs(state.multipliers[0]), B * t * YIELD * (H - t) + elastic, rtol=6e-3)
+        ratio = state.field("yield_ratio", np.array([[L / 2, L / 2], [0.0, 0.49 * H]]))
+        assert np.isnan(ratio[0]) and ratio[1] == pytest.approx(1.0, abs=1e-2)
+
+
+# structures
+
+def test_collapse_load_of_a_fixed_beam_with_plastic_hinges():
+    """Clamped at both ends, pushed in the middle: P = 8 M_p / L, with M_p = b h^2 y / 4."""
+    length, h, b = 1.0, 0.02, 0.02
+    law = ElasticPlastic(E, NU, YIELD, points=20)
+    fine = 0.25 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, 15)))  # small ones at the hinges
+    beam = Beam(MeshBeam.init_line(np.append(fine, 0.5 + fine[1:]), height=h),
+                ElementBeamCable(3), law, width=b)
+    scene = Scene(beam).clamp("left").fix("right", ["r^2", "r_X^2"])  # it may slide: no catenary
+    scene.fix((length / 2, 0.0), "r^2", displacement=lambda t: -0.025 * t)
+    run = scene.run(1.0, increments=30)
+    P = -run.reactions((length / 2, 0.0)).force[:, 1]
+    M_p = 0.25 * b * h**2 * YIELD
+    assert_allclose(P[-5:], 8.0 * M_p / length, rtol=1e-2)
+    assert abs(run.state(-1).resultants((0.0, 0.0)).M) / M_p == pytest.approx(1.0, abs=0.02)
+    # balance: the work of the load is stored and dissipated
+    v = 0.025 * run.t
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (P[1:] + P[:-1]) * np.diff(v))])
+    balance = run.strain_energy + run.dissipated
+    assert_allclose(balance[-1], work[-1], rtol=1e-3)
+    assert run.dissipated[-1] > 0.5 * work[-1]
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)], ids=name)
+def test_work_is_stored_or_dissipated(element):
+    """Of the moment on a bent strip, to 1e-6: bent, bent back, and through."""
+    top = 3.0 * KAPPA * L
+    law = ElasticPlastic(E, NU, YIELD, 1e-2 * E, 1e-2 * E)
+    _, run = bent(element, law, [0.0, top, -top], (0.0, 1.0, 2.0), 60)
+    M, angle = (np.array(x) for x in zip(*((
+        state.multipliers[0], np.interp(t, [0.0, 1.0, 2.0], [0.0, top, -top]))
+        for t, state in zip(run.t, run))))
+    work = np.sum(0.5 * (M[1:] + M[:-1]) * np.diff(angle))
+    stored = run.strain_energy[-1] + run.dissipated[-1]
+    assert abs(abs(work) - stored) < 1e-5 * stored
+
+
+# relaxation and creep
+
+SHARES, TIMES = [0.3, 0.2], [1.0, 10.0]
+
+
+def polymer(**more):
+    return Prony(StVenantKirchhoff(1e9, 0.0, **more), SHARES, TIMES)
+
+
+def relaxation(t):
+    return 1.0 - sum(g * (1.0 - np.exp(-t / tau)) for g, tau in zip(SHARES, TIMES))
+
+
+def creep(t):
+    """Inverse of the relaxation: J* = 1 / (s^2 R*), by partial fractions."""
+    a, b = (1.0 / tau for tau in TIMES)
+    slow = np.polymul([1.0, a], [1.0, b])
+    R = (1.0 - sum(SHARES)) * slow + np.polyadd(
+        SHARES[0] * np.polymul([1.0, 0.0], [1.0, b]), SHARES[1] * np.polymul([1.0, 0.0], [1.0, a]))
+    poles = np.roots(np.polymul([1.0, 0.0], R))
+    slopes = np.polyder(np.polymul([1.0, 0.0], R))
+    return sum((np.polyval(slow, p) / np.polyval(slopes, p) * np.exp(p * t)).real for p in poles)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)], ids=name)
+def test_creep_of_a_cantilever(element):
+    """A load that stays: the deflection grows as the creep compliance, to 1e-4."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 0.5, 5), height=H), element, polymer(), width=B)
+    scene = Scene(beam).clamp("left").point_force((0.0, -1e-6), at=(0.5, 0.0))
+    at_once = scene.solve_static().displacement((0.5, 0.0))[1]
+    run = scene.run([1e-9, 5.0, 25.0], increments=100)
+    w = run.displacement((0.5, 0.0))[:, 1]
+    assert_allclose(w / at_once, creep(run.t), rtol=1e-4)
+    assert creep(25.0) > 1.8
+    # balance of energy: the load acts from the start, then it stays
+    work = 0.5e-6 * abs(at_once) + 1e-6 * np.abs(w - at_once)
+    assert_allclose(run.strain_energy + run.dissipated, work, rtol=1e-6)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)], ids=name)
+def test_relaxation_of_a_cantilever(element):
+    """A deflection that stays, reached at a constant rate: exact in increments of any size."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 0.5, 5), height=H), element, polymer(), width=B)
+    scene = Scene(beam).clamp("left")
+    scene.fix("right", "r^2", displacement=lambda t: -1e-6 * np.minimum(t, 1.0))
+    run = scene.run([1.0, 4.0, 30.0], increments=2)
+    force = run.reactions("right").force[:, 1]
+    ramp = 1.0 - sum(g * (1.0 - tau * -np.expm1(-1.0 / tau)) for g, tau in zip(SHARES, TIMES))
+    elastic = force[2] / ramp  # at the end of the ramp
+    later = run.t > 1.0
+    # the ramp is a superposition of steps
+    s, w = np.polynomial.legendre.leggauss(40)
+    exact = [np.sum(0.5 * w * relaxation(t - 0.5 * (s + 1.0))) for t in run.t[later]]
+    assert_allclose(force[later] / elastic, exact, rtol=1e-6)
+    at_once = Scene(beam).clamp("left").fix("right", "r^2", 1e-6).solve_static()
+    assert abs(elastic) == pytest.approx(3.0 * 1e9 * B * H**3 / 12.0 / 0.5**3 * 1e-6, rel=2e-2)
+    assert at_once.load == 1.0
+
+
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum", "newmark"])
+def test_logarithmic_decrement_with_one_prony_term(scheme):
+    """Of s^2 (1 + s tau) + omega^2 (1 + s tau - g) = 0, to 1e-3."""
+    rho, length, g = 1000.0, 0.5, 0.1
+    omega = 1.8751040687**2 * np.sqrt(1e9 * H**2 / (12.0 * rho * length**4))
+    tau = 1.0 / omega
+    roots = np.roots([tau, 1.0, omega**2 * tau, omega**2 * (1.0 - g)])
+    s = roots[np.argmax(roots.imag)]
+    period = 2.0 * np.pi / s.imag
+    beam = Beam(MeshBeam.init_line(np.linspace(0, length, 3), height=H), ElementBeamCable(5),
+                Prony(StVenantKirchhoff(1e9, 0.0, rho), [g], [tau]), width=B)
+    scene = Scene(beam).clamp("left")
+    mode = scene.modes(1).mode(0, displacement=1e-5)
+    history = scene.integrate(2.2 * period, period / 200, scheme=scheme, start=mode)
+    w = history.displacement((length, 0.0))[:, 1]
+    w = w * np.sign(w[0])
+    k, = np.nonzero((w[1:-1] > w[:-2]) & (w[1:-1] > w[2:]))
+    low, peak, high = w[k], w[k + 1], w[k + 2]
+    tops = peak - 0.125 * (high - low) ** 2 / (high - 2.0 * peak + low)
+    assert np.log(tops[0] / tops[1]) == pytest.approx(-s.real * period, rel=1e-3)
+    total = history.total_energy + history.dissipated
+    limit = {"generalized-alpha": 1e-5, "energy-momentum": 1e-10, "newmark": 1e-7}[scheme]
+    assert np.ptp(total) < limit * total[0]
+
+
+# motion, and what remembers
+
+def thrown(material, **more):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 0.2, 7), height=H), ElementBeamCable(3), material,
+                width=B, **more)
+    return Scene(beam).clamp("left").initial_velocity((0.0, 20.0))
+
+
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum"])
+def test_a_bar_hit_hard_stays_bent(scheme):
+    steel = ElasticPlastic(E, NU, YIELD, 1e-2 * E, 1e-2 * E, density=7800.0)
+    scene = thrown(steel)
+    history = scene.integrate(4e-3, 1e-5, scheme=scheme)
+    total = history.total_energy + history.dissipated
+    assert np.all(np.diff(history.dissipated) > -1e-9 * total[0])
+    assert history.dissipated[-1] > 0.5 * total[0]
+    assert np.ptp(total) < (1e-8 if scheme == "energy-momentum" else 2e-2) * total[0]
+    w = history.displacement((0.2, 0.0))[:, 1]
+    elastic = thrown(StVenantKirchhoff(E, NU, 7800.0)).integrate(4e-3, 1e-5, scheme=scheme)
+    assert abs(np.mean(w[-150:])) > 3.0 * abs(np.mean(
+        elastic.displacement((0.2, 0.0))[-150:, 1])) > 0.0
+
+
+def test_an_elastic_law_with_a_history_is_that_law():
+    """Below the yield stress, to round-off: force, tangent, modes, motion."""
+    plain, same = StVenantKirchhoff(E, NU, 7800.0), ElasticPlastic(E, NU, 1e30, density=7800.0)
+    for element in EVEN:
+        mesh, found, stress = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), [], []
+        for law in (plain, same):
+            beam = Beam(mesh, element, law, width=B)
+            scene = Scene(beam).clamp("left").point_force((0.0, -2e5), at=(1.0, 0.0))
+            state = scene.solve_static()
+            motion = scene.integrate(2e-3, 2e-4)
+            found.append((state.u, scene.modes(3, state).frequencies, motion.u[-1],
+                          state.strain_energy))
+            stress.append(state.stress((0.5 + 0.25 * 0.211325, 0.02), recover=False)[0])
+        assert_allclose(*stress, rtol=1e-2)  # linear between points
+        for a, b in zip(*found):
+            assert_allclose(b, a, rtol=1e-8, atol=1e-8 * np.max(np.abs(a)))
+
+
+def test_a_motion_and_a_run_go_on_from_states_copies_files(tmp_path):
+    steel = ElasticPlastic(E, NU, YIELD, 1e-2 * E, density=7800.0)
+    scene = thrown(steel)
+    whole = scene.integrate(8e-4, 1e-5, scheme="generalized-alpha")
+    half = scene.integrate(4e-4, 1e-5, scheme="generalized-alpha")
+    for state in (half.state(-1), copy.copy(half.state(-1))):
+        rest = scene.integrate(8e-4, 1e-5, scheme="generalized-alpha", start=state)
+        assert_allclose(rest.u[-1], whole.u[-1], rtol=0.0, atol=1e-12)
+    again = pickle.loads(pickle.dumps(half.state(-1)))
+    point = (0.01, 0.004)
+    assert again.field("plastic_strain", point) == half.state(-1).field("plastic_strain", point) > 0
+    file = tmp_path / "run.npz"
+    stored = scene.integrate(8e-4, 1e-5, scheme="generalized-alpha", checkpoint=file, every=20)
+    assert_allclose(stored.u[-1], whole.u[-1], rtol=0.0, atol=1e-13)
+    assert_allclose(scene.resume(file).state(-1).memory, whole.state(-1).memory)
+    # nothing depends on what was asked in between
+    assert_allclose(whole.state(40).strain_energy, whole.strain_energy[40], rtol=1e-12)
+    assert scene.integrate(1e-4, 1e-5).dissipated[0] == 0.0
+
+
+def test_plasticity_and_contact_together():
+    """A wire is pressed around a drum and let go: both histories are in the same states."""
+    wire = ElasticPlastic(E, NU, YIELD, 1e-3 * E)
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 0.2, 17), height=0.002), ElementBeamCable(3),
+                wire, width=0.002)
+    scene = Scene(beam).clamp("left").obstacle(Circle((0.03, -0.051), 0.05), friction=0.2)
+    scene.fix("right", "r^2", displacement=lambda t: -0.1 * np.interp(t, [0, 1, 2], [0, 1, 0]))
+    run = scene.run([1.0, 2.0], increments=20)
+    k = run.resultants((0.03, 0.0), recover=False).curvature
+    top = np.argmin(np.abs(run.t - 1.0))
+    assert abs(k[top]) > 2.0 * 2.0 * YIELD / (E * 0.002)
+    end = run.state(-1)
+    assert abs(end.displacement((0.1, 0.0))[1]) > 1e-4 and run.dissipated[-1] > 0.0
+    assert end.field("plastic_strain", (0.03, 0.0009)) > 1e-4
+
+
+# one's own
+
+class Damage(HistoryMaterial):
+    """Modulus lost in proportion to the largest axial strain so far."""
+
+    variables = {"largest": 1}  # noqa: RUF012
+
+    def stress(self, strain, history, dt):
+        largest = np.maximum(history, np.abs(strain[:1].real))
+        kept = 1.0 - 20.0 * np.maximum(history, np.where(strain[:1].real < 0, -1, 1) * strain[:1])
+        kept = np.where(largest > history, kept, 1.0 - 20.0 * history)
+        return kept * np.tensordot(self.elastic, strain, 1), largest
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)], ids=name)
+def test_a_law_of_ones_own_in_one_class(element):
+    """A bar: (1 - 20 e) E e, then back along the secant; its derivative is by complex steps."""
+    law = Damage(E, 0.0)
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), height=H), element, law, width=B)
+    scene = Scene(beam).clamp("left", thickness="free")
+    scene.fix("right", "r^1", displacement=lambda t: np.interp(t, [0, 1, 2], [0, 0.01, 0.004]))
+    run = scene.run([1.0, 2.0], increments=4)
+    N = np.array([state.resultants((0.5, 0.0), recover=False).N for state in run])
+    stretch = 1.0 + np.interp(run.t, [0, 1, 2], [0, 0.01, 0.004])
+    green = 0.5 * (stretch**2 - 1.0) if beam.has_sections else stretch - 1.0
+    worst = np.maximum.accumulate(green)
+    S = E * B * H * (1.0 - 20.0 * worst) * green
+    assert_allclose(N, S * (stretch if beam.has_sections else 1.0), rtol=1e-4, atol=1e-3)
+    found = run.state(-1).field(lambda v: v.output("largest"), (0.5, 0.0))
+    assert found == pytest.approx(worst[-1], rel=1e-4)
+    assert np.all(run.iterations_at[1:] < 18)
+
+
+# what it refuses
+
+def test_what_cannot_be_is_said():
+    line = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1)
+    steel = ElasticPlastic(E, NU, YIELD, density=7800.0, thermal_expansion=1e-5)
+    with pytest.raises(InputError, match=r"order 1.*12 to 17 %"):
+        _ = Beam(line, ElementBeamANCF(1), steel, width=B).kernel
+    for formulation in ("ecm", "strain-split"):
+        with pytest.raises(InputError, match="constant moduli"):
+            _ = Beam(line, ElementBeamANCF(2), steel, width=B, formulation=formulation).kernel
+    beam = Beam(line, ElementBeamANCF(2), steel, width=B)
+    scene = Scene(beam).clamp("left").point_force((0.0, -1.0), at=(1.0, 0.0))
+    with pytest.raises(InputError, match=r"continuation.*scene\.run"):
+        scene.continuation(max_load=1.0)
+    for scheme in ("radau", "gauss"):
+        with pytest.raises(InputError, match="within the step"):
+            scene.integrate(1e-3, 1e-4, scheme=scheme)
+    with pytest.raises(InputError, match="back in time"):
+        scene.integrate(1e-3, 1e-4, scheme="energy-momentum-4")
+    with pytest.raises(InputError, match="takes the whole strain"):
+        Scene(beam).clamp("left").temperature(10.0).solve_static()
+    tapered = MeshBeam.init_line(np.linspace(0, 1, 3), height=lambda x: 0.1 + 0.01 * x)
+    with pytest.raises(InputError, match="constant section"):
+        _ = Beam(tapered, ElementBeamCable(3), steel, width=B).kernel
+    for wrong, text in ((dict(yield_stress=-1.0), "positive"), (dict(hardening=-1.0), "softening"),
+                        (dict(hardening=[[0.0, 1e8], [1.0, 2e8]]), "begins with the yield stress"),
+                        (dict(kinematic=-1.0), "kinematic"), (dict(points=1), "points")):
+        with pytest.raises(InputError, match=text):
+            ElasticPlastic(**{"E": E, "nu": NU, "yield_stress": YIELD, **wrong})
+    for shares, times, text in (([0.6, 0.5], [1.0, 2.0], "below 1"), ([0.5], [-1.0], "times")):
+        with pytest.raises(InputError, match=text):
+            Prony(StVenantKirchhoff(E, NU), shares, times)
+    with pytest.raises(InputError, match="elastic one"):
+        Prony(steel, [0.5], [1.0])
+    with pytest.raises(InputError, match="number for E"):
+        ElasticPlastic(lambda x, y: E, NU, YIELD)
+
+
+def test_wrong_derivatives_and_shapes_of_a_law_are_said():
+    line = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1)
+
+    class Wrong(HistoryMaterial):
+        def stress(self, strain, history, dt):
+            return np.tensordot(self.elastic, strain, 1), history
+
+        def moduli(self, strain, history, dt):
+            return 2.0 * self.elastic[..., None] + 0.0 * strain[0]
+
+    class Short(Wrong):
+        moduli = HistoryMaterial.moduli
+
+        def stress(self, strain, history, dt):
+            return strain[:2], history
+
+    for law, text in ((Wrong, "is not the derivative"), (Short, "shapes")):
+        with pytest.raises(InputError, match=text):
+            _ = Beam(line, ElementBeamANCF(2), law(E, NU), width=B).kernel
