@@ -169,6 +169,39 @@ def test_an_elastica_between_walls_touches_both():
     assert np.allclose(walls[1].points.mean(axis=1)[0], found.y[2, -1], atol=0.01)
 
 
+def test_a_buckled_strip_at_a_wall_by_the_augmented_lagrangian():
+    """Pushed lengthwise until it touches a wall in its middle: the force of an extensible elastica.
+
+    Beyond 80.8 E I / L^2 the strip alone is unstable, and multipliers of a soft obstacle diverge.
+    """
+    h, d, way, aside = 1e-3, 0.02, 1.06e-3, 0.01
+    E = 12.0 / h**3  # E I = 1
+    EA = E * h
+    strip = Beam(MeshBeam.init_line(np.linspace(0, 1, 41), h), ElementBeamCable(5),
+                 StVenantKirchhoff(E, 0.0), width=1.0)
+    scene = Scene(strip).clamp("left").fix("right", ["r^2", "r_X^2"]).point_force(
+        (0, aside), at=(0.5, 0)).obstacle(Line((0, d + h / 2), (0, -1)), method="augmented")
+    state = scene.fix("right", "r^1", displacement=lambda t: -way * t).run(1.0).state(-1)
+
+    def right(s, y, p):
+        cos, sin = np.cos(y[0]), np.sin(y[0])
+        stretch = 1 - (p[0] * cos - p[1] * sin) / EA
+        return np.array([y[1], -p[0] * sin - p[1] * cos, stretch * cos, stretch * sin])
+
+    def ends(a, b, p):
+        return np.array([a[0], a[2], a[3], b[0], b[2] - 0.5 + way / 2, b[3] - d])
+
+    s = np.linspace(0, 0.5, 41)
+    guess = np.array([np.pi * d * np.sin(2 * np.pi * s), 2 * np.pi**2 * d * np.cos(2 * np.pi * s),
+                      s, 0.5 * d * (1 - np.cos(2 * np.pi * s))])
+    found = solve_bvp(right, ends, s, guess, p=[90.0, -3.0], tol=1e-7)
+    assert found.success
+    thrust, shear = found.p
+    assert state.reactions("left").force[0] == pytest.approx(thrust, rel=5e-4)
+    assert state.contact().total[1] == pytest.approx(-2 * abs(shear) - aside, rel=2e-3)
+    assert state.contact().penetration <= 1e-5 * h
+
+
 @pytest.mark.parametrize("degree", [3, 5])
 def test_a_rope_on_a_pulley_has_the_capstan_ratio(degree):
     """exp(mu pi) where it slips all round, pulled against a spring; Euler, Eytelwein."""

@@ -24,6 +24,9 @@ logger = logging.getLogger(__name__)
 
 #: Largest number of pressure corrections (augmented Lagrangian) in a load step.
 AUGMENTED = 50
+#: Number of corrections after which they are too slow, and the obstacles are stiffened; by which
+#: factor, and up to which.
+SLOW, STIFFER, STIFFEST = 5, 10.0, 1e6
 #: Tolerance of an equilibrium that is only a start.
 NEAR = 1e-2
 
@@ -119,15 +122,24 @@ class Increment:
             "force": found.force})
 
     def _augmented(self):
-        """Repeat with corrected pressures until the penetration is within tolerance."""
+        """Repeat with corrected pressures until the penetration is within tolerance.
+
+        Where the body alone is unstable, as a buckled strip at a wall, corrections converge only if
+        obstacles are stiffer than it is unstable, see Bertsekas: "Constrained Optimization and
+        Lagrange Multiplier Methods", Academic Press 1982, 2.2.
+        """
         contacts = self.system.forces.contacts
         self.system.histories.put(self.start.memory, self.level - self.start.load)
         found = self._touching()
         if not contacts.augmented:
             return found
-        for _ in range(AUGMENTED):
+        for k in range(1, AUGMENTED + 1):
             if contacts.augment(found.u, self.time) == 0:
                 return found
+            if k % SLOW == 0:
+                firmness = np.where(contacts.with_multipliers, STIFFER, 1.0) * (
+                    1.0 + contacts.firmness) - 1.0
+                contacts.harden(np.minimum(firmness, STIFFEST), found.u, self.time)
             found = self.iterate(found)
         raise StepFailed(f"the penetration of obstacles is above its tolerance after {AUGMENTED} "
                          "corrections of the pressure")

@@ -21,8 +21,8 @@ from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
-                     POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, TURNS, ContactTables,
-                     Pair, Question, pair_of, transition)
+                     POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, TOLERANCE, TURNS,
+                     ContactTables, Pair, Question, pair_of, transition)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
@@ -219,6 +219,11 @@ class Contacts:
         """Factors of hardening relative to the default stiffness, (groups,), a view; 0 for none."""
         first = LARGEST + len(self.groups)
         return self.tables.memory[first:first + len(self.groups)]
+
+    @property
+    def with_multipliers(self) -> Array:
+        """Whether a group uses the augmented Lagrangian, (groups,)."""
+        return np.array([group.numbers[TOLERANCE] > 0.0 for _, group in self.groups])
 
     def harden(self, firmness: Array, u: Array, t: float) -> None:
         """Set factors of hardening; the tractions of sticking points at u do not change."""
