@@ -41,18 +41,18 @@ smooth, rough = run(0.0), run(0.2)
 print(smooth, rough, sep="\n")
 
 # %%
-# **Check**: without friction the force is normal to the face. With friction it is turned from there
-# by the angle of friction: forwards on the way in, backwards on the way out.
+# **Check**: at each point of contact the force is turned from the normal of the pin by the angle of
+# friction: backwards on the way in, forwards on the way out.
 
-for step, sign in (("insert", 1), ("pull", -1)):
-    at = smooth.during(step)
-    at = at[(stroke(smooth.t[at]) > 5.0) & (stroke(smooth.t[at]) < 8.5)]
-    Fx, Fy = -smooth.reactions("left").force[at].T
-    slope = np.arctan2(-Fx, Fy)
-    found = np.interp(smooth.t[at], rough.t, np.arctan2(*(
-        rough.reactions("left").force.T * [[1], [-1]])))
-    print(f"{step}: angle of friction {np.tan(found - slope).mean():+.4f}")
-    assert np.allclose(np.tan(found - slope), sign * 0.2, atol=0.02)
+for step, sign in (("insert", -1), ("pull", 1)):
+    at = rough.during(step)
+    for i in at[(stroke(rough.t[at]) > 5.0) & (stroke(rough.t[at]) < 8.5)]:
+        contact = rough.state(i).contact()
+        nx, ny = contact.points - (pin.center - [stroke(rough.t[i]), 0.0])[:, None]
+        Fx, Fy = contact.force
+        found = (Fx * ny - Fy * nx) / (Fx * nx + Fy * ny)
+        assert np.allclose(found, sign * 0.2, atol=1e-4)
+    print(f"{step}: angle of friction {found.mean():+.4f}")
 
 # %%
 # The force against the stroke, and the arm on its way.
