@@ -83,6 +83,11 @@ class Assumed(Formulation):
         return [Term(LinearLaw(uncoupled), axis, section, samples),
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
 
+    def points_along(self, element: ElementBeam, material: Material) -> int:
+        if type(self).terms is not Assumed.terms:  # of a subclass
+            return super().points_along(element, material)
+        return element.sampling.points
+
     @staticmethod
     def _volumetric_apart(whole: Term, element: ElementBeam, material: Material,
                           factor: float) -> list[Term] | None:

@@ -6,6 +6,7 @@ derivatives ``G[e] = R[e] G D[e]`` and diagonal R and D (graded meshes, arcs), r
 and unknowns ``D U``.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -102,8 +103,13 @@ def _blocks(x):
         [x, np.repeat(x[-1:], -len(x) % W, axis=0)])
     if x.size == 0:
         return np.zeros((0, *x.shape[1:2], 0)) if x.ndim > 1 else np.zeros((0, 0, 0))
-    x = np.moveaxis(x.reshape(len(x) // W, W, *x.shape[1:]), 1, -1)
-    return np.ascontiguousarray(x).reshape(*x.shape[:2], -1)
+    x = x.reshape(len(x) // W, W, *x.shape[1:])
+    return x.transpose(0, *range(2, x.ndim), 1).reshape(len(x), x.shape[2], -1)
+
+
+@lru_cache(64)
+def _lower(m, k):
+    return np.tril_indices(m, k)
 
 
 def _scales(x):
@@ -115,7 +121,7 @@ def _products(G, products, own):
     """P and Q of derivatives (rows, m)."""
     if own:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    (i, j), (a, b), (g, h) = np.tril_indices(G.shape[1]), np.tril_indices(G.shape[1], -1), products
+    (i, j), (a, b), (g, h) = _lower(G.shape[1], 0), _lower(G.shape[1], -1), products
     one, two, skew = G[g].T, G[h].T, g != h
     return (one[i] * two[j] + one[j] * two[i],
             one[a][:, skew] * two[b][:, skew] - one[b][:, skew] * two[a][:, skew])
@@ -127,7 +133,7 @@ def _symmetric_and_skew(C, D):
         return np.zeros((0, 0, 0)), np.zeros((0, 0, 0))
     m = D.shape[1]
     C = C.reshape(len(C), m, 2, m, 2) / (D[:, :, None, None, None] * D[:, None, None, :, None])
-    (i, j), (a, b) = np.tril_indices(m), np.tril_indices(m, -1)
+    (i, j), (a, b) = _lower(m, 0), _lower(m, -1)
     one, two = C[:, :, 0, :, 1], C[:, :, 1, :, 0]
     K = np.stack([C[:, i, 0, j, 0], C[:, i, 1, j, 1], 0.5 * (one + two)[:, i, j]], axis=2)
     return _blocks(K), _blocks(0.5 * (one - two)[:, a, b])
@@ -137,7 +143,7 @@ def _coupled(K, Z, m):
     """Functions k >= l that K and Z couple, and 1 if component x of one acts on y of the other."""
     if not len(K):
         return np.zeros((3, 0), np.int64)
-    k, l = np.tril_indices(m)
+    k, l = _lower(m, 0)
     both = K.any(axis=0).reshape(len(k), 3, W).any(axis=2)
     both[k != l, 2] |= Z.any(axis=(0, 2))
     used = both.any(axis=1)

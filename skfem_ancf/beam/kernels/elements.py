@@ -106,22 +106,32 @@ class Elements:
         self._sample, self._row = np.concatenate([own, second]), np.concatenate([g, h[second]])
         self._direction = (np.concatenate([own, second + n]) if t.kind == CABLE else
                           np.concatenate([h, g[second]]))
-        self._G_ends = np.ascontiguousarray(G.transpose(0, 2, 1).take(self._row, axis=2))
-        # relative DOFs (2 m, ne); stresses: modulus and strain of each summand, sorted by stress
+        # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
-        (s, z), q = t.pairs, np.arange(t.pairs.shape[1])
-        both = np.concatenate([t.pairs, t.pairs[::-1, s != z]], axis=1)
-        order = both[0].argsort(kind="stable")
-        self._modulus = np.concatenate([q, q[s != z]])[order]
-        self._other = both[1, order]
-        self._begin = both[0, order].searchsorted(own)
-        self.moduli = self._last(t.H, OF_H)
 
     def _last(self, x, column):
         """A table with the elements as last axis, of length 1 if all are equal."""
         x = x if len(x) == 1 else x[self.t.at[:, column]]
         return x.transpose(*range(1, x.ndim), 0).copy()
+
+    @cached_property
+    def _G_ends(self):
+        return np.ascontiguousarray(self.G.transpose(0, 2, 1).take(self._row, axis=2))
+
+    @cached_property
+    def moduli(self) -> Array:
+        """Weighted moduli between samples, (nq, ne or 1)."""
+        return self._last(self.t.H, OF_H)
+
+    @cached_property
+    def _summands(self):
+        """Moduli and strains of the summands of the stresses, sorted, and the first of each."""
+        (s, z), pairs = self.t.pairs, self.t.pairs
+        both, q = np.concatenate([pairs, pairs[::-1, s != z]], axis=1), np.arange(len(s))
+        order = both[0].argsort(kind="stable")
+        return (np.concatenate([q, q[s != z]])[order], both[1, order],
+                both[0, order].searchsorted(np.arange(self.ns)))
 
     @cached_property
     def C(self) -> Array | None:
@@ -194,8 +204,9 @@ class Elements:
     def linear_stress(self, strain: Array, moduli: Array | None = None) -> Array:
         """Weighted stresses (ns, ne) by moduli (nq, ne) between samples."""
         H = self.moduli if moduli is None else moduli
-        products = H.take(self._modulus, 0, None, CLIP) * strain.take(self._other, 0, None, CLIP)
-        return np.add.reduceat(products, self._begin)
+        modulus, other, begin = self._summands
+        products = H.take(modulus, 0, None, CLIP) * strain.take(other, 0, None, CLIP)
+        return np.add.reduceat(products, begin)
 
     @cached_property
     def weights(self) -> Array:
