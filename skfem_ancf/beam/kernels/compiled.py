@@ -104,7 +104,8 @@ def _blocks(x):
     if x.size == 0:
         return np.zeros((0, *x.shape[1:2], 0)) if x.ndim > 1 else np.zeros((0, 0, 0))
     x = x.reshape(len(x) // W, W, *x.shape[1:])
-    return x.transpose(0, *range(2, x.ndim), 1).reshape(len(x), x.shape[2], -1)
+    last = np.ascontiguousarray(x.transpose(0, *range(2, x.ndim), 1))
+    return last.reshape(len(x), x.shape[2], -1)
 
 
 @lru_cache(64)
