@@ -164,11 +164,17 @@ def samples_of(at_xx: Any, at_yy: Any, at_xy: Any, eta: Any) -> Samples:
                    np.repeat([0, 1, 2], [len(xx), len(yy), len(x)]))
 
 
+@lru_cache(64)
+def _unit_slopes(element, samples):
+    X, (x, y) = samples.X, samples.where
+    return element.unit_slopes(X[:, x], X[:, y])
+
+
 def _rows(mesh, element, samples, tind):
     """G (1 or ne, rows, nb - 1) and frame (1 or ne, rows, 2)."""
     X, (x, y) = samples.X, samples.where
     if mesh.is_straight and mesh.heights is None and element.by_reference:
-        unit, n, h = element.unit_slopes(X[:, x], X[:, y]), len(x), mesh.height
+        unit, n, h = _unit_slopes(element, samples), len(x), mesh.height
         t = mesh.t if tind is None else mesh.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])[:, None]
         scale = np.empty((len(L), len(unit)))
