@@ -155,6 +155,32 @@ def test_springback_and_residual_stress(element):
     assert abs(resultants.M) < 3e-3 * M_Y
 
 
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=name)
+def test_fields_of_a_bent_strip_at_points_and_in_files(element, tmp_path):
+    """At k = 3 k_y with kinematic hardening: plastic strain, back stress, and their integrals."""
+    hard, b = E / 20.0, E / 20.0
+    _, run = bent(element, ElasticPlastic(E, NU, YIELD, kinematic=hard, points=20),
+                  [0.0, 3.0 * KAPPA * L])
+    state, eta = run.state(-1), np.array([-0.95, -0.6, -0.2, 0.4, 0.9])
+    points = np.array([0.0 * eta + L / 2, eta * H / 2])
+    plastic = np.maximum(np.abs(3.0 * eta) - 1.0, 0.0) * YIELD / (E + b)
+    assert_allclose(state.field("plastic_strain", points), plastic, atol=3e-2 * plastic.max())
+    back = state.field("back_stress", points)
+    assert_allclose(back[0], -np.sign(eta) * hard * plastic, atol=5e-2 * hard * plastic.max())
+    assert_allclose(state.field("dissipated", points), YIELD * plastic,
+                    atol=3e-2 * YIELD * plastic.max())
+    # its integral over the strip is what the run has lost
+    Y = np.linspace(-0.5, 0.5, 201) * H
+    lost = state.field("dissipated", np.array([0.0 * Y + L / 2, Y]))
+    mean = np.sum(0.5 * (lost[1:] + lost[:-1])) / 200.0
+    assert_allclose(mean * B * H * L, run.dissipated[-1], rtol=2e-2)
+    meshio = pytest.importorskip("meshio")
+    file = state.save(tmp_path / "strip.vtu", fields=("stress", "plastic_strain", "back_stress"))
+    read = meshio.read(file)
+    assert_allclose(read.point_data["plastic_strain"].max(), 2.0 * YIELD / (E + b), rtol=5e-2)
+    state.plot("yield_ratio")
+
+
 def test_a_cycle_closes_and_is_the_masing_curve():
     """Bilinear fibres with kinematic hardening: the branch is the first one, magnified by 2."""
     hard, top = E / 20.0, 4.0 * KAPPA * L
@@ -327,15 +353,15 @@ def thrown(material, **more):
 def test_a_bar_hit_hard_stays_bent(scheme):
     steel = ElasticPlastic(E, NU, YIELD, 1e-2 * E, 1e-2 * E, density=7800.0)
     scene = thrown(steel)
-    history = scene.integrate(4e-3, 1e-5, scheme=scheme)
+    history = scene.integrate(3e-3, 2e-5, scheme=scheme)
     total = history.total_energy + history.dissipated
     assert np.all(np.diff(history.dissipated) > -1e-9 * total[0])
     assert history.dissipated[-1] > 0.5 * total[0]
     assert np.ptp(total) < (1e-8 if scheme == "energy-momentum" else 2e-2) * total[0]
     w = history.displacement((0.2, 0.0))[:, 1]
-    elastic = thrown(StVenantKirchhoff(E, NU, 7800.0)).integrate(4e-3, 1e-5, scheme=scheme)
-    assert abs(np.mean(w[-150:])) > 3.0 * abs(np.mean(
-        elastic.displacement((0.2, 0.0))[-150:, 1])) > 0.0
+    elastic = thrown(StVenantKirchhoff(E, NU, 7800.0)).integrate(3e-3, 2e-5, scheme=scheme)
+    v = elastic.displacement((0.2, 0.0))[:, 1]
+    assert w[-50:].min() > 0.5 * w.max() and v[-50:].min() < 0.1 * v.max()
 
 
 def test_an_elastic_law_with_a_history_is_that_law():
@@ -348,8 +374,12 @@ def test_an_elastic_law_with_a_history_is_that_law():
             scene = Scene(beam).clamp("left").point_force((0.0, -2e5), at=(1.0, 0.0))
             state = scene.solve_static()
             motion = scene.integrate(2e-3, 2e-4)
+            column = Scene(beam).clamp("left").point_force((-1e5, 0.0), at=(1.0, 0.0))
+            pressed = column.solve_static()
+            more = Scene(beam).clamp("left").point_force((-1.0, 0.0), at=(1.0, 0.0))
             found.append((state.u, scene.modes(3, state).frequencies, motion.u[-1],
-                          state.strain_energy))
+                          state.strain_energy, column.buckling(1).factors,
+                          more.buckling(1, pressed).factors))
             stress.append(state.stress((0.5 + 0.25 * 0.211325, 0.02), recover=False)[0])
         assert_allclose(*stress, rtol=1e-2)  # linear between points
         for a, b in zip(*found):
@@ -435,6 +465,9 @@ def test_what_cannot_be_is_said():
     for formulation in ("ecm", "strain-split"):
         with pytest.raises(InputError, match="constant moduli"):
             _ = Beam(line, ElementBeamANCF(2), steel, width=B, formulation=formulation).kernel
+    nearly = ElasticPlastic(E, 0.49, YIELD, plane="strain")
+    with pytest.raises(InputError, match=r"lock in plane strain.*Cubic"):
+        _ = Beam(line, ElementBeamANCF(2), nearly, width=B).kernel
     beam = Beam(line, ElementBeamANCF(2), steel, width=B)
     scene = Scene(beam).clamp("left").point_force((0.0, -1.0), at=(1.0, 0.0))
     with pytest.raises(InputError, match=r"continuation.*scene\.run"):

@@ -18,6 +18,10 @@ from .base import Formulation, Term
 from .ecm import AXIS, split_moduli
 
 
+#: Poisson ratio in plane strain to which linear sections take laws that are not split.
+NEAR = 0.4
+
+
 class Assumed(Formulation):
     """Strain components sampled where the interpolation represents pure bending exactly.
 
@@ -64,6 +68,12 @@ class Assumed(Formulation):
         factor = material.shear_factor(element)
         law = material.law(factor)
         whole = Term(law, axis, section, samples)
+        locks = isinstance(law, AtRest) and material.plane == "strain" and material.nu > NEAR
+        if locks and element.order > 0 and sampling.volume:
+            raise InputError(
+                f"{type(material).__name__} has a history, and linear sections lock in plane "
+                f"strain as nu goes to 1/2, by 2 % at {NEAR:g}: nu is {material.nu:g}. Use "
+                "ElementBeamANCFCubic(2), or a cable")
         if element.order > 1:
             return self._volumetric_apart(whole, element, material, factor) or [whole]
         if isinstance(law, AtRest) and element.order == 1:

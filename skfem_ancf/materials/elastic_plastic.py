@@ -16,8 +16,8 @@ from .history import ACROSS, HistoryMaterial
 CORRECTIONS, CLOSED = 100, 1e-13
 #: Relative excess of the yield stress that is round-off.
 EXCESS = 1e-12
-#: (xx, yy, 2 xy) in the basis in which the plane stress moduli are diagonal, and the factors of
-#: f^2 there, with f = sqrt(2/3) times the von Mises stress.
+#: (xx, yy, 2 xy) in the basis in which the plane stress moduli are diagonal (a symmetric matrix),
+#: and the factors of f^2 there, with f = sqrt(2/3) times the von Mises stress.
 BASIS = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]]) / np.sqrt(2.0)
 FACTORS = np.array([1.0 / 3.0, 1.0, 2.0])
 #: f of the yield stress 1.
@@ -145,7 +145,7 @@ class ElasticPlastic(HistoryMaterial):
         if isinstance(h, Voce):
             rest = h.saturation * np.exp(-h.rate * p)
             return y + h.saturation - rest + h.linear * p, h.rate * rest + h.linear
-        if np.ndim(h) == 0:
+        if isinstance(h, float):
             return y + h * p, h + 0.0 * p
         slopes = np.append(np.diff(h[:, 1]) / np.diff(h[:, 0]), 0.0)
         k = np.clip(np.searchsorted(h[:, 0], p, side="right") - 1, 0, None)
@@ -157,7 +157,7 @@ class ElasticPlastic(HistoryMaterial):
         if isinstance(h, Voce):
             lost = -np.expm1(-h.rate * p) / h.rate if h.rate else 0.0 * p
             return h.saturation * (p - lost) + 0.5 * h.linear * p * p
-        if np.ndim(h) == 0:
+        if isinstance(h, float):
             return 0.5 * h * p * p
         steps = np.cumsum(np.append(0.0, np.diff(h[:, 0]) * (
             0.5 * (h[1:, 1] + h[:-1, 1]) - self.yield_stress)))
@@ -204,19 +204,19 @@ class ElasticPlastic(HistoryMaterial):
             2.0 / 3.0 * self.kinematic)
         back = BASIS @ history[3:6]
         x = C * (BASIS @ (E - history[:3])) - back
-        S, D = x + back, np.zeros((3, 3, E.shape[1]))
-        D[[0, 1, 2], [0, 1, 2]] = C
+        S, D = x + back, np.empty((3, 3, E.shape[1]))
+        D[:] = self.elastic[..., None]
         at, = np.nonzero(np.sum(P * x * x, axis=0) > (
             ROOT * (1.0 + EXCESS) * self._yield(history[6])[0]) ** 2)
         if len(at):
-            z, g, D[:, :, at] = self._onto_ellipse(x[:, at], history[6, at], C, P, H)
+            z, g, T = self._onto_ellipse(x[:, at], history[6, at], C, P, H)
+            D[:, :, at] = (np.kron(BASIS, BASIS) @ T.reshape(9, -1)).reshape(T.shape)
             f = np.sqrt(np.sum(P * z * z, axis=0))
-            after[:3, at] += BASIS.T @ (g * P * z)
-            after[3:6, at] += BASIS.T @ (g * H * z)
+            after[:3, at] += BASIS @ (g * P * z)
+            after[3:6, at] += BASIS @ (g * H * z)
             after[6, at] += ROOT * g * f
             S[:, at] = z + back[:, at] + g * H * z
-        D = np.einsum("ia,abn,bj->ijn", BASIS.T, D, BASIS, optimize=True)
-        return BASIS.T @ S, D, after
+        return BASIS @ S, D, after
 
     def _onto_ellipse(self, x, p, C, P, H):
         """Stress less back stress, plastic multiplier and moduli on the yield surface."""
@@ -229,8 +229,9 @@ class ElasticPlastic(HistoryMaterial):
             y, K = self._yield(p + ROOT * g * f)
             return f - ROOT * y, df - 2.0 / 3.0 * K * (f + g * df)
 
-        most = np.sqrt(squares.sum(axis=0)) / (ROOT * self.yield_stress) / A.min()
-        g = self._returned(gap, np.zeros_like(p), most)
+        f = np.sqrt(squares.sum(axis=0)) / ROOT
+        most, start = f / self.yield_stress / A.min(), (f / self._yield(p)[0] - 1.0) / A.max()
+        g = self._returned(gap, start, most)
         z = x / (1.0 + A * g)
         f = np.sqrt(np.sum(P * z * z, axis=0))
         K = self._yield(p + ROOT * g * f)[1]
@@ -340,4 +341,5 @@ class ElasticPlastic(HistoryMaterial):
         if self.plane == "strain":
             z = z + history[3] + history[4]
         size = np.sqrt(0.5 * ((a - b) ** 2 + (b - z) ** 2 + (z - a) ** 2) + 3.0 * c * c)
-        return {"plastic_strain": history[6], "yield_ratio": size / self._yield(history[6])[0]}
+        return {"plastic_strain": history[6], "dissipated": self.yield_stress * history[6],
+                "yield_ratio": size / self._yield(history[6])[0]}

@@ -133,7 +133,7 @@ class HistoryMaterial(Material):
     def moduli(self, strain: Array, history: Array, dt: float) -> Array:  # type: ignore[override]
         """Derivative (3, 3, ...) of the stress by the strain; by default by complex steps.
 
-        Iterations take its symmetric part.
+        Iterations take it as symmetric.
         """
         out = []
         for j in range(3):

@@ -238,6 +238,23 @@ class Values(Mapping):
         return self._by_history(lambda law, history: law.outputs(
             self.strain, history, S).get(name, np.full(self.n, other)), other)
 
+    def variable(self, name: str, components: int = 1) -> Array:
+        """A history variable of materials, (n,) or (components, n); zero where there is none.
+
+        Parameters
+        ----------
+        name, components
+            Its name and number of components in ``variables`` of a
+            :class:`~skfem_ancf.materials.HistoryMaterial`.
+        """
+        def of(k):
+            return np.zeros(self.n) if not remembers(self.beam) else self._by_history(
+                lambda law, history: history[law.rows(name)][k] if name in law.variables else
+                np.zeros(self.n), 0.0)
+
+        found = np.array([of(k) for k in range(components)])
+        return found[0] if components == 1 else found
+
     def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
         """A field (n,) that depends on the material at each point.
 
@@ -398,6 +415,10 @@ def _table():
                 "accumulated plastic strain", one, False)
     yield Field("yield_ratio", lambda v: v.output("yield_ratio", np.nan),
                 "von Mises stress over yield stress", one, False)
+    yield Field("dissipated", lambda v: v.output("dissipated"), "dissipated energy density",
+                "energy / volume", False)
+    yield Field("back_stress", lambda v: v.variable("back_stress", 3), "back stress", area, True, 3,
+                "beam")
     yield Field("stretch", _stretch, "stretch along the axis", one, neutral=1.0)
     yield Field("eps_1_direction", lambda v: v.principal[1],
                 "direction of the larger principal strain, reference configuration", one, False, 2,

@@ -167,7 +167,8 @@ def _kinks(state):
         if at_node and (not 0 < k < t.shape[1] or t[1, k - 1] != t[0, k]):
             continue  # an end
         sides = [k - 1, k] if at_node else [int(station)] * 2
-        found = _kink(beam, state.u_of(beam), force, sides)
+        remembering = state.system.histories.beam(beam, state)
+        found = _kink(remembering, state.u_of(beam), force, sides)
         if found is not None:
             angle, reach, length = found
             who = "of a beam" if beam.name is None else f"of beam {beam.name!r}"

@@ -134,7 +134,7 @@ def _solution(s, dynamic, linear):
     layer = " a layer" if any(len(b.across.layers) > 1 for b in beams) else ""
     yield _item("section quadrature", rules, "; ".join(
         f"order {n}: {p} points{layer}, exact for degree {2 * p - 1 - spent} of {4 * n}"
-        for n, p, spent in rules), "a cable has EA and EI", "constant")
+        for n, p, spent in rules), "a cable has EA and EI, or fibres", "constant")
     if linear:
         yield Item("compiled loop", "skipped", "one solve")
     else:

@@ -41,7 +41,8 @@ class StepHistory(History):
     """A quasi-static run: equilibria over the time of its steps.
 
     It has the methods of a History: positions, strains, reactions, sensors, pictures, films and
-    files. Velocities and accelerations are zero; ``dissipated`` is the work of friction.
+    files. Velocities and accelerations are zero; ``dissipated`` is the work of friction and of
+    materials since the first instant.
 
     Attributes
     ----------

@@ -262,7 +262,10 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
     """
     system.constraints.require_supports()
     state = state or _prestressed(system)
-    tangent, loads, du, stress, multipliers = _linear_response(system, state)
+    mine, (theirs, memory) = system.histories, (system.histories, None) if state is None else (
+        state.system.histories, state.memory)
+    with theirs.lent(memory), mine.lent(mine.of_state(state)):
+        tangent, loads, du, stress, multipliers = _linear_response(system, state)
     n, m = tangent.size
     k = _count(k, n - m)
     Ks = loads.geometric(stress, multipliers, 1.0) + _geometric_of_domains(system, tangent, du)

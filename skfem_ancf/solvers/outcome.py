@@ -60,9 +60,9 @@ class StaticResult:
     unstable, doubt
         Whether the equilibrium is unstable, and doubts about the result.
     memory
-        Contact history, shape (n,), or None.
+        History, shape (n,), or None.
     rubbed
-        Work of friction in all load steps.
+        Work that friction and materials dissipate in all load steps.
     diverging
         Whether the equilibrium of the linearised law was no better start; it is not tried again.
     attempts

@@ -107,9 +107,8 @@ class ElementsWithHistory(Elements):
         return sparse.csr_matrix(M.reshape(len(s), -1))
 
     def _between(self, D):
-        """Moduli (nq, ne) between samples, of the symmetric part."""
-        D = 0.5 * (D + D.swapaxes(0, 1)) * self.weights
-        return self._to_moduli @ D.reshape(-1, self.ne)
+        """Moduli (nq, ne) between samples, as if they were symmetric."""
+        return self._to_moduli @ (D * self.weights).reshape(-1, self.ne)
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         S, D, _ = self.evaluate(self.at_points(strain))
