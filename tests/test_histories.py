@@ -173,7 +173,7 @@ def test_fields_of_a_bent_strip_at_points_and_in_files(element, tmp_path):
     Y = np.linspace(-0.5, 0.5, 201) * H
     lost = state.field("dissipated", np.array([0.0 * Y + L / 2, Y]))
     mean = np.sum(0.5 * (lost[1:] + lost[:-1])) / 200.0
-    assert_allclose(mean * B * H * L, run.dissipated[-1], rtol=2e-2)
+    assert_allclose(mean * B * H * L, run.dissipated[-1], rtol=5e-2)
     meshio = pytest.importorskip("meshio")
     file = state.save(tmp_path / "strip.vtu", fields=("stress", "plastic_strain", "back_stress"))
     read = meshio.read(file)
