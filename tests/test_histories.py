@@ -178,7 +178,8 @@ def test_fields_of_a_bent_strip_at_points_and_in_files(element, tmp_path):
     file = state.save(tmp_path / "strip.vtu", fields=("stress", "plastic_strain", "back_stress"))
     read = meshio.read(file)
     largest = read.point_data["plastic_strain"].max()  # at the clamp, in sections
-    assert_allclose(largest, 2.0 * YIELD / (E + b), rtol=0.2 if state.beams[0].has_sections else 0.05)
+    slack = 0.2 if state.beams[0].has_sections else 0.05
+    assert_allclose(largest, 2.0 * YIELD / (E + b), rtol=slack)
     state.plot("yield_ratio")
 
 
