@@ -14,7 +14,7 @@ from ..materials import LinearLaw
 from ..materials.base import Material
 from ..materials.history import AtRest
 from ..mesh.mesh_beam import MeshBeam
-from .base import Formulation, Term
+from .base import Formulation, Term, refuse_rigid_sections
 from .ecm import AXIS, split_moduli
 
 
@@ -76,11 +76,7 @@ class Assumed(Formulation):
                 "ElementBeamANCFCubic(2), or a cable")
         if element.order > 1:
             return self._volumetric_apart(whole, element, material, factor) or [whole]
-        if isinstance(law, AtRest) and element.order == 1:
-            raise InputError(
-                f"{type(material).__name__} has a history, and sections of order 1, which cannot "
-                "contract as they bend, would be 12 to 17 % too stiff with it: use order 2 or "
-                "more, or a cable")
+        refuse_rigid_sections(element, material, law)
         if not isinstance(law, LinearLaw) or isinstance(law, AtRest):
             return [whole]
         uncoupled, coupling = split_moduli(self.name, material, element)

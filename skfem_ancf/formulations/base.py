@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..core.caching import cached_property
-from ..core.errors import require_like
+from ..core.errors import InputError, require_like
 from ..core.immutable import Immutable, read_only
 from ..core.linear import stress_of
 from ..core.quadrature import gauss, lagrange, product_rule
 from ..core.types import Array, Law, Rule
 from ..elements.base import ElementBeam
 from ..materials.base import Material
+from ..materials.history import AtRest
 from ..mesh.mesh_beam import MeshBeam
 
 COMPONENTS = ("xx", "yy", "xy")
@@ -71,6 +72,15 @@ class Term:
         across = self.section_samples[1] if self.section_samples else np.eye(len(self.section[0]))
         both = along[:, None, :, None] * across[:, None]
         return both.reshape(len(along) * len(across), -1)
+
+
+def refuse_rigid_sections(element: ElementBeam, material: Material, law: Law) -> None:
+    """Raise InputError for sections of order 1 of a material with a history."""
+    if isinstance(law, AtRest) and element.order == 1:
+        raise InputError(
+            f"{type(material).__name__} has a history, and sections of order 1, which cannot "
+            "contract as they bend, would be 12 to 17 % too stiff with it: use order 2 or more, or "
+            "a cable")
 
 
 class Formulation(Immutable):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ..core.errors import require_like
 from ..elements.base import ElementBeam
 from ..materials.base import Material
-from .base import Formulation, Term
+from .base import Formulation, Term, refuse_rigid_sections
 
 
 class Continuum(Formulation):
@@ -25,4 +25,5 @@ class Continuum(Formulation):
         require_like("material", material, "Material", "law")
         require_like("element", element, "beam element", "strain_degree", "order")
         law = material.law(material.shear_factor(element))
+        refuse_rigid_sections(element, material, law)
         return [Term(law, *self.full_rules(element, material))]

@@ -221,7 +221,7 @@ def _strained(state, beam, low, high):
         return []
     who = "" if beam.name is None else f" of beam {beam.name!r}"
     law = (f": Hooke's law, as in St. Venant-Kirchhoff, is meant for at most {HOOKE:g}, and metals "
-           "yield before; for rubber use NeoHookean" if hooke else "")
+           "yield before (ElasticPlastic); for rubber use NeoHookean" if hooke else "")
     return [f"the strain{who} is {strain:.3g}{law}. Are E and the lengths in the same units, as Pa "
             "and m, or MPa and mm?"]
 
