@@ -388,6 +388,33 @@ def slow_path(monkeypatch, whole):
     return scene, asked
 
 
+def test_a_rope_over_a_pulley_that_turns_against_the_slip():
+    """At first the tip's force slides the rope, then the pulley turns and it slides back.
+
+    Moments about the axis: the force at the surface is T R / (R + h / 2) times the friction.
+    """
+    R, h, mu, straight = 0.1, 0.004, 0.2, 0.2
+    r = R + 0.5 * h
+
+    def axis(s):
+        turn, end = np.clip((s - straight) / r, 0.0, np.pi), straight + np.pi * r
+        y = r * np.sin(turn) + np.minimum(s - straight, 0.0) - np.maximum(s - end, 0.0)
+        return np.array([-r * np.cos(turn), y])
+
+    mesh = MeshBeam.init_curve(axis, np.linspace(0.0, 2 * straight + np.pi * r, 25), h)
+    rope = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(1e6, 0.3, 1000.0), width=0.01)
+    scene = Scene(rope).pin("left").point_force(
+        (0, -2.0), at="right", amplitude=lambda t: min(t / 0.2, 1.0))
+    scene.obstacle(Circle((0, 0), R), friction=mu, angle=lambda t: -max(t - 0.2, 0.0))
+    history = scene.run([0.2, 1.0], increments=10)
+    pulls = -history.reactions("left").force[:, 1]
+    slid = int(np.argmin(np.abs(history.t - 0.2)))
+    ratio = np.exp(mu * np.pi * R / r)
+    assert pulls[slid] == pytest.approx(2.0 / ratio, rel=2e-2)
+    assert pulls[-1] == pytest.approx(2.0 * ratio, rel=5e-3)
+    assert len(history.t) < 80 and not len(history.jumps)
+
+
 def test_a_run_that_stalls_says_so_and_goes_on_as_statics_does(monkeypatch):
     scene, asked = slow_path(monkeypatch, True)
     with pytest.warns(ModelWarning, match="only increments of .* succeed, where 0.1 was asked"):

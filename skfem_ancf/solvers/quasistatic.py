@@ -27,7 +27,7 @@ FOLLOWED, JUMPED, AT_REST = "followed", "jumped", "at rest"
 #: support: smaller loads stabilise no better. Two smaller ones are tried if all strategies fail.
 CUTS_AT_REST, LAST_AT_REST = CUT**3, CUT**5
 #: Iterations of a descent in an increment.
-BOUNDED = 20
+BOUNDED = 40
 #: Largest number of consecutive jumps.
 JUMPS = 3
 #: Increments below this fraction of those asked for are slow; number of slow ones in a row after
