@@ -1,5 +1,7 @@
 """Contact of beams with obstacles."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
@@ -719,3 +721,39 @@ def test_a_pinned_rod_leans_on_a_circle_of_any_size(angle):
     # its lower face is 0.005 below the axis; it touches at the tip, below the top of the circle
     drop = radius + 0.005 + gap - np.sqrt(radius**2 - 0.5**2)
     assert -tip[1] == pytest.approx(drop - 0.005, rel=1e-3)
+
+
+def test_motions_and_paths_say_where_the_default_stiffness_yields():
+    """A bar that heat presses on a wall: E A (alpha T - gap / L); a path does not stiffen the wall.
+
+    With the stiffness of the finding it is right to 2 %.
+    """
+    law = StVenantKirchhoff(2e5, 0.0, 1e-9, thermal_expansion=1.2e-5)
+    bar = Beam(MeshBeam.init_line(np.linspace(0, 100, 9), 10.0), ElementBeamANCF(2), law, width=1.0)
+    right = 2e5 * 10.0 * (1.2e-5 * 200.0 - 0.1 / 100.0)
+
+    def pressed(**options):
+        return Scene(bar).clamp("left").temperature(200.0).obstacle(
+            Line((100.1, 0), (-1, 0)), **options)
+
+    state = pressed().solve_static()
+    assert not state.checks.findings
+    assert state.reactions("left").force[0] == pytest.approx(right, rel=1e-2)
+    soft = pressed().continuation(max_load=1.0).state(-1)
+    assert soft.reactions("left").force[0] < 0.9 * right
+    (finding,) = soft.checks.findings
+    assert "of default stiffness yields" in finding
+    stiffness = float(re.search(r"stiffness=([\d.e+]+)", finding)[1])
+    firm = pressed(stiffness=stiffness).continuation(max_load=1.0).state(-1)
+    assert not firm.checks.findings
+    assert firm.reactions("left").force[0] == pytest.approx(right, rel=2e-2)
+    slow = Scene(bar).clamp("left").temperature(200.0, amplitude=lambda t: min(t, 1.0))
+    history = slow.obstacle(Line((100.1, 0), (-1, 0))).integrate(1.0, 0.02)
+    assert any("of default stiffness yields" in text for text in history.state(-1).checks.findings)
+    assert not history.state(5).checks.findings  # before it touches
+
+
+def test_slender_beams_that_lie_on_an_obstacle_have_no_such_finding():
+    scene = Scene(beam(ElementBeamCable(3))).clamp("left").gravity((0, -9.81)).obstacle(
+        Line((0, -0.05)))
+    assert not scene.integrate(0.4, 2e-3).state(-1).checks.findings

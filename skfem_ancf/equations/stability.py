@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,23 @@ def _is_symmetric(system):
     """True if the tangent of follower loads happens to be symmetric."""
     skew, size = system.K.skew_size(system.constraints.coordinate_sizes * system.constraints.mask)
     return skew <= ROUND_OFF * size
+
+
+def response(system: Any, u: Array, load: float, when: float, multipliers: Array,
+             t: float | None = None) -> Callable[[Array], Any]:
+    """A function of forces (N,): displacements (N,) by the tangent at u (N,).
+
+    With a measure of displacements; None if there is no tangent. ``when`` is the time of joints,
+    ``t`` that of loads, None for full size.
+    """
+    none = np.zeros(system.constraints.m)
+    try:
+        system.assemble(u, load, t=t)
+        system.solver.factorize(u, when, multipliers)
+    except NO_FACTORS:
+        return lambda force: None
+    return lambda force: (system.solver.solve(force, none)[0],
+                          partial(largest_displacement, system))
 
 
 def has_potential(system: Any, u: Array, load: float) -> bool:

@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from ..actions.contact.contacts import YIELDS
+from ..actions.contact.tables import STIFFNESS
 from ..actions.joints.prescribed import PrescribedDisplacement
 from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..core.errors import ModelWarning, warn
 from ..core.types import Array
+from ..equations.stability import response
 
 #: Stretch below which St. Venant-Kirchhoff softens in compression: the force of a fibre,
 #: E (l^3 - l) / 2, has its minimum there.
@@ -76,11 +79,34 @@ def check(state: Any) -> Checks:
                   + _strained(state, beam, *values[-1][1:3]) if base is None else
                   _linear_findings(beam, u, base))
     found += pushed_points(state.system) + state._not_recovered
+    if state.base is None:
+        found += _yields(state)
     if state.t is None and state.base is None:
         found += _slips(state)
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))
+
+
+def _yields(state):
+    """Findings of ends and stout bodies that press obstacles of default stiffness in too far."""
+    system, contacts = state.system, state.system.forces.contacts
+    soft = any(group.firmest > 1.0 for _, group in contacts.groups)
+    if not soft or system.constraints.missing_supports:
+        return
+    t = state.load if state.t is None else state.t
+    with system.histories.lent(state.memory):
+        respond = response(system, state.u, state.load, t, state.multipliers, state.t)
+        yields = contacts.yielding(state.u, t, respond) if system.solver.stays() else []
+        for k, share in enumerate(yields):
+            if share > YIELDS:
+                which, group = contacts.groups[k]
+                firm = (1.0 + contacts.firmness[k]) * group.numbers[STIFFNESS]
+                yield (f"{contacts.obstacles[which]!r} of default stiffness yields under the end "
+                       f"of a beam or a stout body: some {100.0 * share:.2g} % of its force or of "
+                       "the displacement. solve_static and scene.run stiffen it; for motions and "
+                       f"continuation give stiffness={2.0 * firm * share / YIELDS:.2g}, and small "
+                       "steps where it touches")
 
 
 def _slips(state):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -162,18 +161,8 @@ class Increment:
                               StepFailed, options.close)
 
     def _response(self, found):
-        """A function of forces (N,): displacements (N,) by the tangent at an equilibrium.
-
-        With a measure of displacements; None if there is no tangent.
-        """
-        system, none = self.system, np.zeros(self.system.constraints.m)
-        try:
-            system.assemble(found.u, self.load)
-            system.solver.factorize(found.u, self.time, found.multipliers)
-        except NO_FACTORS:
-            return lambda force: None
-        return lambda force: (system.solver.solve(force, none)[0],
-                              partial(stability.largest_displacement, system))
+        """The response at an equilibrium."""
+        return stability.response(self.system, found.u, self.load, self.time, found.multipliers)
 
     def _from_start(self, options):
         """Iterate from the last equilibrium; if that fails, from the equilibrium of the linearised

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.contact.contacts import Contacts
-from ..actions.contact.contacts import FIRMER
+from ..actions.contact.contacts import FIRMER, YIELDS
 from ..actions.contact.tables import ANCHORED, BILATERAL, LARGEST, MULTIPLIER, hardening
 from ..core.types import Array
 
@@ -35,9 +35,6 @@ RELEASED = 0.1
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
 #: Smallest target of the penetration, relative to the height.
 LEAST = 1e-3
-#: Relative error of the answer above which an obstacle is too soft; largest extent of a stout body,
-#: relative to its height.
-YIELDS, STOUT = 0.01, 5.0
 #: Target of penetration, energy and error, relative to their limits.
 LEFT = 0.5
 #: Largest stiffening factor in one step.
@@ -87,35 +84,11 @@ def soft(contacts: Contacts, u: Array, t: float) -> Array:
     return out
 
 
-def yielding(contacts: Contacts, u: Array, t: float, respond: Callable[..., Any]) -> Array:
-    """The relative error of the answer by the penetration, shape (groups,), to first order.
-
-    For obstacles of default stiffness that the ends of a beam or a stout body touch: that of their
-    forces, or of the largest displacement. A slender beam yields more in bending. ``respond``
-    returns changes of displacements (N,) for forces (N,), from the tangent, and a measure of
-    displacements; None without a tangent.
-    """
-    out = np.zeros(len(contacts.groups))
-    for k, ((_, group), _, gap) in enumerate(contacts.look(u, t)):
-        if group.firmest <= 1.0 or not np.any(gap < 0.0):
-            continue
-        force, change, work = contacts.stiffened(k, u, t)
-        slender = np.ptp(group.starts[:2], axis=1).max() > STOUT * group.height
-        if slender and 2.0 * work[-2 * group.points:].sum() < work.sum():
-            continue
-        found = respond(force)
-        if found is None:
-            return 0.0 * out
-        du, size = found
-        out[k] = max((change.sum() - force @ du) / work.sum(), size(du) / size(u))
-    return out
-
-
 def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -> Array:
     """The required firmness, shape (groups,); at least the present one.
 
     ``energy`` is the strain energy including that of the penetration, ``yields`` the result of
-    :func:`yielding`.
+    :meth:`~skfem_ancf.actions.contact.contacts.Contacts.yielding`.
     """
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
@@ -140,7 +113,7 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
 
     Obstacles have the contact history at the start of the load step. ``solve`` takes the last
     equilibrium (None for the start), whether a rough one suffices, and the number of iterations; it
-    raises ``failed``. ``respond`` is that of :func:`yielding` at an equilibrium. If the start
+    raises ``failed``. ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the start
     is ``close`` to the equilibrium, few iterations are tried.
     """
     before = contacts.tables.memory.copy()
@@ -219,7 +192,7 @@ class _Climb:
         for _ in range(TIMES):
             u, yields = found[0], np.zeros(len(contacts.groups))
             if any(group.firmest > 1.0 for _, group in contacts.groups):
-                yields = yielding(contacts, u, self.t, self.respond(found))
+                yields = contacts.yielding(u, self.t, self.respond(found))
             wanted = firm(contacts, u, self.t, self.energy(u), yields)
             if np.all(wanted == contacts.firmness):
                 break

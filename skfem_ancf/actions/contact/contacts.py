@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -30,6 +30,9 @@ from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HE
 SUNK, FIRM = 0.5, 0.1
 #: Largest factor of hardening beyond that for deep penetration.
 FIRMER = 1e5
+#: Relative error of the answer above which an obstacle is too soft; largest extent of a stout body,
+#: relative to its height.
+YIELDS, STOUT = 0.01, 5.0
 #: Penetration of the reference configuration allowed, relative to the height, as meshes of curves
 #: are approximate.
 CUT = 1e-2
@@ -254,6 +257,29 @@ class Contacts:
             memory[ANCHORED], self.firmness[k] = sticks, firm - 1.0
         return ((out[0] - out[1]) / (2.0 * CHANGE), push * pressure_slope(a, width) * a,
                 push * mean_pressure(a, a, width))
+
+    def yielding(self, u: Array, t: float, respond: Callable[..., Any]) -> Array:
+        """The relative error of the answer by the penetration, shape (groups,), to first order.
+
+        For obstacles of default stiffness that the ends of a beam or a stout body touch: that of
+        their forces, or of the largest displacement. A slender beam yields more in bending.
+        ``respond`` returns changes of displacements (N,) for forces (N,), from the tangent, and a
+        measure of displacements; None without a tangent.
+        """
+        out = np.zeros(len(self.groups))
+        for k, ((_, group), _, gap) in enumerate(self.look(u, t)):
+            if group.firmest <= 1.0 or not np.any(gap < 0.0):
+                continue
+            force, change, work = self.stiffened(k, u, t)
+            slender = np.ptp(group.starts[:2], axis=1).max() > STOUT * group.height
+            if slender and 2.0 * work[-2 * group.points:].sum() < work.sum():
+                continue
+            found = respond(force)
+            if found is None:
+                return 0.0 * out
+            du, size = found
+            out[k] = max((change.sum() - force @ du) / work.sum(), size(du) / size(u))
+        return out
 
     def settle(self, u: Array, t: float) -> float:
         """Update anchors of slipped points; returns the work of friction."""

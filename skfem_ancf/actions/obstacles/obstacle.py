@@ -60,7 +60,8 @@ class Obstacle(ForceElement):
         thinner than a hundredth of their extent L at most ``E height^3 / (12 (L / 200)^4)``, so
         that meshes resolve the indentation. A static solution increases it, up to ``E / height``,
         under deep penetration, and beyond that at ends of beams and at stout bodies, until the
-        answer depends on it by less than 1 %.
+        answer depends on it by less than 1 %. Motions and paths of ``continuation`` keep it;
+        ``state.checks.findings`` say where it yields more.
     beam
         Beam, name or number; all by default.
     method
