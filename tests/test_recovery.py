@@ -7,10 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 from skfem import LinearForm
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        KelvinVoigt, MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.core.errors import ConvergenceError, NameUnknown
 from skfem_ancf.dynamics import GeneralizedAlpha
+from skfem_ancf.recovery.segments import Segment
 from skfem_ancf.scene.adapt import strain_error
 
 REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
@@ -291,3 +292,30 @@ def test_what_cannot_be_recovered_is_raw_and_says_why():
     assert "not an equilibrium" in shape.recovered[0]
     mode = Scene(*scene.beams).clamp("left").modes(1, scene).mode(0, 0.1)
     assert "those of the elements" in mode.recovered[0] and mode.recovery() is None
+
+
+@pytest.mark.parametrize("kind", ["plain", "viscous", "hyperelastic", "tapered"])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
+def test_fields_of_a_motion_are_solved_together_and_those_of_its_states(element, kind, monkeypatch):
+    """Instants from rest to large rotation; one solution for all of them."""
+    law = NeoHookean(2e6, 0.3, 1000.0) if kind == "hyperelastic" and element.order else (
+        StVenantKirchhoff(2e6, 0.3, 1000.0))
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 9), angle=0.3, height=(
+        (lambda x: 0.04 - 0.02 * x) if kind == "tapered" else 0.03))
+    beam = Beam(mesh, element, law, 0.02, damping=KelvinVoigt(2e-3) if kind == "viscous" else None)
+    scene = Scene(beam).clamp("left").gravity((0, -9.81)).traction("top", (0.0, -20.0))
+    history = scene.integrate(0.16, 8e-3)
+    points = [(x, x * np.tan(0.3) + 0.002) for x in (0.02, 0.4, 0.6)]
+    alone = [history.state(k) for k in range(len(history))]
+    expected = {name: np.array([getattr(one, name)(points) for one in alone])
+                for name in ("stress", "strain")}
+    curvature = np.array([one.resultants(points).curvature for one in alone])
+    solved, solve = [], Segment._solve
+    monkeypatch.setattr(Segment, "_solve", lambda one: (solved.append(1), solve(one)))
+    assert_allclose(history.stress(points), expected["stress"],
+                    atol=1e-7 * np.abs(expected["stress"]).max())
+    assert len(solved) == 1 and np.ptp(history.displacement("right")[:, 1]) > 0.1
+    assert_allclose(history.strain(points), expected["strain"],
+                    atol=1e-7 * np.abs(expected["strain"]).max())
+    assert_allclose(history.resultants(points).curvature, curvature,
+                    atol=1e-7 * np.abs(curvature).max())

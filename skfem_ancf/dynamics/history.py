@@ -31,6 +31,8 @@ from .sensors import Readings
 #: Attributes of a Motion that are stored.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
            "dissipated", "history", "turns")
+#: Number of states whose fields are recovered together.
+TOGETHER = 32
 #: Default number of instants in a plot.
 STROBES = 8
 
@@ -141,8 +143,15 @@ class History(MaterialPoints, SpringForces):
         if instants is not None and (isinstance(instants, (str, bytes, dict, set))
                                      or not hasattr(instants, "__iter__")):
             raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
-        return map(self.state, range(len(self)) if instants is None else [
+        return self._states(range(len(self)) if instants is None else [
             require_index("instants", k, len(self)) for k in instants])
+
+    def _states(self, instants):
+        for k in range(0, len(instants), TOGETHER):
+            states = [self.state(j) for j in instants[k:k + TOGETHER]]
+            for one in states:
+                vars(one)["_mates"] = states
+            yield from states
 
     def __iter__(self):
         return self.states()

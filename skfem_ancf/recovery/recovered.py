@@ -21,6 +21,7 @@ recovered fields are found for each axial segment between jumps of the section f
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -42,8 +43,8 @@ from ..materials import LinearLaw
 from ..mesh.refinement import by_element
 from ..sections import Layer
 from ..sections.across import EDGE
-from .section_forces import ALONG, NotFound, NotRecovered, SectionForces
-from .segments import Segment
+from .section_forces import ALONG, NotFound, NotRecovered, SectionForces, Together
+from .segments import EACH, Segment
 
 #: Largest relative change of the strain in the last round, and strain that is round-off.
 UNSETTLED, TINY = 0.01, 1e-12
@@ -267,7 +268,7 @@ class Recovery:
     iteration failed.
     """
 
-    def __init__(self, forces: SectionForces, u: Array) -> None:
+    def __init__(self, forces: Any, u: Any) -> None:
         self.forces, self.beam, self._u = forces, forces.beam, u
         beam, layers = self.beam, self.beam.across.layers
         self.why = "" if beam.section.has_fields else (
@@ -298,10 +299,35 @@ class Recovery:
             self.failed = isinstance(why, NotFound)
             self.why = self.why or str(why)
 
+    @cached_property
+    def _parts(self):
+        """The recovered fields of each of several instants."""
+        parts = [copy.copy(self) for _ in self._u]
+        for one, forces, u in zip(parts, self.forces.instants, self._u):
+            one.forces, one._u = forces, u
+        return parts
+
+    @classmethod
+    def together(cls, forces: Sequence[SectionForces], u: Sequence[Array]) -> list[Recovery]:
+        """The recovered fields of several instants.
+
+        They are solved together if they have the same cuts, and no history of materials.
+        """
+        if len(forces) > 1 and all(one.beam is forces[0].beam and np.array_equal(
+                one.cuts, forces[0].cuts) for one in forces):
+            every = cls(Together(forces), u)
+            if every.segments:
+                for k, one in enumerate(every._parts):
+                    one.segments = [segment.part(k) for segment in every.segments]
+                    one.why = every.why
+                return every._parts
+        return [cls(*each) for each in zip(forces, u)]
+
     def _solved(self):
         found = [Segment(self, a, b) for a, b in pairwise(self.forces.cuts)]
-        strain = max(largest(segment.stretch - 1.0) for segment in found)
-        change = max(segment.change for segment in found) / max(strain, TINY)
+        strain = np.max([largest(segment.stretch - 1.0, EACH) for segment in found], axis=0)
+        change = np.max(np.max([segment.change for segment in found], axis=0)
+                        / np.maximum(strain, TINY))
         if change > UNSETTLED:
             raise NotFound("the iteration does not converge: the last change of the strain is "
                            f"{change:.0%} of its largest value")
@@ -339,6 +365,9 @@ class Recovery:
     @cached_property
     def samples(self) -> tuple[Array, Array]:
         """Sampling points along an element, (p,), and the element stress there, (3, ne, p, m)."""
+        if isinstance(self.forces, Together):
+            samples = [one.samples for one in self._parts]
+            return samples[0][0], np.stack([each for _, each in samples], axis=1)
         beam, x = self.beam, self.beam.element.sampling.places("xx")
         eta, u, e = self.intervals.eta, self._u, np.arange(self.beam.mesh.nelements)
         X = np.array([np.repeat(x, len(eta)), np.tile(eta, len(x))])

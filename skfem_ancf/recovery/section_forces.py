@@ -7,7 +7,7 @@ the element between a node and a section gives the section force and moment.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -157,6 +157,15 @@ class SectionForces:
         """Sum of the Sampled densities of a kind, (2, n, k); or 0."""
         return sum(s.at(at.e, at.X[0, :, 0], at.X[1], self.beam.mesh.nelements)
                    for s in self._sampled if s.where == where)
+
+    def eigenstrain(self, X: Array, e: Array) -> Array:
+        """Sum of the eigenstrains at reference points X (2, n, k), (3, n, k)."""
+        return sum((factor * eigen.strain_at(X, e) for factor, eigen in self.eigen),
+                   np.zeros((3,) + X.shape[1:]))
+
+    def tangent(self, axis: Sections) -> Array:
+        """Derivative of the axis by xi, (2, n)."""
+        return axis.field(self.q, slope=True)[..., 0]
 
     def face(self, side: int, e: Array, xi: Array) -> tuple[Sections, Array]:
         """Sections at the bottom (0) or top (1), and the force on them per xi, (2, n, 1)."""
@@ -337,6 +346,43 @@ class SectionForces:
                 "the state is not an equilibrium under the loads of the scene: at node "
                 f"{np.argmax(jump)} the section force jumps by {np.max(jump):.1%} of its largest "
                 "value")
+
+
+class Together:
+    """Section forces of several instants with the same cuts, as one with an axis of instants."""
+
+    def __init__(self, instants: Sequence[SectionForces]) -> None:
+        self.instants, first = instants, instants[0]
+        self.beam, self.small, self.lifted, self.cuts = (
+            first.beam, first.small, first.lifted, first.cuts)
+        self.viscous = first.viscous
+        self.sides = sorted({side for one in instants for side in one.sides})
+
+    def _all(self, ask: Callable[[SectionForces], Any], like: Any = 0.0) -> Array:
+        return np.stack([ask(one) + like for one in self.instants], axis=1)
+
+    def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
+        R, M = zip(*(one.at(e, xi, begin) for one in self.instants))
+        return np.stack(R, axis=1), np.array(M)
+
+    def viscous_middles(self) -> tuple[Array, Array]:
+        R, M = zip(*(one.viscous_middles() for one in self.instants))
+        return np.stack(R, axis=1), np.array(M)
+
+    def body(self, at: Sections) -> Array:
+        return self._all(lambda one: one.body(at))
+
+    def sampled(self, at: Sections, where: int) -> Array:
+        return self._all(lambda one: one.sampled(at, where), np.zeros((2, *at.X.shape[1:])))
+
+    def face(self, side: int, e: Array, xi: Array) -> tuple[None, Array]:
+        return None, self._all(lambda one: one.face(side, e, xi)[1], np.zeros((2, len(e), 1)))
+
+    def eigenstrain(self, X: Array, e: Array) -> Array:
+        return self._all(lambda one: one.eigenstrain(X, e))
+
+    def tangent(self, axis: Sections) -> Array:
+        return self._all(lambda one: one.tangent(axis))
 
 
 def _traction(beam, traction, X, e):

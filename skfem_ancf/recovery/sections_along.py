@@ -48,11 +48,12 @@ class SectionsAlong:
         return _back(dgttrs(*self._slopes, b)[0], values)
 
     def integral(self, values: Array) -> Array:
-        """Integral from the first section, of values (n,)."""
-        slope, d = self.d_ds(values[:, None])[:, 0], self.d
-        parts = 0.5 * d * (values[:-1] + values[1:]) + d * d / 12.0 * (slope[:-1] - slope[1:])
+        """Integral from the first section, of values (..., n)."""
+        slope, d = self.d_ds(values[..., None])[..., 0], self.d
+        parts = 0.5 * d * (values[..., :-1] + values[..., 1:]) + d * d / 12.0 * (
+            slope[..., :-1] - slope[..., 1:])
         out = np.zeros_like(values)
-        np.cumsum(parts, out=out[1:])
+        np.cumsum(parts, axis=-1, out=out[..., 1:])
         return out
 
     def smoothed(self, values: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ from .sections_along import SectionsAlong
 ROUNDS, SETTLED = 6, 1e-7
 MOST, SLOWLY = 30, 1e-4
 
+#: The axes of sections and points across, behind that of several instants.
+EACH = (-2, -1)
+
 #: Fraction of an element next to a load or joint that has no sections. If it is the whole segment,
 #: the sections are those of the whole element.
 CLOSE = 0.02
@@ -38,7 +42,8 @@ class Segment:
 
     The sections have arc lengths ``s`` (n,) and turn at the ``rate`` (n,). ``strain`` and
     ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the axial fibres, ``change`` the
-    last change of the stretch.
+    last change of the stretch. Of several instants together, the fields have an axis of the
+    instants before n; :meth:`part` is one of them.
     """
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
@@ -53,6 +58,15 @@ class Segment:
             self.Rv, self.Mv = self._viscous_forces()
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
         self._solve()
+
+    def part(self, k: int) -> Segment:
+        """The segment at instant k of several."""
+        one = copy.copy(self)
+        vars(one).pop("result", None)
+        one.strain, one.stress = self.strain[:, k], self.stress[:, k]
+        for name in ("angle", "stretch", "rate", "change"):
+            setattr(one, name, getattr(self, name)[k])
+        return one
 
     def _sections(self, start, end):
         """xi of the sections; sets their elements."""
@@ -88,16 +102,14 @@ class Segment:
             r.intervals.width * (r.of_layers(across.breadth, X, e) + 0.0 * X[0]))
         self.grade = r.of_layers(across.grade, X, e)
         self.g = sections.volume / (speed[:, None] * h)
-        self.E0 = sum((factor * eigen.strain_at(X, e) for factor, eigen in self.forces.eigen),
-                      np.zeros((3,) + self.g.shape))
+        self.E0 = self.forces.eigenstrain(X, e)
         area = self.integral(1.0)[:, None]
         self.below = self.from_bottom(self.width) / area
         self.body = self.g * (self.forces.body(sections)
                               + self.forces.sampled(axis, AXIS) / (area * speed[:, None]))
         self.faces = [self.forces.face(k, e, xi)[1][..., 0] / speed if k in self.forces.sides
                       else np.zeros((2, len(e))) for k in (0, 1)]
-        tangent = axis.field(self.forces.q, slope=True)[..., 0]
-        self.axis_angle = unwrapped(angle_of(*tangent))
+        self.axis_angle = unwrapped(angle_of(*self.forces.tangent(axis)))
         # Jourawski's shear stress up to a factor: first moment of E dA over the width
         E = self.grade * r.modulus(np.zeros((3,) + self.g.shape))
         centre = (self.integral(E * self.Y) / self.integral(E))[:, None]
@@ -108,7 +120,7 @@ class Segment:
         s = self.recovery.arc.at(self.elements, np.full(len(self.elements), 0.5))
         R, M = (x[..., self.elements] for x in self.forces.viscous_middles())
         if len(s) == 1:
-            return R + np.zeros((2, len(self.s))), M + np.zeros(len(self.s))
+            return R + np.zeros(len(self.s)), M + np.zeros(len(self.s))
         return tuple(scipy.interpolate.CubicSpline(s, x, axis=-1)(self.s) for x in (R, M))
 
     # along the axis and across
@@ -184,7 +196,7 @@ class Segment:
         self.eps = eps = self._strain()
         lam_y = np.sqrt(1.0 + 2.0 * eps[1])
         if self.rigid:  # sections of a cable keep their height
-            lam_y = lam_y / self.thinner[:, None]
+            lam_y = lam_y / self.thinner[..., None]
         lean = self.alpha - _arcsin(eps[2] / (self.stretch * lam_y))
         self.rY = lam_y * _normal(lean)
         self.rX = self.stretch * _tangent(self.alpha)
@@ -206,11 +218,11 @@ class Segment:
                 self.P[0], x * self.P[1] - y * self.P[0], force, z * force, z * z * force]))
             n, m, det = N - found, (self.M - moment) / self.height, one * three - two * two
             a, b = (three * n + two * m) / det, (-one * m - two * n) / det
-            change = (a[:, None] + b[:, None] * z) / self.g
+            change = (a[..., None] + b[..., None] * z) / self.g
             self.stretch = self.stretch + change
             if self.stress_given:
                 self.S[0] += E * self.stretch * change
-            if largest(change) < 1e-12 * largest(self.eps[0]):
+            if np.all(largest(change, EACH) < 1e-12 * largest(self.eps[0], EACH)):
                 break
 
     def _turn(self):
@@ -218,23 +230,23 @@ class Segment:
         intervals, along = self.recovery.intervals, self.g * self.rX[0]
         total = self.across(self.rY)
         with_faces = along + self.lean * self.rY[0]
-        self.rate = (self.along.d_ds(total[0][:, None])[:, 0]
+        self.rate = (self.along.d_ds(total[0][..., None])[..., 0]
                      - with_faces @ (intervals.top - intervals.bottom)) / total[1]
         if not np.isfinite(self.rate).all():
             raise NotFound(DIVERGED)
         dt, dn = self.along.d_ds(self.rY)
         normal = (self.slope_from_axis(self.rY[1], dn)
-                  + self.from_axis(self.rate[:, None] * self.rY[0]))
+                  + self.from_axis(self.rate[..., None] * self.rY[0]))
         self.alpha = _arcsin(normal / (self.g * self.stretch))
         turned = (self.slope_from_axis(self.rY[0], self.along.smoothed(dt))
-                  - self.from_axis(self.rate[:, None] * self.rY[1]))
-        self.stretch = (self.at_axis(along)[:, None] + turned) / (self.g * np.cos(self.alpha))
+                  - self.from_axis(self.rate[..., None] * self.rY[1]))
+        self.stretch = (self.at_axis(along)[..., None] + turned) / (self.g * np.cos(self.alpha))
         phi = self.along.integral(self.rate)
-        self.phi = phi + self._line @ (self.axis_angle - phi)
+        self.phi = phi + (self.axis_angle - phi) @ self._line
 
     @cached_property
     def _line(self):
-        """Matrix of the least-squares line through values (n,)."""
+        """Symmetric matrix of the least-squares line through values (n,)."""
         s = self.s - self.s.mean()
         return s[:, None] * s / (s @ s) + 1.0 / len(s)
 
@@ -242,7 +254,7 @@ class Segment:
 
     def _equilibrium(self):
         """Set S_xy and S_yy from div P + b = 0 and the loads of the faces."""
-        rate, viscous, phi = self.rate[:, None], self._viscous_stress(), self.phi[:, None]
+        rate, viscous, phi = self.rate[..., None], self._viscous_stress(), self.phi[..., None]
         P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
         dP = (self.along.d_ds(P) + rate * np.array([-P[1], P[0]])
               + self.width * _turned(self.body, phi))
@@ -269,12 +281,12 @@ class Segment:
         det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
         first = (K[1, 1] * N - K[1, 0] * self.Mv) / det
         second = (K[0, 0] * self.Mv - K[0, 1] * N) / det
-        S = first[:, None] * units[0] + second[:, None] * units[1]
+        S = first[..., None] * units[0] + second[..., None] * units[1]
         return S, self._sheared(Q - self.integral(b * S))
 
     def _sheared(self, force):
         """Jourawski's shear stress (n, m) of shear forces (n,)."""
-        return (force / self.integral(self.rY[1] * self.jourawski))[:, None] * self.jourawski
+        return (force / self.integral(self.rY[1] * self.jourawski))[..., None] * self.jourawski
 
     def _shear(self):
         """Add shear stress to S_xy to match the shear force."""
@@ -282,7 +294,7 @@ class Segment:
             self.rX[1] * self.S[0] + self.rY[1] * self.S[2]))
 
     def _solve(self):
-        shape, dtype = self.g.shape, self.R.dtype
+        shape, dtype = self.axis_angle.shape + self.g.shape[-1:], self.R.dtype
         self.phi, self.alpha, self.stretch = self.axis_angle, np.zeros(shape, dtype), np.ones(
             shape, dtype)
         self.eps, self.S = np.zeros((2, 3) + shape, dtype)
@@ -292,9 +304,9 @@ class Segment:
             self._balance(BALANCE)
             self._turn()
             self._equilibrium()
-            self.change = largest(self.stretch - before)
-            if self.change <= largest(self.stretch - 1.0) * (
-                    SETTLED if k < ROUNDS - 1 else SLOWLY):
+            self.change = largest(self.stretch - before, EACH)
+            if np.all(self.change <= largest(self.stretch - 1.0, EACH) * (
+                    SETTLED if k < ROUNDS - 1 else SLOWLY)):
                 break
         self._balance()
         weight = self._layers()
@@ -303,7 +315,7 @@ class Segment:
             self.stress_given = True
             self._balance()
             self._shear()
-        self.stress, self.angle = self.S, self.phi[:, None] + self.alpha
+        self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
         self.strain = self._fibres(self.S / self.grade)[0] if self.rigid else (
             self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0))
         if not np.all(np.isfinite(self.strain)):
@@ -331,7 +343,8 @@ class Segment:
         r = self.recovery
         at, stress = r.samples
         s = r.arc.at(np.repeat(self.elements, len(at)), np.tile(at, len(self.elements)))
-        values = stress[:, self.elements].reshape(3, len(s), -1)
+        values = stress[..., self.elements, :, :]
+        values = values.reshape(*stress.shape[:-3], len(s), -1)
         if len(s) == 1:
             return np.broadcast_to(values, self.S.shape)
         return scipy.interpolate.CubicSpline(s, values, axis=-2)(self.s)

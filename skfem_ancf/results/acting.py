@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from scipy import sparse
 from ..actions.forces.unscaled import Unscaled
 from ..beam.beam import Beam
 from ..beam.distribution import Sampled, station_of_node, stations_of_vector
-from ..core.types import Array
 from ..recovery.recovered import Recovery
 from ..recovery.section_forces import NotRecovered, SectionForces
 
@@ -69,13 +69,20 @@ def distributed(state: Any, beam: Beam, unit: Any) -> tuple[list[Sampled], list[
     return sampled, places
 
 
-def recover(state: Any, number: int, at: list[float], u: Array,
-            unit: Any) -> Recovery | NotRecovered:
-    """The recovered field of a beam, or the reason why there is none.
+def recover(states: Sequence[Any], number: int) -> list[Any]:
+    """The Recovery of a beam at each of some states, or the NotRecovered why there is none."""
+    found: list[Any] = [_section_forces(state, number) for state in states]
+    known = [k for k, forces in enumerate(found) if not isinstance(forces, NotRecovered)]
+    with np.errstate(all="ignore"):
+        together = Recovery.together([found[k] for k in known],
+                                     [states[k]._places_of(number) for k in known])
+    for k, one in zip(known, together):
+        found[k] = one
+    return found
 
-    ``u`` (N,) may be a step; ``unit`` multiplies load factors.
-    """
-    beam, system = state.beams[number], state.system
+
+def _section_forces(state, number):
+    beam, system, unit = state.beams[number], state.system, state._unit
     if state.base is not None and not np.iscomplexobj(unit):
         return NotRecovered("it is linearised about a state that is not free of load, a mode of "
                             "it: its strain and stress are those of the elements")
@@ -102,7 +109,8 @@ def recover(state: Any, number: int, at: list[float], u: Array,
             viscous = beam.kernel.viscous_forces(state.u[s], state.v[s], time)
         with np.errstate(all="ignore"):
             remembering = system.histories.beam(beam, state)
-            return Recovery(SectionForces(remembering, u, loads, [*at, *places], acceleration,
-                                          sampled, viscous), u)
+            return SectionForces(remembering, state._places_of(number), loads,
+                                 [*state._stations[number], *places], acceleration, sampled,
+                                 viscous)
     except NotRecovered as why:
         return why

@@ -358,11 +358,12 @@ class State(Immutable, MaterialPoints, SpringForces):
     def _recovery_of(self, k, fields=True):
         """:meth:`recovery` of beam ``k``; with ``fields=False`` section forces suffice."""
         if k not in self._recoveries:
-            self._recoveries[k] = recover(
-                self, k, self._stations[k], self._places_of(k), self._unit)
-            if why := self._why(k):
-                logger.info("%r: strain and stress are those of the elements: %s",
-                            self.beams[k], why)
+            mates = [one for one in self._mates if k not in one._recoveries]
+            for one, found in zip(mates, recover(mates, k)):
+                one._recoveries[k] = found
+                if why := one._why(k):
+                    logger.info("%r: strain and stress are those of the elements: %s",
+                                self.beams[k], why)
         found = self._recoveries[k]
         return None if isinstance(found, NotRecovered) or fields and found.why else found
 
@@ -398,6 +399,11 @@ class State(Immutable, MaterialPoints, SpringForces):
     @cached_property
     def _recoveries(self):
         return {}
+
+    @cached_property
+    def _mates(self):
+        """States whose fields are recovered together with its own."""
+        return [self]
 
     @cached_property
     def _stations(self):
