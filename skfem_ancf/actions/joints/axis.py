@@ -5,7 +5,7 @@ The parameter s of a point is the number of its element plus its xi in [0, 1].
 
 from __future__ import annotations
 
-from math import factorial
+from math import factorial, floor
 from typing import Any
 
 import numpy as np
@@ -29,11 +29,10 @@ class Axis:
         along = np.array([-1 if across else a for _, a, across in beam.element.functionals])
         m, nb = (degree + 1) // 2, len(along)
         one = np.array([int(np.flatnonzero(along == k)[0]) for k in range(m)])
-        self._used = np.concatenate([one, nb + one])
-        self._slope = np.tile(np.arange(m), 2)
+        used = np.concatenate([one, nb + one])
         # coefficients of the functions and their derivatives by s, (4, nb, degree + 1), in powers
         # of the distance from the middle of the element
-        self._powers = np.zeros((4, len(self._used), degree + 1))
+        self._powers = np.zeros((4, len(used), degree + 1))
         for k in range(degree + 1):
             self._powers[0, :, k] = hermite_basis(m, 0.5, k) / factorial(k)
         for k in range(1, 4):
@@ -41,23 +40,19 @@ class Axis:
         self._start = np.asarray(beam.q0)
         x = np.linspace(0.0, 1.0, max(SAMPLES, degree))
         self._samples = self._powers[0] @ (x - 0.5) ** np.arange(degree + 1)[:, None]
-        elements = np.arange(beam.mesh.nelements)
-        self._all = self._local(elements)
-        self._scales = beam.mesh.lengths[:, None] ** self._slope
-
-    def _local(self, e: Any) -> Array:
-        first = np.asarray(self.beam.mesh.t[0, e] * self.beam.nd)
-        return first[..., None, None] + 2 * self._used + np.arange(2)[:, None]
+        starts = (beam.mesh.t[0] * beam.nd)[:, None, None]
+        self._dofs = first + starts + 2 * used + np.arange(2)[:, None]  # (ne, 2, nb)
+        self._scales = beam.mesh.lengths[:, None] ** np.tile(np.arange(m), 2)
+        self._range = np.arange(degree + 1)
 
     def element(self, s: float) -> int:
         """The element at s; the end element beyond the ends."""
-        return int(np.clip(np.floor(s), 0, self.beam.mesh.nelements - 1))
+        return min(max(floor(s), 0), len(self._dofs) - 1)
 
     def weights(self, s: float) -> tuple[Array, Array]:
         """DOFs of the scene, and their weights in the axis and its derivatives by s."""
         e = self.element(s)
-        xi = (s - e - 0.5) ** np.arange(self._powers.shape[2])
-        return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
+        return self._dofs[e], (self._powers @ (s - e - 0.5) ** self._range) * self._scales[e]
 
     def between(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
         """Weights at two parameters, and their divided differences."""
@@ -84,8 +79,7 @@ class Axis:
 
     def nearest(self, u: Array, p: Array) -> float:
         """Parameter of the closest point of the axis to p."""
-        q = self._start[self._all] + u[self.first + self._all]
-        x = np.einsum("eck,ek,ks->ecs", q, self._scales, self._samples)
+        x = (self.places(u, self._dofs) * self._scales[:, None]) @ self._samples
         gap = np.sum((x - p[:, None]) ** 2, axis=1)
         e, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
         s, n = float(e + k / (gap.shape[1] - 1)), self.beam.mesh.nelements
@@ -94,7 +88,7 @@ class Axis:
             gap, size = c - p, float(d @ d)
             slope = size + float(gap @ dd)
             step = -float(gap @ d) / (slope if slope > 0.1 * size else size)
-            inside = float(np.clip(s + np.clip(step, -0.5, 0.5), -0.5, n + 0.5))
+            inside = min(max(s + min(max(step, -0.5), 0.5), -0.5), n + 0.5)
             done, s = abs(inside - s) <= 1e-15 * n, inside
             if done:
                 break

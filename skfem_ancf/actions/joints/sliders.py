@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from skfem.helpers import dot
 
 from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
 from ...beam.rigid import RigidBody
@@ -24,6 +23,11 @@ from .spans import Family, Product, Span
 BEYOND = 1e-6
 #: Size of the cache of closest points, for all sleeves.
 KNOWN = 64
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Scalar product of vectors (2, ...), or of one with several."""
+    return a[0] * b[0] + a[1] * b[1]
 
 
 def _pairs(A: Array, B: Array) -> Array:
