@@ -6,7 +6,6 @@ The parameter s of a point is the number of its element plus its xi in [0, 1].
 from __future__ import annotations
 
 from math import factorial, floor
-from typing import Any
 
 import numpy as np
 
