@@ -206,3 +206,19 @@ def test_a_bar_is_swung_round_by_more_than_two_turns(law):
     assert exact.max() > 4 * np.pi
     assert_allclose(history.spring_force(0), stiff * exact, atol=2e-3 * stiff * exact.max())
     assert np.ptp(history.total_energy) < 1e-9 * history.total_energy[0]
+
+
+@pytest.mark.parametrize("law", TURNING.values(), ids=TURNING)
+def test_a_path_goes_on_beyond_half_a_turn(law):
+    """A stiff bar on a spring is turned by a moment: moment over stiffness, in each of its states.
+    """
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.02, angle=0.7), ElementBeamCable(5),
+                StVenantKirchhoff(2e11, 0.0), 0.02)
+    scene = Scene(beam).pin("left").torsional_spring(law, "left").moment("right", 12.0)
+    path = scene.continuation(steps=200, max_load=1.3, ds=0.2)
+    forces = [path.state(k).spring_force(0) for k in range(len(path))]
+    assert_allclose(forces, 12.0 * path.load, atol=1e-6)
+    turned = np.arctan2(*path.position("right")[-1][::-1]) - 0.7
+    assert path.load[-1] == pytest.approx(1.3) and all(path.stable)
+    assert (12.0 * 1.3 / STIFF - turned) / (2 * np.pi) == pytest.approx(1.0, abs=1e-3)
+    assert path.points[-1].state.spring_force(0) == pytest.approx(15.6, rel=1e-6)

@@ -104,7 +104,7 @@ class Path(MaterialPoints):
 
     def _state(self, p, message, iterations=0):
         return State(self.system, p.u, p.load, p.force, True, iterations, message, (),
-                     p.multipliers)
+                     p.multipliers, memory=p.history)
 
     def state(self, k: int) -> State:
         """Point ``k`` as a State."""

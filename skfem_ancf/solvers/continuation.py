@@ -89,10 +89,14 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
         raise InputError("side must be 1 or -1, got 0")
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
-    points, critical, step = [_start(tracer, branch, side)], [], ds
-    with progress_bar(progress, total=steps, desc="path") as bar:
+    critical: list[Critical] = []
+    with system.histories.lent(None if branch is None else branch.history), progress_bar(
+            progress, total=steps, desc="path") as bar:
+        points, step = [_start(tracer, branch, side)], ds
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
+            system.forces.follow(start.u)  # turns of springs are counted from there
+            start.history = system.histories.get()
             try:
                 point, bend = _step(tracer, start, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
@@ -101,7 +105,10 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                 if last:
                     point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
                 if locate is not None and straight:
-                    critical += find_critical(tracer, start, point, locate)
+                    found = find_critical(tracer, start, point, locate)
+                    for one in found:
+                        one.history = start.history
+                    critical += found
             except Failed as failure:
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
@@ -114,6 +121,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
             except KeyboardInterrupt:
                 raise Interrupted(f"stopped at the load {start.load:.6g}; the exception's state is "
                                   "the path up to there", (points, critical)) from None
+            point.history = start.history
             points.append(point)
             bar.update(1)
             if last or (until is not None and _ends(until, point)):

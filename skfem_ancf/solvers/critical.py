@@ -35,6 +35,7 @@ class Critical:
     multiplier_mode: np.ndarray
     negative: int
     change: int
+    history: np.ndarray | None = None
 
 
 def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critical]:

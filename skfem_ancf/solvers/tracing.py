@@ -45,6 +45,8 @@ class Point(MaterialPoints):
         self.tangent: Any = None
         self.multiplier_rate: Any = None
         self.negative: Any = None
+        #: What forces remember of the path before.
+        self.history: Any = None
 
     @property
     def v(self) -> Array:  # type: ignore[override]
@@ -53,7 +55,7 @@ class Point(MaterialPoints):
     @property
     def state(self) -> State:
         return State(self.system, self.u, self.load, self.force, True, self.iterations,
-                     "a point of a path", (), self.multipliers)
+                     "a point of a path", (), self.multipliers, memory=self.history)
 
     @property
     def stable(self) -> bool | None:

@@ -251,8 +251,12 @@ class Forces:
 
     def settle(self, u: Array, t: float) -> float:
         """Update the history data at the end of an increment; returns the work of friction."""
-        self.contacts.turns[:] = self.angles(u)
+        self.follow(u)
         return self.contacts.settle(u, t)
+
+    def follow(self, u: Array) -> None:
+        """Keep the angles of torsional springs at u."""
+        self.contacts.turns[:] = self.angles(u)
 
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
