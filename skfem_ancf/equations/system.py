@@ -251,10 +251,7 @@ class System:
 
     def folded(self, u: Array) -> bool:
         """True if the axis folds back within an element."""
-        for beam, s in zip(self.beams, self.slices):
-            if folded(beam, u[s]):
-                return True
-        return False
+        return any(folded(beam, u[s]) for beam, s in zip(self.beams, self.slices))
 
     def stiffness_at_rest(self) -> sparse.csr_array:
         """The stiffness of force elements in the reference configuration, shape (N, N)."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -142,13 +141,3 @@ def _move(e, target, u, R, phi):
     R -= force * e.free
     add_constraint_rate(e.joints, target.g, target.at, u, moved, phi)
     return moved
-
-
-def reference_work(force: Array, load: Array, u: Array) -> float:
-    """Root of the work of the forces, to which corrections are compared."""
-    return sqrt(max(abs(np.dot(force, u)), abs(np.dot(load, u))))
-
-
-def settled(work: float, reference: float, rules: Any) -> bool:
-    """True if the root of a correction's work is within tolerance or round-off."""
-    return work <= rules.tol * reference + rules.floor

@@ -14,7 +14,7 @@ from ..equations.system import System
 from ..results.points import MaterialPoints
 from ..results.state import State
 from .increment import rules_of
-from .iteration import CLOSED, reference_work, settled
+from .iteration import CLOSED
 
 #: Relative motion of the nodes below which the load counts in the arc length.
 STILL = 1e-3
@@ -182,9 +182,9 @@ class Tracer:
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.jacobian(u, load)
             closed = np.all(np.abs(phi) <= CLOSED * system.backend.tables.plain.joints.sizes)
-            reference = max(reference_work(force, load * external, u),
-                            np.sqrt(abs(external @ step * dl)))
-            if closed and settled(work, reference, rules) and self._small(
+            reference = np.sqrt(max(abs(force @ u), abs(load * (external @ u)),
+                                    abs(external @ step * dl)))
+            if closed and work <= rules.tol * reference + rules.floor and self._small(
                     residual, force, load * external):
                 return Point(self.system, u, m, load, force, start.arc + ds,
                              work / reference if reference > 0 else 0.0, k)
