@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, MeshBeam, Prony, Scene, Section,
+                        ElementBeamCable, InputError, KelvinVoigt, MeshBeam, Prony, Scene, Section,
                         StVenantKirchhoff, Voce)
 from skfem_ancf.materials import HistoryMaterial
 
@@ -403,6 +403,22 @@ def test_an_elastic_law_with_a_history_is_that_law():
         assert_allclose(*stress, rtol=1e-2)  # linear between points
         for a, b in zip(*found):
             assert_allclose(b, a, rtol=1e-8, atol=1e-8 * np.max(np.abs(a)))
+
+
+def test_schemes_of_any_choice_and_step_agree():
+    """By "auto", with damping of the material besides, and at instants within the steps."""
+    steel, point = ElasticPlastic(E, NU, YIELD, 1e-2 * E, density=7800.0), (0.2, 0.0)
+    fine = thrown(steel).integrate(4e-4, 2.5e-6, scheme="newmark")
+    for scene, options in ((thrown(steel), {"scheme": "auto", "dt": 5e-6}),
+                           (thrown(steel), {"scheme": "hht", "dt": 5e-6}),
+                           (thrown(steel, damping=KelvinVoigt(1e-9)), {"dt": 5e-6})):
+        history = scene.integrate(4e-4, t_eval=[0.0, 1.03e-4, 4e-4], **options)
+        assert_allclose(history.displacement(point)[-1], fine.displacement(point)[-1], rtol=1e-2)
+        assert_allclose(history.dissipated[-1], fine.dissipated[-1], rtol=3e-2)
+        if str(history.scheme) == "<EnergyMomentum>":
+            total = history.total_energy + history.dissipated
+            assert np.ptp(total) < 1e-9 * total[0]
+        assert len(history) == 3
 
 
 def test_a_motion_and_a_run_go_on_from_states_copies_files(tmp_path):

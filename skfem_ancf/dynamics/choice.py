@@ -31,7 +31,7 @@ class Choice(NamedTuple):
 def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     """Choose the scheme for a system.
 
-    * obstacles, frames: ``energy-momentum``,
+    * obstacles, frames, materials with a history: ``energy-momentum``,
     * ``rtol`` above 1e-4: ``energy-momentum`` without damping, else ``generalized-alpha``,
     * joints, damping or stiff beams: ``radau``, which damps what steps do not resolve,
     * all others: ``gauss`` with three points.
@@ -57,6 +57,8 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     asked = f"rtol = {rtol:g}"
     if system.forces.contacts.obstacles:
         return Choice(EnergyMomentum(), "obstacles: touching is a kink, and energy is kept")
+    if system.histories.of_beams.size:
+        return Choice(EnergyMomentum(), "a material with a history")
     if system.mass_solver.by_nodes:
         return Choice(EnergyMomentum(), "a frame: its nodes are eliminated")
     if not all(domain.symmetric for domain in system.domains):

@@ -302,7 +302,8 @@ class Integrator:
         For example, all bars of a linkage may be collinear: steps that end there do not converge.
         Collocation, which linearises joints once per step, uses an energy-momentum step here.
         """
-        if not self.m or self.system.forces.contacts.obstacles:
+        system = self.system
+        if not self.m or system.forces.contacts.obstacles or system.histories.of_beams.size:
             return None
         other, begin = self, y
         if not in_steps(self.scheme):
