@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, KelvinVoigt, MeshBeam, Prony, Scene, Section,
-                        StVenantKirchhoff, Voce)
+                        ElementBeamCable, Frame, InputError, KelvinVoigt, MeshBeam, Prony, Scene,
+                        Section, StVenantKirchhoff, Voce)
 from skfem_ancf.materials import HistoryMaterial
 
 E, NU, YIELD, H, B, L = 2e11, 0.3, 2.5e8, 0.01, 0.01, 0.1
@@ -260,6 +260,20 @@ def test_collapse_load_of_a_fixed_beam_with_plastic_hinges():
     balance = run.strain_energy + run.dissipated
     assert_allclose(balance[-1], work[-1], rtol=1e-3)
     assert run.dissipated[-1] > 0.5 * work[-1]
+
+
+def test_collapse_load_of_a_portal():
+    """Fixed feet, a push at the corner: four hinges, P = 4 M_p / height."""
+    h, b = 0.02, 0.02
+    frame = Frame.from_lines(
+        [(0, 0), (0, 1), (1, 1), (1, 0)], [(0, 1), (1, 2), (2, 3)], height=h, width=b, elements=40,
+        material=ElasticPlastic(E, NU, YIELD, points=20))
+    frame.hold(0, ["x", "y", "angle"]).hold(3, ["x", "y", "angle"])
+    run = frame.settle(1, x=lambda t: 0.09 * t).run(1.0, increments=20)
+    left, right = (run.resultants(foot) for foot in ((0.0, 0.0), (1.0, 0.0)))
+    M_p = 0.25 * b * h**2 * YIELD
+    assert_allclose(np.abs([left.M[-1], right.M[-1]]), M_p, rtol=1e-2)
+    assert_allclose(left.force[-1, 0] - right.force[-1, 0], 4.0 * M_p, rtol=1e-2)
 
 
 @pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)], ids=name)
