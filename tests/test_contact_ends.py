@@ -45,7 +45,7 @@ def test_a_wire_hangs_over_a_drum_that_alone_holds_it(element):
         scene.point_force((0, -weight), at=(x, 0), amplitude=ramp)
     history = scene.run(1.0, increments=5)  # the first wraps a wire that lies on one point
     state = history.state(-1)
-    assert history.iterations_at.max() <= 5 * MOST
+    assert history.iterations_at.max() <= MOST
     assert np.allclose(state.contact().total, [0, 2 * weight], atol=1e-3 * weight)
     x, y = state.position([(-1, 0), (1, 0)])
     assert np.allclose(x, [-0.302, 0.302], atol=0.05) and np.allclose(y, y[0], atol=1e-3)

@@ -341,3 +341,9 @@ def test_what_is_not_scaled_has_no_amplitude():
 def test_a_cable_has_none():
     with pytest.raises(InputError, match="elements with sections"):
         cantilever(2, element=ElementBeamCable(5)).add(Energy(soft))
+
+
+@pytest.mark.parametrize("place", [[np.nan, np.nan], (0.0, np.inf)])
+def test_places_that_are_no_numbers_say_so(place):
+    with pytest.raises(InputError, match="material point has a value that is NaN or infinite"):
+        cantilever(element=ElementBeamANCF(2)).energy(lambda r, F, X, t: r[1], over=place)

@@ -176,11 +176,13 @@ class Descent:
                 down = system.solver.inertia().negative == 0 if system.symmetric else R @ du >= 0.0
             except NO_FACTORS:
                 return None
-            self.saw_unstable = self.saw_unstable or (shift == 0.0 and not down)
+            self.saw_unstable = self.saw_unstable or (shift <= least and not down)
             return (du, dm) if down and np.max(np.abs(du / self._sizes)) <= self._radius else None
 
         least = 1e-14 * scale
-        found, shift = correction(0.0), max(self._shift, 100.0 * least)
+        # of a rigid motion the stiffness may be round-off, of any sign
+        free = bool(system.constraints.missing_supports)
+        found, shift = correction(free * least), max(self._shift, 100.0 * least)
         if found is not None:
             self._shift = 0.0
             return found
