@@ -34,12 +34,16 @@ def angle(t):
 
 
 def scene(elements):
-    """The same of skfem_ancf, with quintic cables: the scene, and its crank, rod and slider."""
-    from skfem_ancf import Beam, ElementBeamCable, MeshBeam, RigidBody, Scene, StVenantKirchhoff
+    """The same of skfem_ancf, with quintic cables: the scene, and its crank, rod and slider.
+
+    Exudyn's cables have no rotary inertia.
+    """
+    from skfem_ancf import Beam, ElementBeamCable, MeshBeam, RigidBody, Scene, Section
 
     x = np.linspace(CRANK, CRANK + ROD, elements + 1)
-    rod = Beam(MeshBeam.init_line(x, SIDE), ElementBeamCable(), StVenantKirchhoff(E, 0.0, DENSITY),
-               width=SIDE)
+    A = SIDE**2
+    rod = Beam(MeshBeam.init_line(x, SIDE), ElementBeamCable(), section=Section.numbers(
+        EA=E * A, EI=E * A * A / 12, rhoA=DENSITY * A, rhoI=1e-9 * DENSITY * A * A))
     crank = RigidBody(CRANK_MASS, CRANK_INERTIA, (CRANK / 2, 0), name="crank")
     slider = RigidBody(SLIDER_MASS, 1e-6, (x[-1], 0), name="slider")
     out = Scene(crank, rod, slider).pin((0, 0), crank)
