@@ -20,7 +20,7 @@ from ..beam.strain_energy import body_linearised, body_stress, quadratic
 from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import augment_contact
 from ..core.callbacks import call_solver
-from ..core.source import indices, source
+from ..core.source import indices, shaped, source
 from ..actions.tables import constraint
 from .convergence import (AUGMENTED, MIXED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON,
                           ITERATIONS, LASTING, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
@@ -59,8 +59,7 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, wo
             copy(e.history, memories[n])
         works[n] = state.dissipated[0]
         finish(e.free, matrices.M, s, w, state)
-        for k in range(4):
-            copy(w.y[k], rows[n, k])
+        copy(shaped(w.y, (w.y.size,)), shaped(rows[n], (w.y.size,)))
         copy(w.m.l0, multiplier_rows[n, 0])
         copy(w.m.last, multiplier_rows[n, 1])
     return rows.shape[0]

@@ -34,11 +34,11 @@ def tables_of(body, k):
 
 #: Compiled kernels of elements with their numbers, by the part that has them.
 KERNELS: dict[str, dict[Any, int]] = {
-    "StrainTables": {kernels.force: 0, kernels.mean: 1, kernels.linearised: 2, kernels.tangent: 3},
-    "unsymmetric": {kernels.unsymmetric: 4}, "gradients": {kernels.gradients: 5},
-    "eigenstrains": {kernels.eigen_mean: 6, kernels.eigen_tangent: 7},
-    "laws": {blocks.put_law_stresses: 8, blocks.put_law_moduli: 9}}
-_ARRAYS = {kernels.force: 4, kernels.mean: 5, kernels.linearised: 5, kernels.tangent: 5,
+    "StrainTables": {kernels.force: 0, kernels.linearised: 1, kernels.tangent: 2},
+    "unsymmetric": {kernels.unsymmetric: 3}, "gradients": {kernels.gradients: 4},
+    "eigenstrains": {kernels.eigen_mean: 5, kernels.eigen_tangent: 6},
+    "laws": {blocks.put_law_stresses: 7, blocks.put_law_moduli: 8}}
+_ARRAYS = {kernels.force: 5, kernels.linearised: 5, kernels.tangent: 5,
            kernels.unsymmetric: 3, kernels.gradients: 2, kernels.eigen_mean: 4,
            kernels.eigen_tangent: 3}
 _BANDS = kernels.tangent, kernels.unsymmetric, kernels.eigen_tangent  # with ld
@@ -48,71 +48,71 @@ _HINTS[blocks.put_law_stresses] = CompiledTables, int, F2, F2, F2
 _HINTS[blocks.put_law_moduli] = CompiledTables, int, F2, F2
 #: Addresses of the loaded ones.
 _ADDRESSES = np.zeros(len(_HINTS), np.int64)
-(_call_force, _call_mean, _call_linearised, _call_tangent, _call_unsymmetric, _call_gradients,
+(_call_force, _call_linearised, _call_tangent, _call_unsymmetric, _call_gradients,
  _call_eigen_mean, _call_eigen_tangent, _call_stresses, _call_moduli) = (
     caller(*hints) for hints in _HINTS.values())
 
 
 def run_force(t, u, f):
-    _call_force(t.kernels[0], (t, u, u[:0], u[:0], f))
+    _call_force(t.kernels[0], (t, u, u[:0], u[:0], u[:0], f))
 
 
 def run_stress(t, u, out):
-    _call_force(t.kernels[0], (t, u, u[:0], out, u[:0]))
+    _call_force(t.kernels[0], (t, u, u[:0], u[:0], out, u[:0]))
 
 
 def run_mixed(t, u, given, out, f):
-    _call_force(t.kernels[0], (t, u, given, out, f))
+    _call_force(t.kernels[0], (t, u, u[:0], given, out, f))
 
 
 def run_given(t, u, given, f):
-    _call_force(t.kernels[0], (t, u, given, u[:0], f))
+    _call_force(t.kernels[0], (t, u, u[:0], given, u[:0], f))
 
 
 def run_mean(t, u, v, f):
-    _call_mean(t.kernels[1], (t, u, v, u[:0], u[:0], f))
+    _call_force(t.kernels[0], (t, u, v, u[:0], u[:0], f))
 
 
 def run_mean_mixed(t, u, v, given, out, f):
-    _call_mean(t.kernels[1], (t, u, v, given, out, f))
+    _call_force(t.kernels[0], (t, u, v, given, out, f))
 
 
 def run_linearised(t, u, du, given, out):
-    _call_linearised(t.kernels[2], (t, u, du, given, out, u[:0]))
+    _call_linearised(t.kernels[1], (t, u, du, given, out, u[:0]))
 
 
 def run_viscous(t, u, v, f):
-    _call_linearised(t.kernels[2], (t, u, v, u[:0], u[:0], f))
+    _call_linearised(t.kernels[1], (t, u, v, u[:0], u[:0], f))
 
 
 def run_tangent(t, u, given, out, f, flat, ld):
-    _call_tangent(t.kernels[3], (t, u, given, out, f, flat, ld))
+    _call_tangent(t.kernels[2], (t, u, given, out, f, flat, ld))
 
 
 def run_unsymmetric(t, u, v, flat, ld):
-    _call_unsymmetric(t.kernels[4], (t, u, v, flat, ld))
+    _call_unsymmetric(t.kernels[3], (t, u, v, flat, ld))
 
 
 def run_gradients(t, u, out):
-    _call_gradients(t.kernels[5], (t, u, out))
+    _call_gradients(t.kernels[4], (t, u, out))
 
 
 def run_eigen_force(t, u, given, f):
     if t.law.kind == LINEAR:
-        _call_force(t.kernels[0], (t, u, given, u[:0], f))
+        _call_force(t.kernels[0], (t, u, u[:0], given, u[:0], f))
     else:
-        _call_eigen_mean(t.kernels[6], (t, u, u, given, f))
+        _call_eigen_mean(t.kernels[5], (t, u, u, given, f))
 
 
 def run_eigen_mean(t, u, v, given, f):
     if t.law.kind == LINEAR:
-        _call_mean(t.kernels[1], (t, u, v, given, u[:0], f))
+        _call_force(t.kernels[0], (t, u, v, given, u[:0], f))
     else:
-        _call_eigen_mean(t.kernels[6], (t, u, v, given, f))
+        _call_eigen_mean(t.kernels[5], (t, u, v, given, f))
 
 
 def run_eigen_tangent(t, u, given, flat, ld):
-    _call_eigen_tangent(t.kernels[7], (t, u, given, flat, ld))
+    _call_eigen_tangent(t.kernels[6], (t, u, given, flat, ld))
 
 
 def run_accept(t, u, v, out):
@@ -120,11 +120,11 @@ def run_accept(t, u, v, out):
 
 
 def law_stresses(t, first, E, change, T):
-    _call_stresses(t.kernels[8], (t, first, E, change, T))
+    _call_stresses(t.kernels[7], (t, first, E, change, T))
 
 
 def law_moduli(t, first, E, H):
-    _call_moduli(t.kernels[9], (t, first, E, H))
+    _call_moduli(t.kernels[8], (t, first, E, H))
 
 
 def evaluate_points(law, strain, out):

@@ -142,15 +142,18 @@ def directions(t, r, dd, X):
 
     They are derivatives without dd. Those of sections are means of the rows.
     """
-    if t.kind != SECTION:
-        cable_directions(r, r if len(dd) == 0 else r + dd, X)
-        return X
+    cable = t.kind != SECTION
     if len(dd) == 0:
-        return r
+        if cable:
+            cable_directions(r, r, X)
+        return X if cable else r
+    part, end = (1.0, np.empty(r.shape)) if cable else (0.5, X)
     for g in range(len(r)):
-        a, b, c = r[g], dd[g], X[g]
+        a, b, c = r[g], dd[g], end[g]
         for e in range(len(c)):
-            c[e] = a[e] + 0.5 * b[e]
+            c[e] = a[e] + part * b[e]
+    if cable:
+        cable_directions(r, end, X)
     return X
 
 

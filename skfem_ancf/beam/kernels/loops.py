@@ -6,6 +6,7 @@ t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and `
 
 import numpy as np
 
+from ...core.band import add_multiple
 from ...core.source import source
 from .blocks import (add, at_points, between_samples, block, changes, directions, displaced,
                      from_points, gather, moduli, push, put, strains, stresses,
@@ -16,54 +17,40 @@ from .tangents import (add_geometric, add_material, add_matrices, place, product
 
 
 @source
-def force(t, u, given, out, f):
-    """Force and stresses at u; given stresses act in place of those of the strain.
+def force(t, u, v, given, out, f):
+    """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
 
-    Without ``out``, given stresses act without the constant stiffness.
+    Given stresses act in place of those of the strain; without ``out``, they act without the
+    constant stiffness.
     """
-    R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
-    work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
-    U, F, d, r, B, X = (work[:m], work[m:2 * m], work[2 * m:2 * m + R],
-                        work[2 * m + R:2 * m + 2 * R], work[2 * m + 2 * R:2 * m + 3 * R],
-                        work[2 * m + 3 * R:])
-    E, T, whole = samples[0], samples[1], out.size > 0 or given.size == 0
+    R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v.copy(), v.size > 0
+    if moving:
+        add_multiple(-1.0, u, du)
+    work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
+    U, V, F, rows = work[:m], work[m:2 * m], work[2 * m:3 * m], work[3 * m:]
+    d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
+    E, C, T, whole = samples[0], samples[1], samples[2], out.size > 0 or given.size == 0
+    if not moving:
+        dd, C = dd[:0], C[:0]
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
+        if moving:
+            gather(t, first, du, V)
+            to_rows(t, first, V, dd)
+        D = directions(t, r, dd, X)
         if whole:
             strains(t, first, d, r, E)
-            stresses(t, first, E, E[:0], T)
+            if moving:
+                changes(t, D, dd, C)
+                add(0.5, C, E)
+                add(0.5, V, U)
+            stresses(t, first, E, C, T)
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if given.size > 0:
             take(t, first, given, T)
         if f.size > 0:
-            push(t, first, directions(t, r, d[:0], X), T, U if whole else U[:0], B, F, f)
-
-
-@source
-def mean(t, u, v, given, out, f):
-    """As :func:`force`, but means from u to v whose work is the change of the energy."""
-    R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v - u
-    work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
-    U, V, F, rows = work[:m], work[m:2 * m], work[2 * m:3 * m], work[3 * m:]
-    d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
-    E, C, T, whole = samples[0], samples[1], samples[2], out.size > 0 or given.size == 0
-    for first in range(0, len(t.start), W):
-        displaced(t, first, u, U, d, r)
-        gather(t, first, du, V)
-        to_rows(t, first, V, dd)
-        D = directions(t, r, dd, X)
-        if whole:
-            strains(t, first, d, r, E)
-            changes(t, D, dd, C)
-            add(0.5, C, E)
-            stresses(t, first, E, C, T)
-            add(0.5, V, U)
-        if out.size > 0:
-            put(t, first, T, out[:0], out)
-        if given.size > 0:
-            take(t, first, given, T)
-        push(t, first, D, T, U if whole else U[:0], B, F, f)
+            push(t, first, D, T, U if whole else U[:0], B, F, f)
 
 
 @source
@@ -119,6 +106,8 @@ def tangent(t, u, given, out, f, A, ld):
 def unsymmetric(t, u, v, A, ld):
     """Add ``B(u)^T H (B(v) - B(u))`` to a matrix in two halves."""
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.rows.shape[1], 3 * t.G.shape[0] // 2
+    du = v.copy()
+    add_multiple(-1.0, u, du)
     work = np.empty((m + 3 * R + 2 * n, 2 * t.width))
     U, d, r, s = work[:m], work[m:m + R], work[m + R:m + 2 * R], work[m + 2 * R:m + 3 * R]
     E, X, Y = np.empty((ns, t.width)), work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
@@ -127,7 +116,7 @@ def unsymmetric(t, u, v, A, ld):
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
-        gather(t, first, v - u, U)
+        gather(t, first, du, U)
         to_rows(t, first, U, d)
         s[:] = r
         add(1.0, d, s)
@@ -273,7 +262,8 @@ def shifted(t, first, E, change, shift, S):
 @source
 def eigen_mean(t, u, v, shift, f):
     """Change of the mean force from u to v by eigenstrains (3, points, ne) of a nonlinear law."""
-    R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v - u
+    R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v.copy()
+    add_multiple(-1.0, u, du)
     work, samples = np.empty((m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
     U, rows, E, C, T = work[:m], work[m:], samples[0], samples[1], samples[2]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
