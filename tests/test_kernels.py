@@ -143,22 +143,24 @@ def test_loops_are_arrays(kind, mesh):
         f, g, A, B, S, T = (np.zeros(n) for n in (k.N, k.N, k.N * ld, k.N * ld, ns, ns))
         D, E = np.zeros((2, 4 * ns * k.nd))
         for one, other, *both in (
-                ((runs.run_force, u), (loops.force, u, none, none), (f, g)),
-                ((runs.run_stress, u), (loops.force, u, none), (S, T)),
-                ((runs.run_mixed, u, given), (loops.force, u, given), (S, T), (f, g)),
-                ((runs.run_given, u, given), (loops.force, u, given, none), (f, g)),
-                ((runs.run_mean, u, v), (loops.mean, u, v, none, none), (f, g)),
-                ((runs.run_mean_mixed, u, v, given), (loops.mean, u, v, given), (S, T), (f, g)),
+                ((runs.run_force, u), (loops.force, u, none, none, none), (f, g)),
+                ((runs.run_stress, u), (loops.force, u, none, none), (S, T)),
+                ((runs.run_mixed, u, given), (loops.force, u, none, given), (S, T), (f, g)),
+                ((runs.run_given, u, given), (loops.force, u, none, given, none), (f, g)),
+                ((runs.run_mean, u, v), (loops.force, u, v, none, none), (f, g)),
+                ((runs.run_mean_mixed, u, v, given), (loops.force, u, v, given), (S, T), (f, g)),
                 ((runs.run_linearised, u, v, given), (loops.linearised, u, v, given), (S, T)),
                 ((runs.run_viscous, u, v), (loops.linearised, u, v, none, none), (f, g)),
                 ((runs.run_tangent, u, none), (loops.tangent, u, none), (S, T), (f, g), (A, B)),
                 ((runs.run_tangent, u, given), (loops.tangent, u, given), (S, T), (f, g), (A, B)),
                 ((runs.run_unsymmetric, u, v), (loops.unsymmetric, u, v), (A, B)),
                 ((runs.run_gradients, u), (loops.gradients, u), (D, E)),
-                ((runs.run_eigen_force, u, eigen), (loops.force, u, eigen, none) if linear else
-                 (loops.eigen_mean, u, u, eigen), (f, g)),
-                ((runs.run_eigen_mean, u, v, eigen), (loops.mean, u, v, eigen, none) if linear else
-                 (loops.eigen_mean, u, v, eigen), (f, g)),
+                ((runs.run_eigen_force, u, eigen),
+                 (loops.force, u, none, eigen, none) if linear else (loops.eigen_mean, u, u, eigen),
+                 (f, g)),
+                ((runs.run_eigen_mean, u, v, eigen),
+                 (loops.force, u, v, eigen, none) if linear else (loops.eigen_mean, u, v, eigen),
+                 (f, g)),
                 ((runs.run_eigen_tangent, u, eigen), (loops.eigen_tangent, u, eigen), (A, B))):
             for function, table, place in ((one, x, 0), (other, y, 1)):
                 for pair in both:
