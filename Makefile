@@ -7,6 +7,7 @@
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
 # make margins  the tests, with how far their comparisons are from round-off, out/margins.txt
 # make coverage  the tests, with the lines and branches that they run
+# make check-pages   that README.md and docs/benchmarks.md have the times of benchmarks/results
 # make lint    ruff, mypy and codespell, of the versions that pyproject.toml names
 # make docs    the pages of docs/, the gallery and the reference, out/docs/index.html
 # make pictures  the pictures of docs/ that README.md and the pages show, anew
@@ -23,7 +24,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings test-noise test-least lint paper bench stress fuzz mutants margins coverage docs pictures dist clean
+.PHONY: demo test test-settings test-noise test-least lint paper bench check-pages stress fuzz mutants margins coverage docs pictures dist clean
 
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
@@ -103,6 +104,9 @@ paper: $(VENV)/test.stamp
 
 bench: $(VENV)/bench.stamp
 	$(PY) benchmarks/bench.py
+
+check-pages: $(VENV)/test.stamp
+	$(PY) benchmarks/page.py --check
 
 stress: $(VENV)/test.stamp
 	$(PY) benchmarks/stress.py

@@ -1,20 +1,27 @@
-"""Write the tables of docs/benchmarks.md from the CSV files that bench.py has written.
+"""Write the times of README.md and docs/benchmarks.md from the CSV files of a run of bench.py.
 
-    python benchmarks/page.py [--results out/bench] [--page docs/benchmarks.md]
+    python benchmarks/page.py           after ``cp out/bench/*.csv benchmarks/results``
+    python benchmarks/page.py --check   fails where a page does not say what the files have
 
-Between ``<!-- bench NAME -->`` and ``<!-- end -->`` stands what :data:`TABLES` makes of the rows of
-one run. What was not measured stays as it is, so that a folder of some cases renews theirs alone.
+Between ``<!-- bench NAME -->`` and ``<!-- end -->`` stands what :data:`TABLES` makes of the rows.
+What was not measured stays as it is, so that a folder of some cases renews theirs alone. Where the
+code that is timed has changed since the commit of the run, the page says which.
 """
 
 import argparse
 import csv
 import re
+import subprocess
 from pathlib import Path
 
 from work_precision import large
 from work_precision.report import (DECADES, EXUDYN, GOALS, OURS, Q2, at, fastest, goals, places,
                                    sweeps, table, tangents, weakest)
 
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = "README.md", "docs/benchmarks.md"
+#: Folders of the package that decide times.
+TIMED = "beam/kernels", "solvers", "dynamics"
 NUMBERS = {"error": float, "seconds": float, "whole_seconds": float, "cold_seconds": float,
            "setup_seconds": float, "peak_mb": float, "elements": int, "dofs": int, "steps": int,
            "iterations": float, "cells": int}
@@ -66,7 +73,7 @@ def ratio(rows, peer, target, key, factor):
 
 def factor(case, key, target):
     """The factor of the goal on a case at an error, or None."""
-    return next((g.factor for g in GOALS if g.case == case and g.key == key
+    return next((g.factor(target) for g in GOALS if g.case == case and g.key == key
                  and (1.0 - 1e-6) * min(g.targets) < target < (1.0 + 1e-6) * max(g.targets)), None)
 
 
@@ -84,10 +91,20 @@ def duel(case, peer):
                     named(solved), ms(solved["seconds"]), ms(whole["whole_seconds"])]
             cells += [ratio(rows, peer, target, key, factor(case, key, target))
                       for key in ("seconds", "whole_seconds")]
+            alone = [r for r in rows if r["code"] == peer or in_numpy(r)]
+            cells.append(" / ".join(ratio(alone, peer, target, key, None)
+                                    for key in ("seconds", "whole_seconds"))
+                         if fastest(alone, OURS, target) else "-")
             out.append(cells)
         return table(["error", "here", "solve (ms)", "whole (ms)", peer, "solve (ms)", "whole (ms)",
-                      "solve, times faster", "whole, times faster"], out) + cold(rows)
+                      "solve, times faster", "whole, times faster", "the same in NumPy alone"],
+                     out) + cold(rows)
     return lines
+
+
+def in_numpy(r):
+    """Whether a row is one of this package without compiled code."""
+    return r["code"] == OURS and "NumPy" in r["variant"]
 
 
 def cold(rows):
@@ -114,6 +131,39 @@ def others(results):
         [title, *(both(case, t) for t in DECADES[1:])] for case, title in OTHERS.items()]) + (
         [f"Least between these errors, {title}: {'; '.join(found)}."
          for title, found in between.items() if found] + [""])
+
+
+#: What README.md compares: title, case, peer, error.
+SHORT = (("cantilever under gravity", "5.2", EXUDYN, 1e-4),
+         ("soft pendulum over 1 s", "pendulum", EXUDYN, 1e-4),
+         ("cantilever, small deflection", "5.1", EXUDYN, 1e-4),
+         ("thick cantilever", "thick", Q2, 1e-3))
+
+
+def readme(results):
+    """The times of README.md, and by how much NumPy alone is slower; None if a case is missing."""
+    if not {"frames", *(case for _, case, *_ in SHORT)} <= set(results):
+        return None
+    out, slower = [], []
+    for title, case, peer, error in SHORT:
+        rows = results[case]
+        mine, its = (fastest(rows, code, error) for code in (OURS, peer))
+        alone = fastest([r for r in rows if in_numpy(r)], OURS, error)
+        slower.append(alone["seconds"] / mine["seconds"])
+        out.append((f"{title}, error {error:.0e}", f"{ms(mine['seconds'])} ms",
+                    f"{ms(alone['seconds'])} ms", f"{ms(its['seconds'])} ms ({peer})"))
+    rows = [r for r in results["frames"] if r["cells"] == 30]
+    mine, its = (fastest(rows, code, 1.0001e-4) for code in (OURS, EXUDYN))
+    out.append(("frame of 30 x 30 cells, building it included, error 1e-04",
+                f"{ms(mine['seconds'])} ms", "", f"{ms(its['seconds'])} ms ({EXUDYN})"))
+    return table(["time on one core", "compiled", "NumPy alone", "the other"], out) + [
+        f"Without Numba these take {short(min(slower))} to {short(max(slower))} times as long.", ""]
+
+
+def compiling(results):
+    """What compiling takes."""
+    return table(["a new process", "processor time (s)"],
+                 [(r["variant"], short(r["seconds"])) for r in results["compiling"]])
 
 
 def sweep(results):
@@ -175,22 +225,37 @@ def about(results):
     first = next(iter(results.values()))[0]
     found = [row[4] for row in goals(results)]
     missed = found.count("missed")
+    since = changed(re.search(r"commit (\w+)", first["versions"]))
     return [f"One run: {first['machine']}; {first['versions']}. Of {len(found)} goals "
-            f"{len(found) - missed} were met, {missed} missed; those are marked below.", ""]
+            f"{len(found) - missed} were met, {missed} missed; those are marked below.", "",
+            *([f"Changed since that commit, and not timed again: {', '.join(since)}.", ""]
+              if since else [])]
+
+
+def changed(commit):
+    """Files that decide times and are no longer what they were at a commit (a match), by git."""
+    if commit is None:
+        return []
+    found = subprocess.run(["git", "diff", "--name-only", commit[1], "--", *(
+        f"skfem_ancf/{folder}" for folder in TIMED)], cwd=ROOT, capture_output=True, text=True,
+        check=False)
+    if found.returncode:
+        raise SystemExit(f"no commit {commit[1]} here: {found.stderr.strip()}")
+    return [f"`{line}`" for line in found.stdout.split()]
 
 
 #: The lines of each table, by the case that it needs; "about" and "others" take all of them.
 TABLES = {"about": about, "5.2": duel("5.2", EXUDYN), "pendulum": duel("pendulum", EXUDYN),
           "thick": duel("thick", Q2), "others": others, "sweep": sweep, "tangent": tangent,
           "iteration": iteration, "steps": steps, "frames": frames, "large": large_frames,
-          "scaling": scaling}
+          "scaling": scaling, "compiling": compiling, "readme": readme}
 
 
 def renewed(text, results):
     """The page with the tables of what was measured."""
     def block(match):
         name = match[2]
-        if name not in ("about", "others") and name not in results:
+        if name not in ("about", "others", "readme") and name not in results:
             return match[0]
         lines = TABLES[name](results)
         return match[0] if lines is None else match[1] + "\n".join(["", *lines]) + match[3]
@@ -201,11 +266,17 @@ def renewed(text, results):
 def main(arguments=None):
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--results", default="out/bench", help="folder that bench.py has written")
-    parser.add_argument("--page", default="docs/benchmarks.md", type=Path, help="page to renew")
+    parser.add_argument("--results", default=ROOT / "benchmarks" / "results", help="CSV files")
+    parser.add_argument("--check", action="store_true", help="write nothing, fail if they differ")
     options = parser.parse_args(arguments)
-    options.page.write_text(renewed(options.page.read_text(encoding="utf-8"),
-                                    read(options.results)), encoding="utf-8")
+    results = read(options.results)
+    for page in PAGES:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        if (new := renewed(text, results)) != text:
+            if options.check:
+                raise SystemExit(f"{page} does not say what was measured, or the code has changed "
+                                 "since: run make bench, or python benchmarks/page.py")
+            (ROOT / page).write_text(new, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -22,9 +22,6 @@ def gravity_52(p):
     for order in (1, 2, 3):
         for n in FINE:
             yield ours.run(p, "cubic", order, n)
-    for n in (4, 8, 16):
-        for kind, order in (("cable", 7), ("cubic", 2), ("ancf", 3)):
-            yield ours.run(p, kind, order, n, compiled=False)
     yield from textbook(p)
     for nx in (16, 32, 64, 128):
         for steps in (1, 5):
@@ -164,8 +161,6 @@ def motion(p, scale=1, adaptive=True):
             yield ours.run(p, "cubic", 2, n, steps=steps // scale, tol=1e-6)
     for n in (8, 16, 32):
         yield ours.run(p, "ancf", 2, n, steps=1000 // scale, tol=1e-6)
-    for kind, order in (("cable", 5), ("cubic", 2)):
-        yield ours.run(p, kind, order, 8, steps=1000 // scale, tol=1e-6, compiled=False)
     if exudyn_beams.exudyn is not None:
         yield from peer_motion(p, scale)
 
@@ -255,8 +250,6 @@ def quick(p):
     yield ours.run(p, "cubic", 2, 8)
     if exudyn_beams.exudyn is not None:
         yield exudyn_beams.run(p, "ANCFCable2D", 16, 10 if p.load == "moment" else 1)
-    if p.name == "5.2":
-        yield ours.run(p, "ancf", 3, 4, compiled=False)
 
 
 CASES = {"5.2": gravity_52, "5.2-1e3": slender_fewer, "5.2-1e4": slender_fewer, "5.1": small,
@@ -267,6 +260,12 @@ CASES = {"5.2": gravity_52, "5.2-1e3": slender_fewer, "5.2-1e4": slender_fewer, 
 def runs_of(case, is_quick=False):
     """The list of the runs of a case, always in the same order."""
     return list((quick if is_quick else CASES[case])(PROBLEMS[case]))
+
+
+def in_numpy(run):
+    """The same run of this package without compiled code."""
+    _, args, options = run.recipe
+    return ours.run(run.problem, *args, **{**options, "compiled": False})
 
 
 def warm_up():

@@ -1,4 +1,6 @@
-"""Single operations: assembling the tangent, one iteration, and cost against size."""
+"""Single operations: assembling the tangent, one iteration, compiling, and cost against size."""
+
+import sys
 
 import numpy as np
 from skfem import asm
@@ -8,7 +10,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 
 from .ours import CODE, scene
 from .problems import PROBLEMS
-from .runs import COLUMNS, clock
+from .runs import COLUMNS, alone, clock
 from .stock import TEXTBOOK
 
 ORDER = 3
@@ -95,6 +97,26 @@ def iteration(about, watch):
         rows.append(row("iteration", "NumPy", f"{n} x {points} products of 20 x 20 by 20 x 20", n,
                         "", seconds(lambda A=A, B=B: A @ B), about))
     return rows + own_energies(n, about)
+
+
+#: What a new process does that has no compiled code on disk.
+SCENE = """
+import numpy as np
+from skfem_ancf import *
+beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01), ElementBeamANCF(3),
+            StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
+scene = Scene(beam).clamp("left").gravity((0, -9.81))
+"""
+COMPILED = {"imports": ["-c", SCENE], "statics": ["-c", SCENE + "scene.solve_static()"],
+            "time steps": ["-c", SCENE + "scene.integrate(0.1, 0.01, 'energy-momentum')"],
+            "everything": ["-m", "skfem_ancf", "compile"]}
+
+
+def compiling(names, about, watch):
+    """Processor time of new processes that compile what they need, imports included."""
+    return [row("compiling", CODE, name, "", "", alone([sys.executable, *COMPILED[name]],
+                                                       SKFEM_ANCF_COMPILED="1"), about)
+            for name in watch(names, "compiling")]
 
 
 def bedding(r, F, X, t):

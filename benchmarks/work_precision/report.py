@@ -12,6 +12,7 @@ from .problems import PROBLEMS
 OURS, EXUDYN, Q2, TEXTBOOK = "skfem-ancf", "Exudyn", "scikit-fem Q2", "scikit-fem forms"
 TANGENT = "Tangent assembly 100 times faster than the textbook BilinearForm, 16 to 4096 elements"
 ITERATION = "A static iteration at 16 elements, N = 3, under 0.25 ms"
+FRAME = "A frame of 14 x 14 cells, whole, twice as fast as Exudyn's best with an error of 1e-4"
 SWEEP = "A sweep of cantilevers, beside a loop of Exudyn's at no larger error"
 DECADES = 10.0 ** -np.arange(1.0, 8.0)
 
@@ -23,24 +24,30 @@ class Goal(NamedTuple):
     case: str
     peer: str
     targets: np.ndarray
-    factor: float = 1.0
+    factors: tuple[float, ...] = (1.0,)
     key: str = "seconds"
 
+    def factor(self, error):
+        """That of the smallest target which is no smaller, the last of those given at most."""
+        met = int(np.sum(self.targets * (1.0 + 1e-6) >= error)) - 1
+        return self.factors[min(max(met, 0), len(self.factors) - 1)]
 
-GOALS = (Goal("5.2: faster than Exudyn's best at every error from 1e-2 to 1e-7", "5.2", EXUDYN,
-              DECADES[1:]),
-         Goal("Soft pendulum: ten times faster than Exudyn's best from 1e-3 to 1e-6", "pendulum",
-              EXUDYN, DECADES[2:6], 10.0),
+
+GOALS = (Goal("5.2: 2, 3 and 4 times faster than Exudyn's best at errors of 1e-2, of 1e-3, and of "
+              "1e-4 to 1e-7", "5.2", EXUDYN, DECADES[1:], (2.0, 3.0, 4.0)),
+         Goal("Soft pendulum: three times faster than Exudyn's best from 1e-3 to 1e-6", "pendulum",
+              EXUDYN, DECADES[2:6], (3.0,)),
          Goal("Spin-up: five times faster than Exudyn's best from 1e-3 to 1e-7", "spin-up", EXUDYN,
-              DECADES[2:], 5.0),
+              DECADES[2:], (5.0,)),
          Goal("Thrown rod: five times faster than Exudyn's best from 1e-3 to 1e-7", "free-rod",
-              EXUDYN, DECADES[2:], 5.0),
+              EXUDYN, DECADES[2:], (5.0,)),
          Goal("Thick continuum: stock scikit-fem Q2 beaten a hundredfold", "thick", Q2,
-              DECADES[1:4], 100.0),
-         Goal("5.2, whole: from parameters to the tip in a warm process, ahead of Exudyn's best at "
-              "every error from 1e-2 to 1e-7", "5.2", EXUDYN, DECADES[1:], 1.0, "whole_seconds"),
+              DECADES[1:4], (100.0,)),
+         Goal("5.2, whole: from parameters to the tip in a warm process, 1, 1.5 and 2 times faster "
+              "than Exudyn's best at errors of 1e-2, of 1e-3, and of 1e-4 to 1e-7", "5.2", EXUDYN,
+              DECADES[1:], (1.0, 1.5, 2.0), "whole_seconds"),
          Goal("Soft pendulum, whole: from parameters to the tip in a warm process, ahead of "
-              "Exudyn's best from 1e-3 to 1e-6", "pendulum", EXUDYN, DECADES[2:6], 1.0,
+              "Exudyn's best from 1e-3 to 1e-6", "pendulum", EXUDYN, DECADES[2:6], (1.0,),
               "whole_seconds"))
 
 
@@ -90,7 +97,7 @@ def weakest(rows, goal):
         inside = {e: ahead(e) for e in errors if low < e < high and ahead(e) not in ends}
         least = min(inside.values(), default=np.inf)
         out += [e for e, found in inside.items()
-                if found < goal.factor or found == least < min(ends)]
+                if found < goal.factor(e) or found == least < min(ends)]
     return out
 
 
@@ -114,13 +121,13 @@ def one_against(rows, goal, target):
     mine, its = (fastest(rows, code, target, goal.key) for code in (OURS, goal.peer))
     ratio = lead(rows, goal.peer, target, goal.key)
     return (at(target, goal.targets), f"{ratio:.3g}" if mine and its else "",
-            "met" if mine and ratio >= goal.factor else "missed",
+            "met" if mine and ratio >= goal.factor(target) else "missed",
             named(mine, goal.key), named(its, goal.key))
 
 
 def decades(rows, case):
     """Rows as :func:`against` at each decade, of a case that has no goal."""
-    goal = Goal("", case, EXUDYN, DECADES[1:], 1.0)
+    goal = Goal("", case, EXUDYN, DECADES[1:])
     return [one_against(rows, goal, target) for target in goal.targets]
 
 
@@ -152,8 +159,14 @@ def goals(results):
     for goal in GOALS:
         rows = results.get(goal.case, ())
         if any(r["code"] == goal.peer for r in rows) and all(goal.key in r for r in rows):
-            out += [(goal.wanted, f"error {target}", f"{goal.factor:g} times", ratio, *rest)
-                    for target, ratio, *rest in against(rows, goal)]
+            out += [(goal.wanted, f"error {target}", f"{goal.factor(float(target)):g} times", ratio,
+                     *rest) for target, ratio, *rest in against(rows, goal)]
+    square = [r for r in results.get("frames", ()) if r["cells"] == 14]
+    mine, its = (fastest(square, code, 1.0001e-4) for code in (OURS, EXUDYN))
+    if mine and its:
+        found = its["seconds"] / mine["seconds"]
+        out.append((FRAME, "14 x 14", "2 times", f"{found:.3g}",
+                    "met" if found >= 2.0 else "missed", named(mine), named(its)))
     for n, pairs, _, fused, verdict in tangents(results.get("tangent", ())):
         out.append((TANGENT, f"{n} elements", "100 times", f"{pairs / fused:.3g}", verdict,
                     f"{1e3 * fused:.3g} ms", f"{1e3 * pairs:.3g} ms"))

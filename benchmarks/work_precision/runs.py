@@ -183,13 +183,18 @@ def cold(run):
     What other codes need is not imported; nan where it cannot be told. Bytecode of Python is
     there, as an installation leaves it: a checkout may have none.
     """
-    script = Path(__file__).with_name("cold.py")
-    compileall.compile_dir(script.parents[2] / "skfem_ancf", quiet=2)
     module, args, options = run.recipe
+    return alone([sys.executable, str(Path(__file__).with_name("cold.py")),
+                  json.dumps([module, run.problem.name, args, options])])
+
+
+def alone(command, **variables):
+    """Processor time of a command as a process of its own, with no compiled code on disk."""
+    compileall.compile_dir(Path(__file__).parents[2] / "skfem_ancf", quiet=2)
     with tempfile.TemporaryDirectory() as empty:
         process = subprocess.Popen(
-            [sys.executable, str(script), json.dumps([module, run.problem.name, args, options])],
-            stdout=subprocess.DEVNULL, env={**os.environ, "NUMBA_CACHE_DIR": empty})
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env={**os.environ, **variables, "NUMBA_CACHE_DIR": empty})
         if not hasattr(os, "wait4"):
             process.wait()
             return np.nan
