@@ -298,4 +298,4 @@ def test_ends_that_turn_against_each_other_are_a_fold():
         u = np.zeros((5, beam.nd))
         u[1, 2:4] = np.cos(angle) - 1.0, -np.sin(angle)
         u[2, 2:4] = np.cos(angle) - 1.0, np.sin(angle)
-        assert folded(beam, u.ravel()) is expected
+        assert folded(beam, u.ravel(), 2.5) is expected and not folded(beam, u.ravel())

@@ -20,7 +20,7 @@ OPEN = {"replace", "joint", "plot_curve", "draw", "save", "load"}
 def methods(owner):
     """Public methods of a class that are this package's: name and signature."""
     for name, value in inspect.getmembers(getattr(skfem_ancf, owner)):
-        if not name.startswith("_") and inspect.isroutine(value) and (
+        if not name.startswith("_") and inspect.isroutine(value) and callable(value) and (
                 value.__module__.startswith("skfem_ancf")):
             yield name, inspect.signature(value)
 

@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 from test_io import affine, bent, turn
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, Frame, InputError, Line,
-                        MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene, Section,
-                        StVenantKirchhoff, Train)
+from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamCable, Frame,
+                        InputError, Line, MeshBeam, MissingExtra, NameUnknown, RigidBody, Scene,
+                        Section, StVenantKirchhoff, Train)
 from skfem_ancf.recovery.fields import DRAWN, FIELDS
 from skfem_ancf.visuals.matplotlib import plot_state
 
@@ -27,8 +27,16 @@ def state():
     return bent()
 
 
+@pytest.fixture(scope="module")
+def yielding():
+    beam = Beam(MeshBeam.init_line([0, 0.3, 1.0], height=0.1), ElementBeamANCF(2),
+                ElasticPlastic(1e6, 0.3, yield_stress=1e4, hardening=1e5), 0.1)
+    return Scene(beam).clamp("left").moment("right", 2.4).solve_static()
+
+
 @pytest.mark.parametrize("field", DRAWN)
-def test_every_field_is_drawn_and_named(state, field):
+def test_every_field_is_drawn_and_named(state, yielding, field):
+    state = yielding if field in ("plastic_strain", "yield_ratio", "dissipated") else state
     ax = state.plot(field)
     assert ax.get_title(loc="left") == FIELDS[field].title
     low, high = drawn(ax).get_clim()

@@ -21,9 +21,6 @@ from .strains import cable_axis, fibres
 #: Relative deflection of a cantilever by shear that gives a warning if neglected.
 SHEARED = 1e-3
 
-#: Largest rotation of an axis over one element in radians that need not be a fold.
-FOLDED = 2.5
-
 #: Kernels of the strain energy by the kinematics of elements.
 KERNELS: dict[str, Any] = {"sections": SectionKernel, "cable": CableKernel}
 
@@ -189,11 +186,11 @@ def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
     return np.concatenate(det), np.concatenate(stretches)
 
 
-def folded(beam: Any, u: Array) -> bool:
-    """True if the axis folds back within an element.
+def folded(beam: Any, u: Array, turn: float = np.pi) -> bool:
+    """True if the axis folds back within an element: a chord is opposite to an end tangent.
 
-    Then a chord is opposite to an end tangent, or the ends of an axis of degree 7 or less turn
-    against each other by more than :data:`FOLDED`. Such discrete equilibria are none of the beam.
+    It also does if the ends of an axis of degree 7 or less turn against each other by more than
+    ``turn``.
     """
     nodes = u.reshape(-1, beam.nd)[:, :4].T
     x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
@@ -201,6 +198,7 @@ def folded(beam: Any, u: Array) -> bool:
     ends = (x[:, right] - x[:, left])[:, None] * tangent[:, t]
     if (ends[0] + ends[1] < 0.0).any():
         return True
-    turn = ([1.0, 1.0j] @ tangent) / ([1.0, 1.0j] @ beam.mesh.p_X)
-    largest = np.abs(np.angle(turn[right] * turn[left].conj())).max()
-    return bool(largest > FOLDED and beam.element.axis_degree <= 7)
+    if turn >= np.pi or beam.element.axis_degree > 7:
+        return False
+    turns = ([1.0, 1.0j] @ tangent) / ([1.0, 1.0j] @ beam.mesh.p_X)
+    return bool(np.abs(np.angle(turns[right] * turns[left].conj())).max() > turn)

@@ -36,6 +36,8 @@ UNSTABILISED = 2
 #: Largest number of iterations of a user-defined energy's equilibrium close to the reference
 #: configuration: beyond a pole of the energy there are others.
 SURE = 6
+#: Rotation of an axis within an element, in radians, that round-off may be the reason of.
+FOLDED = 2.5
 #: Largest number of steps along the path to a limit point.
 PATH = 100
 #: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, others a single iteration.
@@ -415,7 +417,8 @@ class Search:
             self.loose, self._unstabilised = self._loose(result.u), self._unstabilised + 1
             raise StepFailed("the loads do not hold what the supports leave free" + (
                 f": nothing holds {self.loose}" if self.loose else ""))
-        if self.rules.method == "auto" and self.system.folded(result.u):
+        if self.rules.method == "auto" and self.system.folded(
+                result.u, FOLDED):
             again = self._folded is not None and np.allclose(
                 result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
             self._folded = self._folded or result
