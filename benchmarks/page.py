@@ -1,7 +1,7 @@
 """Write the times of README.md and docs/benchmarks.md from the CSV files of a run of bench.py.
 
-    python benchmarks/page.py           after ``cp out/bench/*.csv benchmarks/results``
-    python benchmarks/page.py --check   fails where a page does not say what the files have
+    python benchmarks/page.py --take out/bench   keeps what a run has written, and writes the pages
+    python benchmarks/page.py --check            fails where a page says something else
 
 Between ``<!-- bench NAME -->`` and ``<!-- end -->`` stands what :data:`TABLES` makes of the rows.
 What was not measured stays as it is, so that a folder of some cases renews theirs alone. Where the
@@ -20,6 +20,7 @@ from work_precision.report import (DECADES, EXUDYN, GOALS, OURS, Q2, at, fastest
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = "README.md", "docs/benchmarks.md"
+KEYS = "seconds", "whole_seconds"
 #: Folders of the package that decide times.
 TIMED = "beam/kernels", "solvers", "dynamics"
 NUMBERS = {"error": float, "seconds": float, "whole_seconds": float, "cold_seconds": float,
@@ -263,12 +264,41 @@ def renewed(text, results):
     return BLOCK.sub(block, text)
 
 
+def take(folder, results):
+    """Keep the files of a run: of each code what no other run of it beats, alone or as a whole."""
+    results.mkdir(exist_ok=True)
+    for name, rows in read(folder).items():
+        with open(Path(folder) / f"{name}.csv", newline="", encoding="utf-8") as file:
+            lines = list(csv.DictReader(file))
+        best = range(len(rows))
+        if "whole_seconds" in lines[0] and any(r["whole_seconds"] for r in lines):
+            groups = {(r["code"], in_numpy(r), key): [] for r in rows for key in KEYS}
+            for k, r in enumerate(rows):
+                for key in KEYS:
+                    if r["error"] == r["error"] and r[key] == r[key]:
+                        groups[r["code"], in_numpy(r), key].append((r[key], r["error"], k))
+            best = {k for k, r in enumerate(rows) if r["cold_seconds"] > 0.0 or name == "frames"}
+            for group in groups.values():
+                error = float("inf")
+                for _, e, k in sorted(group):
+                    if e < error:
+                        error = e
+                        best.add(k)
+        with open(results / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, lines[0])
+            writer.writeheader()
+            writer.writerows(line for k, line in enumerate(lines) if k in best)
+
+
 def main(arguments=None):
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--results", default=ROOT / "benchmarks" / "results", help="CSV files")
+    parser.add_argument("--take", help="folder that bench.py has written")
     parser.add_argument("--check", action="store_true", help="write nothing, fail if they differ")
     options = parser.parse_args(arguments)
+    if options.take:
+        take(options.take, Path(options.results))
     results = read(options.results)
     for page in PAGES:
         text = (ROOT / page).read_text(encoding="utf-8")
