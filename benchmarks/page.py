@@ -125,13 +125,12 @@ def others(results):
                  for key in ("seconds", "whole_seconds")]
         return found[0] if found[0] == found[1] else " / ".join(found)
 
-    between = {title: [f"{both(case, target)} at {target:.2e}" for goal in GOALS
-                       if goal.case == case for target in weakest(results[case], goal)]
-               for case, title in OTHERS.items()}
+    between = [[title, f"{target:.2e}", both(case, target)] for case, title in OTHERS.items()
+               for goal in GOALS if goal.case == case for target in weakest(results[case], goal)]
     return table(["case", *(f"{t:.0e}" for t in DECADES[1:])], [
         [title, *(both(case, t) for t in DECADES[1:])] for case, title in OTHERS.items()]) + (
-        [f"Least between these errors, {title}: {'; '.join(found)}."
-         for title, found in between.items() if found] + [""])
+        ["Least between these errors:", "", *table(["case", "error", "solve / whole"], between)]
+        if between else [])
 
 
 #: What README.md compares: title, case, peer, error.
