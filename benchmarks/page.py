@@ -15,6 +15,8 @@ import subprocess
 from pathlib import Path
 
 from work_precision import large
+from work_precision.figures import front, usable
+from work_precision.problems import PROBLEMS
 from work_precision.report import (DECADES, EXUDYN, GOALS, OURS, Q2, at, fastest, goals, places,
                                    sweeps, table, tangents, weakest)
 
@@ -269,24 +271,16 @@ def take(folder, results):
     for name, rows in read(folder).items():
         with open(Path(folder) / f"{name}.csv", newline="", encoding="utf-8") as file:
             lines = list(csv.DictReader(file))
-        best = range(len(rows))
-        if "whole_seconds" in lines[0] and any(r["whole_seconds"] for r in lines):
-            groups = {(r["code"], in_numpy(r), key): [] for r in rows for key in KEYS}
-            for k, r in enumerate(rows):
-                for key in KEYS:
-                    if r["error"] == r["error"] and r[key] == r[key]:
-                        groups[r["code"], in_numpy(r), key].append((r[key], r["error"], k))
-            best = {k for k, r in enumerate(rows) if r["cold_seconds"] > 0.0 or name == "frames"}
-            for group in groups.values():
-                error = float("inf")
-                for _, e, k in sorted(group):
-                    if e < error:
-                        error = e
-                        best.add(k)
+        best = rows
+        if name in PROBLEMS:
+            groups = [[r for r in usable(rows) if (r["code"], in_numpy(r)) == one]
+                      for one in {(r["code"], in_numpy(r)) for r in rows}]
+            best = [r for r in rows if r["cold_seconds"] > 0.0]
+            best += [r for group in groups for key in KEYS for r in front(group, key)]
         with open(results / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, lines[0])
             writer.writeheader()
-            writer.writerows(line for k, line in enumerate(lines) if k in best)
+            writer.writerows(line for line, r in zip(lines, rows) if r in best)
 
 
 def main(arguments=None):

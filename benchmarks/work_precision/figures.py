@@ -14,10 +14,10 @@ def usable(rows):
             and np.isfinite(r["seconds"])]
 
 
-def front(rows):
+def front(rows, key="seconds"):
     """Rows that no other beats in both error and time, fastest first."""
     best, out = np.inf, []
-    for r in sorted(rows, key=lambda r: (r["seconds"], r["error"])):
+    for r in sorted(rows, key=lambda r: (r[key], r["error"])):
         if r["error"] < best:
             best = r["error"]
             out.append(r)

@@ -186,19 +186,22 @@ def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
     return np.concatenate(det), np.concatenate(stretches)
 
 
-def folded(beam: Any, u: Array, turn: float = np.pi) -> bool:
-    """True if the axis folds back within an element: a chord is opposite to an end tangent.
+def tangents(beam: Any, u: Array | float) -> Array:
+    """Derivative r_X at the nodes as complex numbers, for a displacement (N,) or 0."""
+    return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
 
-    It also does if the ends of an axis of degree 7 or less turn against each other by more than
-    ``turn``.
-    """
+
+def turning(beam: Any, u: Array) -> float:
+    """Largest rotation of the axis over an element, from its tangents at the nodes."""
+    (left, right), turn = beam.mesh.t, tangents(beam, u) / tangents(beam, 0.0)
+    turn = turn[right] * turn[left].conj()
+    return float(abs(np.arctan2(turn.imag, turn.real)).max())
+
+
+def folded(beam: Any, u: Array) -> bool:
+    """True if the axis folds back within an element: a chord is opposite to an end tangent."""
     nodes = u.reshape(-1, beam.nd)[:, :4].T
     x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
     left, right = t = beam.mesh.t
     ends = (x[:, right] - x[:, left])[:, None] * tangent[:, t]
-    if (ends[0] + ends[1] < 0.0).any():
-        return True
-    if turn >= np.pi or beam.element.axis_degree > 7:
-        return False
-    turns = ([1.0, 1.0j] @ tangent) / ([1.0, 1.0j] @ beam.mesh.p_X)
-    return bool(np.abs(np.angle(turns[right] * turns[left].conj())).max() > turn)
+    return bool((ends[0] + ends[1] < 0.0).any())

@@ -249,9 +249,9 @@ class System:
                 return True
         return any(domain.inverted(u[self.of(domain)]) for domain in self.domains)
 
-    def folded(self, u: Array, turn: float = np.pi) -> bool:
-        """True if an axis folds back, or turns by more than ``turn``, within an element."""
-        return any(folded(beam, u[s], turn) for beam, s in zip(self.beams, self.slices))
+    def folded(self, u: Array) -> bool:
+        """True if the axis folds back within an element."""
+        return any(folded(beam, u[s]) for beam, s in zip(self.beams, self.slices))
 
     def stiffness_at_rest(self) -> sparse.csr_array:
         """The stiffness of force elements in the reference configuration, shape (N, N)."""

@@ -176,10 +176,10 @@ class HistoryMaterial(Material):
         E[0], E[1] = strain, -self.lateral_ratio * strain
         for _ in range(LATERAL):
             S, D, after = self.evaluate(E, history, dt)
-            change = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
-                                     np.moveaxis(S[1:], 0, -1)[..., None])[..., 0]
             if np.max(np.abs(S[1:])) <= CLOSE * (np.max(np.abs(S)) + CLOSE * self.E):
                 break
+            change = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
+                                     np.moveaxis(S[1:], 0, -1)[..., None])[..., 0]
             E[1:] -= np.moveaxis(change, -1, 0)
         side = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
                                np.moveaxis(D[1:, 0], 0, -1)[..., None])[..., 0]

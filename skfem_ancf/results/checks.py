@@ -14,6 +14,7 @@ from ..actions.joints.prescribed import PrescribedDisplacement
 from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
+from ..beam.kinematics import tangents
 from ..core.errors import ModelWarning, warn
 from ..core.types import Array
 from ..equations.stability import response
@@ -262,21 +263,13 @@ def _linear_findings(beam, u, base):
 
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
     """Largest rotation of the axis over an element, from its tangents at the nodes."""
-    left, right = beam.mesh.t
-    if base is not None:
-        turns = _turns(beam, u, base)
-        return float(np.max(np.abs(turns[right] - turns[left])))
-    turn = tangents(beam, u) / tangents(beam, 0.0)
-    turn = turn[right] * turn[left].conj()
-    return float(abs(np.arctan2(turn.imag, turn.real)).max())
+    if base is None:
+        return kinematics.turning(beam, u)
+    (left, right), turns = beam.mesh.t, _turns(beam, u, base)
+    return float(np.max(np.abs(turns[right] - turns[left])))
 
 
 def _turns(beam, u, base=None):
     start = tangents(beam, u if base is None else base)
     turns = np.angle(start / tangents(beam, 0.0))
     return turns if base is None else turns + (tangents(beam, u) / start).imag
-
-
-def tangents(beam: Beam, u: Array | float) -> Array:
-    """Derivative r_X at the nodes as complex numbers, for a displacement (N,) or 0."""
-    return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]

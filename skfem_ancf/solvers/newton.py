@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..beam.kinematics import turning
 from ..core.caching import cached_property
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
                            require_flag, require_integer, require_option, require_positive)
@@ -36,7 +37,8 @@ UNSTABILISED = 2
 #: Largest number of iterations of a user-defined energy's equilibrium close to the reference
 #: configuration: beyond a pole of the energy there are others.
 SURE = 6
-#: Rotation of an axis within an element, in radians, that round-off may be the reason of.
+#: Rotation of an axis of degree 7 or less over one element, in radians, that is tried again:
+#: round-off may be its reason.
 FOLDED = 2.5
 #: Largest number of steps along the path to a limit point.
 PATH = 100
@@ -417,13 +419,19 @@ class Search:
             self.loose, self._unstabilised = self._loose(result.u), self._unstabilised + 1
             raise StepFailed("the loads do not hold what the supports leave free" + (
                 f": nothing holds {self.loose}" if self.loose else ""))
-        if self.rules.method == "auto" and self.system.folded(
-                result.u, FOLDED):
+        if self.rules.method == "auto" and self._folds(result.u):
             again = self._folded is not None and np.allclose(
                 result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
             self._folded = self._folded or result
             if not again:  # if two strategies find it, the mesh is too coarse: a warning says so
                 raise StepFailed("the axis folds back within an element")
+
+    def _folds(self, u):
+        """True if an axis folds back, or turns too far, within an element."""
+        system = self.system
+        return system.folded(u) or any(
+            beam.element.axis_degree <= 7 and turning(beam, u[s]) > FOLDED
+            for beam, s in zip(system.beams, system.slices))
 
     def _loose(self, u):
         """An unstabilised motion of an equilibrium, in words, from the last factors."""

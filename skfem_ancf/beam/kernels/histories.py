@@ -7,6 +7,7 @@ from copy import copy
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from ...core.caching import cached_property
 from ...core.types import Array
@@ -97,8 +98,6 @@ class ElementsWithHistory(Elements):
 
     @cached_property
     def _to_moduli(self):
-        from scipy import sparse
-
         (s, z), c = self.t.pairs, 1 if self._fibres else 3
         A = self.t.along.reshape(c, -1, self.ns)
         of = np.abs(A).sum(axis=1).argmax(axis=0)
