@@ -74,7 +74,7 @@ one.set(xlabel="way of the punch (mm)", ylabel="force (N)")
 for state, label in ((bent, "under the punch"), (left, "after springback")):
     two.plot(1e-6 * state.stress(section)[0], 1e3 * eta, label=label)
 two.set(xlabel="axial stress (MPa)", ylabel="distance from the axis (mm)")
-two.legend(frameon=False, fontsize=8, loc="lower left")
+two.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 left.plot("plastic_strain", ax=three, scale=5, title="")
 plt.show()
 
