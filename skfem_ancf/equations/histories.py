@@ -117,6 +117,12 @@ class Histories:
                     lost += e.accept(u0[s], u[s])
         return lost
 
+    def after(self, start: Any, end: Any) -> Array | None:
+        """The history at an equilibrium after one with ``u`` and ``history``, at once."""
+        with self.lent(start.history):
+            self.accept(start.u, end.u, end.load)
+            return self.get()
+
     def of_state(self, state: Any) -> Array | None:
         """The history of a State, as far as obstacles and beams are those of its scene, or None."""
         if state is None or state.memory is None:

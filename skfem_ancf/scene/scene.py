@@ -496,9 +496,6 @@ class Scene(Model):
             system = self.system
             system.constraints.require_supports()
             system.forces.contacts.require_path()
-            system.histories.require_none(
-                "continuation()", "follow the path by scene.run(), with a support that moves where "
-                "the load has a maximum")
             system.forces.contacts.require_clear(np.zeros(system.N), 0.0)
             critical = None if branch is None else critical_of(branch, system)
             try:

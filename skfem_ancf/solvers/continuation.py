@@ -34,7 +34,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     displacement over the size of the scene; the load factor is an unknown. For loads that move no
     node, such as heat between walls, the norm includes the strain that their forces could cause.
     Steps get shorter where the path or the load turns, or iterations increase. The geometric
-    stiffness uses the independent stress of the mixed iteration.
+    stiffness uses the independent stress of the mixed iteration. Materials with a history follow
+    the path, at once: time stands still. Their tangent is that of further loading.
 
     Where the load turns, or the number of negative eigenvalues of the tangent changes, the limit or
     bifurcation point within the step is computed.
@@ -95,8 +96,6 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
         points, step = [_start(tracer, branch, side)], ds
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
-            system.forces.follow(start.u)  # turns of springs are counted from there
-            start.history = system.histories.get()
             try:
                 point, bend = _step(tracer, start, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
@@ -104,11 +103,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                 last = abs(point.load) >= limit
                 if last:
                     point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
-                if locate is not None and straight:
-                    found = find_critical(tracer, start, point, locate)
-                    for one in found:
-                        one.history = start.history
-                    critical += found
+                found = find_critical(tracer, start, point, locate) if (
+                    locate is not None and straight) else []
             except Failed as failure:
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
@@ -121,7 +117,10 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
             except KeyboardInterrupt:
                 raise Interrupted(f"stopped at the load {start.load:.6g}; the exception's state is "
                                   "the path up to there", (points, critical)) from None
-            point.history = start.history
+            for one in [*found, point]:
+                one.history = system.histories.after(start, one)
+            system.histories.put(point.history)
+            critical += found
             points.append(point)
             bar.update(1)
             if last or (until is not None and _ends(until, point)):
@@ -152,7 +151,7 @@ def _start(tracer, branch, side):
     point = Point(tracer.system, branch.u, branch.multipliers, branch.load, branch.force, 0.0,
                   branch.error, 0)
     point.tangent, point.multiplier_rate = side * branch.mode, side * branch.multiplier_mode
-    point.rate, point.negative = 0.0, branch.negative
+    point.rate, point.negative, point.history = 0.0, branch.negative, branch.history
     return point
 
 

@@ -232,8 +232,7 @@ class Search:
         """
         system, loads = self.system, [0.0]
         if (self.rules.method != "auto" or not (self.stable and self.route.proportional)
-                or self.stabilised_by_loads or self.touches or system.clock is not None
-                or system.histories.of_beams.size):
+                or self.stabilised_by_loads or self.touches or system.clock is not None):
             return ""
 
         def turned(point: Any) -> bool:
