@@ -44,8 +44,7 @@ from .scene.plan import Plan
 from .scene.scene import Scene
 from .sections import Section
 from .results.modes import Buckling, Modes
-from .sweeps.members import Sweep
-from .sweeps.parameter_sweep import sweep
+from .sweeps.parameter_sweep import Sweep, sweep
 from .visuals.explore import Explorer
 
 __version__ = "0.1.0"

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -138,15 +139,16 @@ def test_a_long_motion_is_compiled_on_its_way_which_is_said(auto, capsys):
     assert loads == ["steps", "force"]
 
 
-@pytest.mark.parametrize("measure", ["a function", "probes"])
-def test_members_of_a_sweep_count(measure, auto):
+@pytest.mark.parametrize("threads", [False, True])
+def test_members_of_a_sweep_count(threads, auto):
     """They are solved by the same process, in threads or not."""
     from skfem_ancf import sweep
 
     s, loads = auto
     few = 20
-    sweep(lambda x: s, {"x": np.arange(few)}, ("displacement", (1, 0)) if measure == "probes" else
-          lambda s: s.solve_static().displacement((1, 0))[1])
+    with ThreadPoolExecutor(2) as pool:
+        sweep(lambda x: s, {"x": np.arange(few)},
+              lambda s: s.solve_static().displacement((1, 0))[1], client=pool if threads else None)
     assert not loads
     assert backend._worked > 0.9 * few * ITERATIONS * s.system.backend.seconds(1)
 

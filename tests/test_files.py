@@ -6,12 +6,11 @@ import zipfile
 import numpy as np
 import pytest
 
-from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, sweep
+from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.core import archive
 from skfem_ancf.core.errors import AncfError
 from skfem_ancf.dynamics import checkpoint
 from skfem_ancf.io import PvdWriter
-from skfem_ancf.sweeps.members import Sweep
 
 
 def scene():
@@ -28,7 +27,6 @@ def _series(path):
 WRITERS = {
     "run.npz": lambda path: scene().integrate(0.02, 0.01, checkpoint=path),
     "run.h5": lambda path: scene().integrate(0.02, 0.01, checkpoint=path),
-    "sweep.npz": lambda path: sweep(lambda x: x, {"x": [1.0, 2.0]}, lambda x: x).save(path),
     "mesh.npz": lambda path: scene().beams[0].mesh.save(path),
     "mesh.vtk": lambda path: scene().beams[0].mesh.save(path),
     "state.vtu": lambda path: scene().solve_linear().save(path),
@@ -89,7 +87,6 @@ def _stopped(path, **options):
 READERS = {
     "run.npz": lambda path: scene().resume(path),
     "run.h5": lambda path: scene().resume(path),
-    "sweep.npz": Sweep.load,
     "mesh.npz": MeshBeam.load,
 }
 

@@ -6,6 +6,7 @@ processes. A sweep of two members before has loaded what is compiled; what that 
 """
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -50,9 +51,10 @@ def runs_of():
         model, build = ours.element_of(kind, order)[1], partial(scene, kind=kind, order=order, n=n)
 
         def run(moduli, build=build, place=place):
-            return sweep(build, {"E": moduli}, ("displacement", PROBLEM.tip) if place == "threads"
-                         else tip, workers=2 if place == "2 processes" else None,
-                         progress=False)["value"]
+            with ThreadPoolExecutor() as threads:
+                return sweep(build, {"E": moduli}, tip, progress=False,
+                             workers=2 if place == "2 processes" else None,
+                             client=threads if place == "threads" else None)["value"]
 
         yield ours.CODE, f"{kind} {order}, {place}", n, model, run
     for kind, n in EXUDYN if exudyn is not None else ():

@@ -165,7 +165,7 @@ class CheckpointError(AncfError):
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint or the file of a sweep could not be written; the previous file remains."""
+    """A checkpoint could not be written; the previous file remains."""
 
 
 class CompilationWarning(UserWarning):

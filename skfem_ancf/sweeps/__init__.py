@@ -1,6 +1,5 @@
 """Parameter sweeps over scenes."""
 
-from .members import Failure, Sweep
-from .parameter_sweep import sweep
+from .parameter_sweep import Failure, Sweep, sweep
 
 __all__ = ["Failure", "Sweep", "sweep"]

@@ -1,34 +1,94 @@
-"""Sweeps over parameters, serial or parallel."""
+"""Sweeps over parameters: an ordered map over threads, processes or a cluster."""
 
 from __future__ import annotations
 
 import inspect
-import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from pathlib import Path
-from typing import Any
+import os
+import pickle
+import signal
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import (CallError, CallbackError, CheckpointWarning, FileError, InputError,
-                           Interrupted, NameUnknown, SweepWarning, require_function,
-                           require_integer, require_path, shown, warn)
+from ..core.errors import (CallError, CallbackError, InputError, Interrupted, MissingExtra,
+                           NameUnknown, PickleError, SweepWarning, require_function,
+                           require_integer, require_like, shown, warn)
 from ..core.progress import progress_bar
-from ..core.types import Array, ArrayLike, StrPath
-from .members import Sweep, column_of, require_plain
-from .probes import Probes, measured
-from .workers import Task, here, in_processes, in_threads, on_cluster
+from ..core.types import Array, ArrayLike
 
-#: Least seconds between two files, and least ratio to the time of writing one.
-_SECONDS, _RARER = 2.0, 20.0
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Failure(NamedTuple):
+    """A member of a sweep that could not be built, solved or measured.
+
+    ``member`` is its index, ``parameters`` are by name, ``error`` is the class and message.
+    """
+
+    member: int
+    parameters: dict[str, Any]
+    error: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Results of :func:`skfem_ancf.sweep`, in the order of the parameters.
+
+    ``sweep[name]`` is the array of a measured quantity or a parameter.
+
+    Attributes
+    ----------
+    parameters : dict
+        By name, arrays (n, ...), one row for each member.
+    values : dict
+        By name, arrays (n, ...) of measured values, nan where a member failed or is not done. A
+        value without a name is called "value".
+    failures : list of Failure
+        The members that failed, among them those whose values differ in names or shapes from those
+        of the first.
+
+    Examples
+    --------
+    >>> from skfem_ancf import sweep
+    >>> result = sweep(lambda x: x, {"x": [1.0, 2.0]}, lambda x: {"square": x**2})
+    >>> result["square"], result["x"], result.failures
+    (array([1., 4.]), array([1., 2.]), [])
+    """
+
+    parameters: dict[str, Array]
+    values: dict[str, Array]
+    failures: list[Failure]
+
+    def __getitem__(self, name: str) -> Array:
+        known = {**self.parameters, **self.values}
+        if not isinstance(name, str) or name not in known:
+            raise NameUnknown("array", name, known)
+        return known[name]
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset``: values along "member", with the parameters as coordinates.
+
+        MissingExtra is raised if xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise MissingExtra("xarray", "arrays") from None
+        values, parameters = (
+            {name: (("member", *(f"{name}_{axis}" for axis in range(x.ndim - 1))), x)
+             for name, x in arrays.items()} for arrays in (self.values, self.parameters))
+        return xarray.Dataset(values, parameters)
 
 
 def sweep(build: Callable[..., Any],
           parameters: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]],
-          measure: Callable[[Any], Any] | tuple[Any, ...] | dict[str, Any],
-          workers: int | None = None, client: Any = None,
-          path: StrPath | None = None, progress: bool | None = None) -> Sweep:
+          measure: Callable[[Any], Any], workers: int | None = None, client: Any = None,
+          progress: bool | None = None) -> Sweep:
     """Build, solve and measure a scene for each of many sets of parameters.
 
     Each member is ``measure(build(**parameters))``: ``build`` makes the scene, ``measure`` solves
@@ -45,21 +105,14 @@ def sweep(build: Callable[..., Any],
         dicts.
     measure
         Function of the scene that returns a number, an array of numbers, or a dict of them by name,
-        with equal names and shapes for all members. Or quantities of ``scene.solve_static()``: a
-        pair (what, at) or a triple (what, at, beam) of "displacement" or "position", a point (x,
-        y), points (2, n) or the name of an end, and a beam; or a dict of such and of functions of
-        the State. These are computed in this process, with one thread for each processor, and built
-        one after the other.
+        with equal names and shapes for all members.
     workers
         Number of processes; None for this one only. ``build`` and ``measure`` must be importable:
         defined by ``def`` at the top of a module. Scripts call sweep under
         ``if __name__ == "__main__":``. Linear algebra uses one thread in each process.
     client
-        A ``dask.distributed.Client``, instead of ``workers``.
-    path
-        A file (.npz) for results so far. If it exists, the sweep continues: finished members are
-        read from it, failed ones are computed again. The parameters must be those of the file; the
-        functions are not compared.
+        What computes the members, instead of ``workers``: a ``dask.distributed.Client``, or an
+        executor of ``concurrent.futures``, as of threads, of MPI or of joblib's loky.
     progress
         Show a progress bar: True, False, or None: on a terminal, after a second, if tqdm is
         installed.
@@ -68,16 +121,14 @@ def sweep(build: Callable[..., Any],
     ------
     InputError
         If arguments do not fit.
-    NameUnknown, CallError
+    CallError
         If ``build`` takes other parameters.
-    FileError
-        If the file is of another sweep, or cannot be written.
     PickleError
         If functions cannot be sent to other processes.
     CallbackError
         If all members fail.
     Interrupted
-        By Ctrl-C; its ``state`` is the Sweep so far, which is also in the file.
+        By Ctrl-C; its ``state`` is the Sweep so far.
 
     Examples
     --------
@@ -97,157 +148,173 @@ def sweep(build: Callable[..., Any],
     True
     """
     require_function("build", build, "of the parameters that returns a scene")
-    task = Task(build, measured(measure))
+    require_function("measure", measure, "of the scene that returns numbers")
     if workers is not None and client is not None:
         raise InputError("workers and client exclude each other: give one of them")
-    if workers is not None:
-        workers = require_integer("workers", workers, 1)
-    values = _columns(parameters)
-    members = [dict(zip(values, row)) for row in zip(*values.values())]
-    if not members:
-        raise InputError(f"there are no members in the parameters {shown(parameters)}")
-    _require_signature(build, members[0])
-    record = _Record({name: column_of(column) for name, column in values.items()},
-                     None if path is None else require_path("path", path, (".npz",)))
-    places = record.places
-    if client is not None:
-        source = on_cluster(task, members, places, client)
-    elif workers is not None:
-        source = in_processes(task, members, places, workers)
-    else:
-        source = (in_threads if isinstance(task.measure, Probes) else here)(task, members, places)
+    members = _members(parameters)
     try:
-        with progress_bar(progress, len(members), "members") as bar, closing(source):
-            bar.update(len(members) - len(places))
-            for k, found in source:
-                record.add(k, found)
+        inspect.signature(build).bind(**members[0])
+    except TypeError as error:
+        raise CallError(f"build does not fit the parameters {', '.join(map(repr, members[0]))}: "
+                        f"{error}") from None
+    except ValueError:  # some functions written in C have no signature
+        pass
+    task, found = partial(_measured, build, measure), [None] * len(members)
+    results: Iterator[tuple[int, Any]] = enumerate(map(task, members))
+    if client is not None:
+        require_like("client", client, "dask.distributed.Client or an executor", "submit")
+        results = _in_order(client.submit, task, members, len(members))
+    elif workers is not None:
+        results = _in_processes(task, members, require_integer("workers", workers, 1))
+    try:
+        with progress_bar(progress, len(members), "members") as bar:
+            for k, found[k] in results:
                 bar.update(1)
     except KeyboardInterrupt:
-        raise Interrupted(record.stopped(), record.written()) from None
-    except BaseException:
-        record.written()
-        raise
-    return _warned(record.written())
+        raise Interrupted(f"interrupted with {len(found) - found.count(None)} of {len(found)} "
+                          "members done; they are in the state of this exception",
+                          _arrays(members, found)) from None
+    result = _arrays(members, found)
+    if failures := result.failures:
+        text = (f"{len(failures)} of {len(members)} members failed, the first with "
+                f"{failures[0].parameters}: {failures[0].error}")
+        if len(failures) == len(members):
+            raise CallbackError(text)
+        warn(f"{text}; all are in .failures", SweepWarning)
+    return result
 
 
-class _Record:
-    """Results so far, written to the file at intervals."""
-
-    def __init__(self, columns: dict[str, Array], path: Path | None) -> None:
-        self.columns, self.path = columns, path
-        self.found: list[dict[str, Array] | str | None] = [None] * len(next(iter(columns.values())))
-        self.next = time.monotonic() + _SECONDS
-        if path is not None:
-            require_plain(columns)
-            if path.exists():
-                self.found = _done(path, columns)
-        self.places = [k for k, one in enumerate(self.found) if one is None]
-        if path is not None and self.places:
-            Sweep(columns, self.found).save(path)  # fails early
-
-    def add(self, k, found):
-        """Add the result of a member; write the file if it is due."""
-        self.found[k] = found
-        if self.path is not None and time.monotonic() >= self.next:
-            begun = time.monotonic()
-            self.written()
-            now = time.monotonic()
-            self.next = now + max(_SECONDS, _RARER * (now - begun))
-
-    def written(self):
-        """The Sweep so far; write it, with a warning where that fails."""
-        result = Sweep(self.columns, self.found)
-        if self.path is not None:
-            try:
-                result.save(self.path)
-            except FileError as error:
-                warn(f"the results are not in the file, the sweep goes on: {error}",
-                     CheckpointWarning)
-        return result
-
-    def stopped(self):
-        """The Interrupted error."""
-        done = sum(isinstance(one, dict) for one in self.found)
-        return (f"interrupted with {done} of {len(self.found)} members done; " + (
-            "they are in the state of this exception; with path= the next call would go on"
-            if self.path is None else f"call again with {str(self.path)!r} to go on"))
-
-
-def _columns(parameters):
-    """Lists of values by name, of equal lengths."""
+def _members(parameters):
+    """The parameters as a list of dicts with equal names."""
     if isinstance(parameters, Mapping) or hasattr(parameters, "columns"):  # of pandas
-        columns = {name: _rows(name, values) for name, values in parameters.items()}
-        lengths = {name: len(rows) for name, rows in columns.items()}
+        columns = {name: getattr(x, "values", x) for name, x in parameters.items()}
+        for name, x in columns.items():
+            if isinstance(x, str) or not hasattr(x, "__len__") or np.shape(x) == ():
+                raise InputError(f"the parameter {name!r} must have one value for each member, got "
+                                 f"{shown(x)}; what is the same for all belongs into build")
+        lengths = {name: len(x) for name, x in columns.items()}
         if len(set(lengths.values())) > 1:
             raise InputError(f"the parameters must have equal lengths, got {lengths}; for all "
                              "combinations hand a list of dicts, made by itertools.product")
-        return columns
-    if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
+        parameters = [dict(zip(columns, row)) for row in zip(*columns.values())]
+    elif isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
         raise InputError("parameters must be a dict of arrays or a list of dicts, got "
                          f"{shown(parameters)}")
     members = list(parameters)
+    if not members:
+        raise InputError("there are no members in the parameters")
     for k, member in enumerate(members):
         if not isinstance(member, Mapping) or set(member) != set(members[0]):
             raise InputError("parameters must be a dict of arrays, or a list of dicts with "
                              f"equal names; the first has {shown(members[0])}, number {k} is "
                              f"{shown(member)}")
-    return {name: [member[name] for member in members] for name in (members[0] if members else ())}
+    return members
 
 
-def _rows(name, values):
-    values = getattr(values, "values", values)  # of pandas and xarray
-    if isinstance(values, str) or np.ndim(values) == 0 and not hasattr(values, "__len__"):
-        raise InputError(f"the parameter {name!r} must have one value for each member, got "
-                         f"{shown(values)}; what is the same for all belongs into build")
-    return list(values)
-
-
-def _require_signature(build, member):
+def _measured(build, measure, member):
+    """Arrays by name, or the text of the error: user functions may raise anything."""
     try:
-        known = inspect.signature(build).parameters
-    except (TypeError, ValueError):  # of some functions written in C
-        return
-    if not any(p.kind is p.VAR_KEYWORD for p in known.values()):
-        for name in member:
-            if name not in known:
-                raise NameUnknown("parameter of build", name, known)
-    missing = [name for name, p in known.items() if p.default is p.empty and name not in member
-               and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
-    if missing:
-        raise CallError(f"build needs {', '.join(map(repr, missing))}, not among the parameters "
-                        f"{', '.join(map(repr, member))}")
+        value = measure(build(**member))
+        found = value if isinstance(value, dict) else {"value": value}
+        for name, x in found.items():
+            if not isinstance(name, str) or np.asarray(x).dtype.kind not in "biufc":
+                raise CallbackError("measure must return a number, an array of numbers, or a dict "
+                                    f"of them by name, got {shown(value)}")
+            if name in member:
+                raise CallbackError(f"measure calls a value {name!r}, which is a parameter of "
+                                    "build: give it another name")
+        return {name: np.array(x) * 1.0 for name, x in found.items()}
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
 
 
-def _done(path, columns):
-    """Results in the file of an interrupted sweep with the same parameters."""
-    before = Sweep.load(path)
-    if list(before.parameters) != list(columns):
-        differ = f"{list(before.parameters)} there, {list(columns)} here"
-    elif len(before) != len(next(iter(columns.values()))):
-        differ = f"{len(before)} members there, {len(next(iter(columns.values())))} here"
-    else:
-        differ = next((f"{name!r} of member {k} is {shown(there[k])} there, {shown(now[k])} here"
-                       for name, now in columns.items() for there in [before.parameters[name]]
-                       for k in range(len(now)) if not _same(there[k], now[k])), "")
-    if differ:
-        raise FileError(f"{path} is of a sweep with other parameters: {differ}; give another path, "
-                        "or delete the file")
-    return [{name: x[k] for name, x in before.values.items()} if status == "done" else None
-            for k, status in enumerate(before.status)]
+def _in_order(submit, task, members, most, lost=None):
+    """Yield the index and result of each member, with so many of them in flight.
+
+    The list ``lost``, if given, gets the indices of those that ended with their process.
+    """
+    flying: deque[Any] = deque()
+    try:
+        for k in range(len(members) + most):
+            if k >= most:
+                first, future = k - most, flying.popleft()
+                try:
+                    yield first, future.result()
+                except Exception as error:
+                    if lost is not None and isinstance(error, BrokenExecutor):
+                        lost.append(first)
+                    else:
+                        yield first, f"{type(error).__name__}: {error}"
+            if k < len(members):
+                flying.append(submit(task, members[k]))
+    finally:
+        for future in flying:
+            future.cancel()
 
 
-def _same(a, b):
-    floats = {np.asarray(a).dtype.kind, np.asarray(b).dtype.kind} == {"f"}
-    return np.array_equal(a, b, equal_nan=floats)
+def _in_processes(task, members, workers):
+    """As :func:`_in_order`, in processes started by "spawn"; where one dies, others are started.
+
+    The members in flight then are repeated one by one, so that only the cause is lost.
+    """
+    import multiprocessing  # takes long
+    from concurrent.futures import ProcessPoolExecutor
+
+    try:
+        pickle.dumps(task)
+    except Exception as error:  # pickling may raise anything
+        raise PickleError(f"build, {shown(task.args[0])}, or measure, {shown(task.args[1])}, "
+                          f"cannot be sent to another process: {error}. Define them by def at the "
+                          "top of a module, leave workers out, or hand a client of "
+                          "dask.distributed, which sends any function by cloudpickle") from None
+    names = [name for name in _THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(names, "1"))  # for the processes that are started
+    start = partial(ProcessPoolExecutor, workers, multiprocessing.get_context("spawn"),
+                    signal.signal, (signal.SIGINT, signal.SIG_DFL))  # ends silently on Ctrl-C
+    pool, lost = start(), []
+
+    def submit(*call):
+        nonlocal pool
+        try:
+            return pool.submit(*call)
+        except BrokenExecutor:
+            pool = start()
+            return pool.submit(*call)
+
+    try:
+        submit(os.getpid).result()
+        yield from _in_order(submit, task, members, 2 * workers, lost)
+        for k in lost:
+            yield k, next(_in_order(submit, task, members[k:k + 1], 1))[1]
+    except BrokenExecutor as error:
+        raise CallError("processes cannot be started: in a script, call sweep under if __name__ == "
+                        "'__main__':, since each of them imports the script") from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+        for name in names:
+            del os.environ[name]
 
 
-def _warned(result):
-    """The result, after a warning of failures."""
-    failures = result.failures
-    if failures:
-        text = (f"{len(failures)} of {len(result)} members failed, the first with "
-                f"{failures[0].parameters}: {failures[0].error}")
-        if len(failures) == len(result):
-            raise CallbackError(text)
-        warn(f"{text}; all are in .failures", SweepWarning)
-    return result
+def _arrays(members, found):
+    """The Sweep of results; those that differ from the first in names or shapes failed."""
+    def listed(values):
+        return ", ".join(f"{name!r} of shape {x.shape}" for name, x in values.items())
+
+    first = next((one for one in found if isinstance(one, dict)), {})
+    found = [one if not isinstance(one, dict) or listed(one) == listed(first) else
+             f"CallbackError: measure returned {listed(one)}, of the first member {listed(first)}: "
+             "names and shapes must be those of all members" for one in found]
+    values = {name: np.array([one[name] if isinstance(one, dict) else x * np.nan for one in found])
+              for name, x in first.items()}
+    return Sweep({name: _column([member[name] for member in members]) for name in members[0]},
+                 values, [Failure(k, dict(members[k]), one) for k, one in enumerate(found)
+                          if isinstance(one, str)])
+
+
+def _column(values):
+    try:
+        return np.array(values)
+    except ValueError:  # rows of different lengths
+        column = np.empty(len(values), dtype=object)
+        column[:] = values
+        return column
