@@ -28,7 +28,6 @@ from skfem_ancf.core.errors import CallError
 from skfem_ancf.elements import choose_element
 from skfem_ancf.formulations import Assumed, get_formulation
 from skfem_ancf.io import PvdWriter
-from skfem_ancf.io.vtkhdf import VtkHdfWriter
 from skfem_ancf.recovery.fields import Field
 
 SECONDS = 5.0  # of the processor that a call with a bad argument may take
@@ -423,8 +422,6 @@ call("PvdWriter", lambda **k: PvdWriter(**k).add(state(), 0.0), filename="s.pvd"
      subdivide=(2, 2), lagrange=False)
 call("PvdWriter.add", of(lambda: PvdWriter("s.pvd", subdivide=(1, 1)), "add"), "t=number",
      state=state(), t=0.0)
-call("VtkHdfWriter", lambda **k: VtkHdfWriter(**k).__exit__(None), filename="s.vtkhdf",
-     precision="single")
 call("history.save", of(history, "save"), filename="h.pvd", progress=False, subdivide=(1, 1))
 call("state.plot", of(state, "plot"), "cmap=name? limits=other?", {"limits": ["[True, False]"]},
      field="S_xx", thickness=1.0, undeformed=True, colorbar=False, cmap="viridis",

@@ -183,7 +183,7 @@ def test_the_readme_runs_with_the_dependencies_alone(tmp_path):
     assert len(drawn) == 1
     for script in (*drawn, others):
         code = ("import sys; sys.modules.update(dict.fromkeys("
-                "['matplotlib', 'tqdm', 'numba', 'h5py', 'pyvista', 'imageio']))\n" + script)
+                "['matplotlib', 'tqdm', 'numba', 'pyvista', 'imageio']))\n" + script)
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, text=True, check=False,
                               env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True)
         assert done.stdout
@@ -196,7 +196,7 @@ def test_the_readme_runs_with_the_dependencies_alone(tmp_path):
 
 def test_what_is_heavy_is_imported_when_it_is_needed():
     heavy = ("scipy.spatial", "scipy.optimize", "scipy.interpolate", "scipy.integrate",
-             "scipy.ndimage", "numba", "meshio", "matplotlib", "pyvista", "h5py", "tqdm")
+             "scipy.ndimage", "numba", "meshio", "matplotlib", "pyvista", "tqdm")
     code = f"import sys, skfem_ancf; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], text=True, check=True,
                           stdout=subprocess.PIPE)

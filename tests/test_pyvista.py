@@ -15,7 +15,6 @@ from test_io import bent
 from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.io import body_fields
-from skfem_ancf.io.vtkhdf import VtkHdfWriter
 from skfem_ancf.recovery.fields import FIELDS
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -151,47 +150,6 @@ def test_without_pyvista(state, history, tmp_path, monkeypatch):
         with pytest.raises(MissingExtra, match=r'pip install "skfem-ancf\[view\]"'):
             call()
     assert history.animate(tmp_path / "a.gif", frames=2, size=(320, 240)).is_file()
-
-
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_temporal_vtkhdf_reads_back(history, tmp_path, precision):
-    vtkhdf = pytest.importorskip("vtkmodules.vtkIOHDF")
-    pytest.importorskip("h5py")
-    fields = ["eps_yy", "displacement"]
-    history.save(tmp_path / "new" / "a.vtkhdf", fields=fields, subdivide=(2, 2),
-                 precision=precision)
-    assert [p.name for p in (tmp_path / "new").iterdir()] == ["a.vtkhdf"]
-    reader = vtkhdf.vtkHDFReader()
-    reader.SetFileName(str(tmp_path / "new" / "a.vtkhdf"))
-    reader.UpdateInformation()
-    assert reader.GetNumberOfSteps() == len(history)
-    info = reader.GetOutputInformation(0)
-    times = [info.Get(reader.GetExecutive().TIME_STEPS(), k) for k in range(len(history))]
-    assert_array_equal(times, history.t)
-    rtol = 1e-6 if precision == "single" else 1e-14
-    for k in (0, 7, len(history) - 1):
-        reader.UpdateTimeStep(times[k])
-        read = pv.wrap(reader.GetOutput())
-        body = body_fields(history.state(k), (2, 2), fields=fields, share=False)
-        assert_allclose(read.points, body.points, atol=rtol)
-        for name in fields:
-            assert_allclose(read.point_data[name], body.point_data[name], atol=rtol)
-        assert_array_equal(read.cells.reshape(-1, 5)[:, 1:], body.cells[0][1])
-        assert_array_equal(read.cell_data["element"], body.cell_data["element"][0])
-
-
-def test_vtkhdf_refuses_and_leaves_nothing_behind(history, state, tmp_path):
-    pytest.importorskip("h5py")
-    with pytest.raises(InputError, match=r"must end with \.vtkhdf"):
-        VtkHdfWriter(tmp_path / "a.h5")
-    with pytest.raises(RuntimeError), VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
-        series.add(history.state(0), 0.0)
-        with pytest.raises(InputError, match="must increase"):
-            series.add(history.state(0), 0.0)
-        with pytest.raises(InputError, match="the same points"):
-            series.add(state, 1.0)
-        raise RuntimeError
-    assert not list(tmp_path.iterdir())
 
 
 def test_notebooks_get_words_and_pictures(state, history, monkeypatch):

@@ -18,7 +18,6 @@ def test_scripts_of_a_page_run_in_order(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     if page.name == "paraview.md":
         pytest.importorskip("pyvista")
-        pytest.importorskip("h5py")
     names = {}
     for script in scripts(page):
         exec(compile(script, str(page), "exec"), names)

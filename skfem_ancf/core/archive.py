@@ -7,15 +7,13 @@ import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from secrets import token_hex
-from typing import Any
 
 import numpy as np
 
-from .errors import FileError, MissingExtra
+from .errors import FileError
 from .types import Array, ArrayLike, StrPath
 
 #: Longest stem of a temporary file's name; names are limited to 255 characters.
@@ -28,25 +26,15 @@ class Unreadable(ValueError):
     """A file is damaged, or was not written by :func:`write`."""
 
 
-def find_h5py() -> Any:
-    """The package h5py; MissingExtra if it is not installed."""
-    try:
-        import h5py
-    except ImportError:
-        raise MissingExtra("h5py", "files") from None
-    return h5py
-
-
 def read(path: Path) -> dict[str, Array]:
-    """Read named arrays from a .npz or .h5 file that :func:`write` wrote.
+    """Read named arrays from a .npz file that :func:`write` wrote.
 
     Memory is bounded by the size of the file, and nothing in it is executed. Raises OSError if the
     file cannot be opened, and Unreadable if it is compressed, damaged or something else.
     """
-    load = _read_npz if path.suffix != ".h5" else partial(_read_h5, find_h5py())
     with open(path, "rb") as file:
         try:
-            arrays = load(file)
+            arrays = _read(file)
         except Exception as error:  # any content
             raise Unreadable(f"{type(error).__name__}: {error}") from None
     for name, array in arrays.items():
@@ -56,7 +44,7 @@ def read(path: Path) -> dict[str, Array]:
     return arrays
 
 
-def _read_npz(file):
+def _read(file):
     size = os.fstat(file.fileno()).st_size
     with zipfile.ZipFile(file) as members:
         if any(x.compress_type != zipfile.ZIP_STORED or x.file_size > size
@@ -64,18 +52,6 @@ def _read_npz(file):
             raise Unreadable("its arrays are compressed: this package writes no such files")
     with np.load(file, allow_pickle=False) as arrays:
         return dict(arrays)
-
-
-def _read_h5(h5py, file):
-    arrays = {}
-    with h5py.File(file, "r") as h5:
-        for name, found in h5.items():
-            if (not isinstance(h5.get(name, getlink=True), h5py.HardLink)
-                    or not isinstance(found, h5py.Dataset) or found.is_virtual or found.external
-                    or found.chunks is not None or found.id.get_storage_size() != found.nbytes):
-                raise Unreadable(f"{name!r} is not a contiguous array")
-            arrays[name] = np.asarray(found[()])
-    return arrays
 
 
 @contextmanager
@@ -97,10 +73,16 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
     ...     path.read_text()
     'whole'
     """
-    new = new_file(path)
+    new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
+    new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)
     try:
         yield new
-        put_in_place(new, path, durable)
+        if durable:
+            with open(new, "rb+") as file:
+                os.fsync(file.fileno())
+        if path.is_file() and not path.is_symlink():
+            shutil.copymode(path, new)
+        os.replace(new, path)
     except BaseException:
         with suppress(OSError):
             new.unlink()
@@ -121,31 +103,9 @@ def output_file(path: StrPath) -> Iterator[Path]:
         raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
 
-def new_file(path: Path) -> Path:
-    """Create an empty file with a random name beside a path."""
-    new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
-    new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)
-    return new
-
-
-def put_in_place(new: Path, path: Path, durable: bool = False) -> None:
-    """Replace a file by a complete one, see :func:`replacing`."""
-    if durable:
-        with open(new, "rb+") as file:
-            os.fsync(file.fileno())
-    if path.is_file() and not path.is_symlink():
-        shutil.copymode(path, new)
-    os.replace(new, path)
-
-
 def write(path: Path, arrays: Mapping[str, ArrayLike]) -> None:
-    """Write named arrays to a .npz or .h5 file, atomically and durably; raises OSError."""
+    """Write named arrays to a .npz file, atomically and durably; raises OSError."""
     with replacing(path, durable=True) as new, open(new, "wb") as file:
-        content = BytesIO()  # in memory first: neither library can close a file on a full disk
-        if path.suffix == ".h5":
-            with find_h5py().File(content, "w") as h5:
-                for name, array in arrays.items():
-                    h5.create_dataset(name, data=array)
-        else:
-            np.savez(content, **arrays)  # type: ignore[arg-type]
+        content = BytesIO()  # in memory first: NumPy cannot close a file on a full disk
+        np.savez(content, **arrays)  # type: ignore[arg-type]
         file.write(content.getbuffer())

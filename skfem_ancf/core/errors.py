@@ -161,7 +161,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 class CheckpointError(AncfError):
-    """A checkpoint cannot be written, is damaged, or belongs to another scene."""
+    """A checkpoint cannot be written, is damaged, or of another scene."""
 
 
 class CheckpointWarning(UserWarning):

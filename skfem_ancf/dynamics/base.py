@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 
-from ..core.errors import CheckpointError
 from ..core.types import Array
 from ..equations.system import System
 
@@ -71,15 +69,6 @@ def interpolate(a: Motion, b: Motion, t: float) -> Motion:
 
     return replace(a, t=t, u=u, v=v, **{name: linear(name) for name in (
         "acceleration", "multipliers", "dissipated")})
-
-
-def stored(arrays: dict[str, Any], name: str, like: Any) -> Any:
-    """Get an array of a checkpoint; raises CheckpointError if its shape or kind is wrong."""
-    found, like = np.asarray(arrays.get(name)), np.asarray(like)
-    if found.shape != like.shape or found.dtype.kind != like.dtype.kind:
-        raise CheckpointError(f"{name!r} should have the shape {like.shape} and the kind "
-                              f"{like.dtype.kind!r}, got {found.shape} and {found.dtype.kind!r}")
-    return found
 
 
 class Scheme:

@@ -14,7 +14,7 @@ from ..actions.forces.turns import Turns
 from ..actions.joints.base import Joint
 from ..beam.layout import WhichBeam, WhichMember
 from ..beam.points import require_body
-from ..core.errors import InputError, require_finite, require_index, require_path, shown
+from ..core.errors import InputError, require_finite, require_index, shown
 from ..core.types import Array, Place, StrPath
 from ..equations.momentum import angular_momentum, momentum
 from ..equations.system import System
@@ -433,22 +433,19 @@ class History(MaterialPoints, SpringForces):
         Parameters
         ----------
         filename
-            Ends with .pvd, for a list and a .vtu file per instant, or with .vtkhdf, for a single
-            file in which the cells are stored once.
+            Ends with .pvd: a list, with a .vtu file per instant.
         progress
             Show a progress bar: True, False, or None for long runs only.
         subdivide, lagrange, undeformed, recover, fields, precision, encoding
             As for :func:`skfem_ancf.io.save_vtu`.
         """
         from ..io.pvd import PvdWriter
-        from ..io.vtkhdf import VtkHdfWriter
         from ..core.progress import progress_bar
 
-        path = require_path("filename", filename, (".pvd", ".vtkhdf"))
-        look = subdivide, lagrange, undeformed, recover, fields, precision
-        made = VtkHdfWriter(path, *look) if path.suffix.lower() == ".vtkhdf" else PvdWriter(
-            path, *look, encoding)
-        with made as writer, progress_bar(
-                progress, total=len(self), desc="files") as bar:
-            writer.extend(self, lambda: bar.update(1))
-        return path
+        writer = PvdWriter(filename, subdivide, lagrange, undeformed, recover, fields, precision,
+                           encoding)
+        with writer, progress_bar(progress, total=len(self), desc="files") as bar:
+            for state in self:
+                writer.add(state, state.t)
+                bar.update(1)
+        return writer.path

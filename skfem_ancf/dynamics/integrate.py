@@ -17,7 +17,7 @@ from ..equations.stability import largest_displacement
 from ..equations.system import System
 from ..results.state import State
 from .base import Scheme, in_steps, same_scheme
-from .checkpoint import Checkpoint, same_problem
+from .checkpoint import Checkpoint
 from .history import History
 from .run import MAX_STEPS, Run, StepFailed, task_of
 from .sensors import Sensor
@@ -88,9 +88,13 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
     def begun(task, sensors=(), until=None):
         run = Run(system, scheme, task, sensors, until)
-        if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
-            run.go_on(motion, start._origin[1])
-            return run
+        if start is not None and motion is not None and same_scheme(start._origin[0], scheme):
+            arrays = start._origin[1]
+            if arrays is not None and len(start.u) == system.N:
+                run.keep_size(arrays)
+            if start.system is system and t_start == start.t and not system.forces.sampled:
+                run.go_on(motion, arrays)
+                return run
         rest = np.zeros(system.N)
         displacement = u if u is not None else rest if start is None else start.u
         velocity = v if motion is None else motion.v
@@ -149,12 +153,6 @@ def _require_room(system):
             "with 'energy-momentum' and 'generalized-alpha', if it is supported at nodes, has no "
             "other joints, no springs between distant points and no modal damping. Otherwise use "
             "fewer elements, or scene.modes(k)")
-
-
-def _goes_on(system, scheme, start, t):
-    """True if the start is an instant of a motion of the same scene by the same scheme."""
-    return (not system.forces.sampled and same_scheme(start._origin[0], scheme)
-            and same_problem(system, start, t))
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..core.callbacks import handle_of
-from ..core.errors import CheckpointError, InputError, SupportError, require_positive, shown
+from ..core.errors import InputError, SupportError, require_positive, shown
 from ..core.linalg import halves
 from ..core.types import Array
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
-from .base import Motion, Scheme, in_steps, interpolate, stored
+from .base import Motion, Scheme, in_steps, interpolate
 from .convergence import FAILURES, new_state
 from .course import SAMPLES, Course, Given
 from .dampers import Dampers, Rows, solve_rows
@@ -358,17 +358,12 @@ class Integrator:
 
     def load(self, arrays: dict[str, Any]) -> None:
         """Restore what :meth:`arrays` returned."""
-        for name in (*self._state._fields, "dt", "substeps"):
-            stored(arrays, name, self.arrays()[name])
         self._load_state([arrays[name] for name in self._state._fields])
         self.dt = float(arrays["dt"])
         self.substeps = int(arrays["substeps"])
         if self.ready:
             for name, array in self._factors().items():
-                array[...] = stored(arrays, name, array)
-                if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < len(
-                        array):
-                    raise CheckpointError("the pivots of the factors are invalid")
+                array[...] = arrays[name]
         if self._nodes:
             steps, mass = self._nodes
             if self.ready:

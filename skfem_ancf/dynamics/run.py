@@ -18,7 +18,7 @@ from ..core.errors import (AncfError, CheckpointError, InputError, ModelWarning,
 from ..core.types import Array
 from ..equations.system import System
 from ..results.state import State
-from .base import Motion, Scheme, in_blocks, interpolate, stored
+from .base import Motion, Scheme, in_blocks, interpolate
 from .history import COLUMNS, History, state_of
 from .integrator import DEPTH, Integrator, StepFailed
 from .sensors import Recorder, Sensor
@@ -154,10 +154,13 @@ class Run:
         if arrays is not None:
             self.integrator.load(arrays)
             self.integrator.reset()
-            if self._sizes is not None and "averages" in arrays:
-                self._size = min(float(arrays["size"]), self.task.span)
-                self._sizes.load(arrays)
         self._store_start()
+
+    def keep_size(self, arrays: dict[str, Any]) -> None:
+        """Begin with the automatic step size of another run."""
+        if self._sizes is not None and "averages" in arrays:
+            self._size = min(float(arrays["size"]), self.task.span)
+            self._sizes.load(arrays)
 
     def _sample(self, u, v, t, first):
         """Evaluate sampled controllers that are due."""
@@ -424,9 +427,9 @@ class Run:
             self._sizes.load(arrays)
         for k, control in enumerate(self.system.forces.sampled):
             control.hold(arrays[f"held {k}"])
-        counts = stored(arrays, "counts", np.zeros(5, dtype=int)).tolist()
+        counts = map(int, arrays["counts"])
         self._segment, self._n, self._next, self.steps, self.rejected = counts
-        self._size = float(stored(arrays, "size", 0.0))
+        self._size = float(arrays["size"])
         self._limit()
         if not self._begun <= y.t <= self._end or self._sizes is None and (
                 abs(self._time(self._n) - y.t) > 1e-9 * self._size):

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.types import Array
 from ..equations.system import System
-from .base import Motion, Scheme, stored
+from .base import Motion, Scheme
 from .course import Lookahead
 from .integrator import Integrator
 
@@ -125,7 +125,5 @@ class StepSize:
 
     def load(self, arrays: dict[str, Any]) -> None:
         """Restore what :meth:`arrays` returned."""
-        self._averages = stored(arrays, "averages", self._averages)
-        if np.size(arrays["origin"]):
-            self._origin = stored(arrays, "origin", self._averages[0])
-        self._moved = float(stored(arrays, "moved", 0.0))
+        self._averages, self._origin = arrays["averages"], arrays["origin"]
+        self._moved = float(arrays["moved"])

@@ -8,15 +8,16 @@ from typing import Any
 
 from ..actions.obstacles.outlines import obstacles_of
 from ..core.archive import output_file
-from ..core.errors import require_path, require_text
+from ..core.errors import (InputError, require_finite_scalar, require_like, require_path,
+                           require_text)
 from ..core.types import StrPath
 from ..recovery.fields import find_fields
-from .vtu import SeriesWriter, require_next, save_vtu
+from .vtu import save_vtu
 
 logger = logging.getLogger(__name__)
 
 
-class PvdWriter(SeriesWriter):
+class PvdWriter:
     """Writes one .vtu file for each frame, and a .pvd file that lists them with their times.
 
     Both are complete after every :meth:`add`, so that ParaView can follow a run. Frames are called
@@ -59,7 +60,10 @@ class PvdWriter(SeriesWriter):
         find_fields(fields)
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
 
-    def __exit__(self, *_):
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         if self.frames:
             logger.info("wrote %s: %d frames", self.path, len(self.frames))
 
@@ -75,7 +79,11 @@ class PvdWriter(SeriesWriter):
         """
         from xml.sax.saxutils import quoteattr  # which imports http and ssl
 
-        t = require_next(state, t, self.frames[-1][0] if self.frames else None)
+        require_like("state", state, "State", "beams", "u_of")
+        t = require_finite_scalar("t", t)
+        if self.frames and t <= self.frames[-1][0]:
+            raise InputError(f"the times of the frames must increase: {t!r} after "
+                             f"{self.frames[-1][0]!r}")
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
         frame = save_vtu(state, self.path.with_name(name), **self.options)
         self.frames.append((t, name))

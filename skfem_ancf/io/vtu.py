@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,9 +10,8 @@ import numpy as np
 
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
-from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
-                           require_option, require_path, warn)
-from ..core.types import Array, StrPath
+from ..core.errors import require_flag, require_option, require_path, warn
+from ..core.types import StrPath
 from ..recovery.arrays import COMPONENTS, body_of, facts_of
 from ..recovery.fields import find_fields, unit_of, units_of
 from ..recovery.grids import grids, in_space
@@ -157,20 +155,13 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     units = {field.name: unit_of(field, scale) for field in find_fields(fields) if scale}
     _write(path, body, dtype, units)
     logger.info("wrote %s: %d points", path, len(body.points))
-    save_obstacles(outlines(state, around(body.points[:, :2].T)), path, dtype)
+    if walls := outlines(state, around(body.points[:, :2].T)):
+        points = in_space(np.concatenate(walls).reshape(-1, 2).T)
+        numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
+        _write(path.with_name(f"{path.stem}_obstacles{path.suffix}"), BodyFields(
+            points, [("line", np.arange(len(points)).reshape(-1, 2))], {},
+            {"obstacle": [numbers]}, {}), dtype)
     return path
-
-
-def save_obstacles(walls: list[Array], path: Path, dtype: Any = np.float64) -> None:
-    """Write the outlines of obstacles, (m, 2, 2) each, beside the file of the body."""
-    if not walls:
-        return
-    points = in_space(np.concatenate(walls).reshape(-1, 2).T)
-    numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
-    suffix = path.suffix if path.suffix.lower() in SUFFIXES else ".vtu"
-    _write(path.with_name(f"{path.stem}_obstacles{suffix}"), BodyFields(
-        points, [("line", np.arange(len(points)).reshape(-1, 2))], {}, {"obstacle": [numbers]}, {}),
-        dtype)
 
 
 def _write(path, body, dtype, units=()):
@@ -207,25 +198,3 @@ def _completed(text, body, units):
             COMPONENTS.get(values.size // len(values), ())))
         text = b"".join([text[:at], parts.encode(), text[at:end], label.encode(), text[end:]])
     return text
-
-
-class SeriesWriter:
-    """Base class of writers of a series; subclasses define ``add(state, t)`` for a frame."""
-
-    def __enter__(self) -> Any:
-        return self
-
-    def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
-        """Write states with a time ``t``, and call ``done`` after each of them."""
-        for state in states:
-            self.add(state, state.t)  # type: ignore[attr-defined]
-            done()
-
-
-def require_next(state: Any, t: Any, before: float | None) -> float:
-    """The time of a frame, later than ``before``, which may be None."""
-    require_like("state", state, "State", "beams", "u_of")
-    t = require_finite_scalar("t", t)
-    if before is not None and t <= before:
-        raise InputError(f"the times of the frames must increase: {t!r} after {before!r}")
-    return t

@@ -571,7 +571,7 @@ class Scene(Model):
             sign, within a step; ``history.event`` is the time. It is evaluated after each step: two
             changes within one step are not detected. Not with ``checkpoint``.
         checkpoint
-            A file (``.npz`` or ``.h5``) for checkpoints, from which :meth:`resume` continues.
+            A file (``.npz``) for checkpoints, from which :meth:`resume` continues.
         every
             Steps between two checkpoints; by default a minute, with at most a twentieth of the time
             spent on writing.
@@ -736,8 +736,8 @@ class Scene(Model):
         Raises
         ------
         CheckpointError
-            If the file cannot be read, is damaged, or belongs to another scene. Functions of time
-            are compared at 33 times only.
+            If the file cannot be read, is damaged, or is of other beams, bodies or meshes. Loads,
+            materials and joints are not compared.
 
         Examples
         --------
