@@ -402,7 +402,7 @@ def test_statics_of_bodies_alone():
     for x, y, dx, dy in ((-0.2, 0, 0, 1), (0.2, 0, 0, 1), (0.2, 0, 1, 0)):
         scene.spring(1e4, between=(("ground", (x + dx, y + dy)), (body, (x, y))))
     state = scene.gravity((0, -G)).solve_static()
-    assert state.converged and state.stability == "stable" and len(scene.plan()) > 5
+    assert state.converged and state.stability == "stable"
     assert_allclose(state.position(body), [0, -G / 2e4], atol=1e-6)
     post = RigidBody(1.0, 0.1, position=(0, 0.5))
     scene = Scene(post).pin((0, 0)).torsional_spring(2.0, post).point_force((0, -1), (0, 1))

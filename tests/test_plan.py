@@ -38,12 +38,12 @@ def test_no_viewer_is_imported():
 
 def test_numba_is_left_out_on_request(monkeypatch):
     """One variable for all beams; what else it may be set to is refused, and the plan says why."""
-    assert "compiled=False" in scene().plan()["compiled loop"].reason
+    assert "compiled=False" in scene().plan()["compiled loop"]
     monkeypatch.setenv("SKFEM_ANCF_COMPILED", "0")
     beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(3),
                 StVenantKirchhoff(2e8, 0.3, 7800), 0.01)
     off = Scene(beam).pin("left").plan()["compiled loop"]
-    assert off.status == "skipped" and "SKFEM_ANCF_COMPILED=0" in off.reason
+    assert off.startswith("no") and "SKFEM_ANCF_COMPILED=0" in off
     monkeypatch.setenv("SKFEM_ANCF_COMPILED", "no")
     with pytest.raises(InputError, match="must be 0 .* 1 .* auto .*, got 'no'"):
         Scene(beam).pin("left").plan()
@@ -51,24 +51,22 @@ def test_numba_is_left_out_on_request(monkeypatch):
 
 def test_plan_of_every_kind():
     s = scene()
-    assert s.plan()["multipliers"].status == "skipped"
-    assert s.plan()["varying loads"].status == "skipped"
-    assert "Cholesky" in s.plan()["linear solver"].reason
+    assert "Cholesky" in s.plan()["linear solver"]
+    assert "8 x <ElementBeamANCF" in s.plan()["elements"]
     s.pressure("top", 1.0)
     s.joint("line", at=(1, 0), direction=(1, 0.5))
     plan = s.plan()
-    assert plan["multipliers"].status == plan["varying loads"].status == "computed"
-    assert "sparse LU" in plan["linear solver"].reason
+    assert "sparse LU" in plan["linear solver"]
     s = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 121), 0.01), ElementBeamCable(3),
                    StVenantKirchhoff(2e8, 0.3, 7800), 0.01)).pin("left").pressure("top", 1.0)
     for k in range(110):
         s.joint("line", at=(1 - k / 120, 0), direction=(1, 0.5))
-    assert "sparse" in s.plan()["linear solver"].reason
-    assert "LU" in s.plan("dynamic")["linear solver"].reason
-    assert all(item.term in str(plan) and item.reason in str(plan) for item in plan)
+    assert "sparse" in s.plan()["linear solver"]
+    assert "LU" in s.plan("dynamic")["linear solver"]
+    assert all(name in str(plan) and text in str(plan) for name, text in plan.items())
     with pytest.raises(NameUnknown, match="'static', 'linear', 'dynamic'"):
         s.plan("modal")
-    with pytest.raises(NameUnknown, match="'mass'"):
+    with pytest.raises(NameUnknown, match="'elements'"):
         plan["inertia"]
 
 
@@ -124,8 +122,7 @@ def test_which_scheme_a_motion_takes():
             (touching, 1e-6, "energy-momentum", "obstacles")):
         choice = choose_scheme(scene.system, rtol)
         assert choice.scheme.name == name and why in choice.reason
-        item = scene.plan("dynamic")["scheme"]
-        assert repr(choose_scheme(scene.system).scheme) in item.reason
+        assert repr(choose_scheme(scene.system).scheme) in scene.plan("dynamic")["scheme"]
     history = held.integrate(0.1, "auto", scheme="auto", rtol=1e-6)
     other = held.integrate(0.1, "auto", scheme="gauss", rtol=1e-6)
     assert np.array_equal(history.u, other.u) and len(history) == len(other)
