@@ -42,8 +42,8 @@ def _bind_custom(item, layout):
         if not isinstance(bound, Item):
             raise InputError(f"bind(layout) of {item!r} must return an Item, got {shown(bound)}")
         out: list[Any] = []
-        if any(hasattr(bound, name) for name in ("energy", "force", "mass")):
-            out.append(_Force(bound, layout))
+        if any(hasattr(bound, name) for name in ("energy", "force", "mass", "evaluate")):
+            out.append((_Remembered if hasattr(bound, "start") else _Force)(bound, layout))
         if hasattr(bound, "constraint"):
             out.append(_Constraint(bound, layout))
     if not out:
@@ -64,8 +64,8 @@ class _Force(ForceElement):
         if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < layout.N):
             raise InputError(f"dofs of {item!r} must be numbers from 0 to {layout.N - 1}, got "
                              f"{shown(item.dofs)}")
-        self.resists = hasattr(item, "force")
-        self._forced = hasattr(item, "energy") or hasattr(item, "force")
+        self.resists = hasattr(item, "force") or hasattr(item, "evaluate")
+        self._forced = hasattr(item, "energy") or self.resists
         pairs = np.unique(dofs // 2) if self._forced else dofs[:0]
         self._dofs = (2 * pairs[:, None] + np.arange(2)).ravel()
         self.links = [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in pairs]
@@ -81,20 +81,23 @@ class _Force(ForceElement):
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         if hasattr(self.item, "force"):
-            found = np.asarray(self.item.force(self._whole(x), self._whole(v), t))
-            if found.shape != (self._N,):
-                raise InputError(f"force(u, v, t) of {self.item!r} must have the shape "
-                                 f"({self._N},), got {found.shape}")
-            return found[self._dofs].reshape(-1, 2)
+            return self._at(self.item.force(self._whole(x), self._whole(v), t))
         return -derivative(lambda y: self.item.energy(self._whole(y), t), np.asarray(x))
+
+    def _at(self, force):
+        found = np.asarray(force)
+        if found.shape != (self._N,):
+            raise InputError(f"the force of {self.item!r} must have the shape ({self._N},), got "
+                             f"{found.shape}")
+        return found[self._dofs].reshape(-1, 2)
 
     def potential_at(self, x: Array, t: float) -> float | None:
         return float(self.item.energy(self._whole(x), t)) if hasattr(self.item, "energy") else None
 
-    def _derivative_by(self, name, x, v, t, otherwise):
+    def _derivative_by(self, name, x, v, t, otherwise, *past):
         if not hasattr(self.item, name):
             return otherwise(x, v, t)
-        found = getattr(self.item, name)(self._whole(x), self._whole(v), t)
+        found = getattr(self.item, name)(self._whole(x), self._whole(v), t, *past)
         matrix = sparse.csr_array(found)[self._dofs][:, self._dofs].toarray()
         n = len(self._dofs) // 2
         return matrix.reshape(n, 2, n, 2)
@@ -115,6 +118,29 @@ class _Force(ForceElement):
 
     def __repr__(self) -> str:
         return repr(self.item)
+
+
+class _Remembered(_Force):
+    """The same of an item with a memory."""
+
+    def start(self) -> Array:
+        return self.item.start()
+
+    def evaluate(self, x: Array, v: Array, t: float, history: Array, dt: float
+                 ) -> tuple[Array, Array]:
+        force, after = self.item.evaluate(self._whole(x), self._whole(v), t, history, dt)
+        return self._at(force), after
+
+    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        return self._derivative_by("stiffness", x, v, t, lambda x, v, t: derivative(
+            lambda y: self.evaluate(y, v, t, *past)[0], x), *past)
+
+    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        return self._derivative_by("damping", x, v, t, lambda x, v, t: derivative(
+            lambda w: self.evaluate(x, w, t, *past)[0], v), *past)
+
+    def potential(self, x: Array, *past: Any) -> float | None:
+        return self.item.energy(self._whole(x), *past) if hasattr(self.item, "energy") else None
 
 
 class _Constraint(Joint):

@@ -33,7 +33,11 @@ class Item(Immutable):
       arrays or sparse matrices (N, N); by default differences of the force,
     * ``constraint(u, t)``: equations that Lagrange multipliers keep at zero, shape (m,),
     * ``jacobian(u, t)``: its derivative by u, shape (m, N); by default by differences,
-    * ``mass()``: contribution to the mass matrix, (N, N), between DOFs of one node.
+    * ``mass()``: contribution to the mass matrix, (N, N), between DOFs of one node,
+    * with a memory: ``start()``, its history at rest, (k,), and ``evaluate(u, v, t, history, dt)``
+      in place of the force, which returns the force and the history after an increment ``dt``. Then
+      ``energy(u, history)`` is what it stores, and derivatives have these arguments, as described
+      in :class:`~skfem_ancf.actions.forces.ForceElement`.
 
     Here u and v are displacement and velocity of all DOFs of the scene, shape (N,), and t is the
     time, in statics the load factor. Differences take complex steps, exact to round-off, where the

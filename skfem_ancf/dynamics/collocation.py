@@ -94,9 +94,7 @@ class Collocation(Scheme):
         return f"<{type(self).__name__}, {len(self.points)} points>"
 
     def require(self, system: System) -> None:
-        system.histories.require_none(
-            repr(self), "its points lie within the step; use 'energy-momentum' or "
-            "'generalized-alpha'")
+        system.histories.require_none(self, "its points lie within the step")
         if system.constraints.m and not (self.joined or system.backend.tables.linear_joints):
             raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
                              "rigid bodies: use 'radau', or 'energy-momentum', which conserves "

@@ -1,7 +1,7 @@
 """Velocities, accelerations and multipliers at the end of a step."""
 
 from ..core.band import copy, dot, solve_joined, subtract_rows
-from ..actions.forces.kernels import set_contact_rate, settle_contact
+from ..actions.forces.kernels import set_contact_rate, settle_contact, settle_elements
 from ..beam.strain_energy import accept_body
 from ..core.callbacks import call_solver
 from ..core.source import indices, source
@@ -131,6 +131,7 @@ def settle(e, rule, s, w, taken):
         settle_contact(e.forces, s.acting, s.dt, w.y[0], w.x.u, taken)
     else:
         settle_contact(e.forces, s.acting, 0.0, w.x.u, w.x.u, taken)
+    settle_elements(e.forces, s.t, w.y[0], w.x.u, w.x.v, taken)
     accept_body(e.body, w.y[0], w.x.u, taken)
     e.span[0] = 0.0
 

@@ -86,6 +86,7 @@ class EnergyMomentum4(EnergyMomentum):
 
     def require(self, system: System) -> None:
         super().require(system)
+        system.histories.require_none(self, "it takes a part of each step back in time")
         if system.damped or system.histories.dissipates:
             raise InputError(f"{self!r} takes a part of each step back in time, where damping and "
                              "friction would add energy: use 'energy-momentum', or 'radau' for "

@@ -303,7 +303,7 @@ class Integrator:
         Collocation, which linearises joints once per step, uses an energy-momentum step here.
         """
         system = self.system
-        if not self.m or system.forces.contacts.obstacles or system.histories.of_beams.size:
+        if not self.m or system.forces.contacts.obstacles or system.histories.evolve:
             return None
         other, begin = self, y
         if not in_steps(self.scheme):

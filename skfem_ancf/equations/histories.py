@@ -19,7 +19,7 @@ from ..core.types import Array
 
 class Histories:
     """The history of a scene: anchors and multipliers of obstacles, whole turns of torsional
-    springs, variables of materials.
+    springs, variables of materials and of user-defined items.
 
     A history is a value, an array (n,). Forces, tangents and energies depend on the one that is
     set, and do not change it; :meth:`accept` replaces it at the end of an increment. To start again
@@ -29,11 +29,11 @@ class Histories:
     ----------
     values
         The history that is set, shape (n,); its parts are ``of_forces``, of obstacles and springs,
-        and ``of_beams``.
+        ``of_beams``, and those of items with a memory. ``rest`` is that at rest.
     span
         Time since then, shape (1,), for laws with rates; 0 at once.
-    lasting, dissipates
-        True if steps change it; if energy may be lost by that.
+    lasting, dissipates, evolve
+        True if steps change it; if energy may be lost by that; if a material or item has one.
     """
 
     def __init__(self, forces: Forces, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
@@ -42,18 +42,25 @@ class Histories:
             (beam, s) for beam, s in zip(beams, slices) if remembers(beam)]
         first = contacts.tables.memory.size if contacts.keeps else 0
         sizes = [sum(map(history_size, beam.kernel.tables)) for beam, _ in some]
-        self.values, self.span = np.zeros(first + sum(sizes)), np.zeros(1)
-        self.of_forces, self.of_beams = self.values[:first], self.values[first:]
+        self._items, end = forces.remembering, first + sum(sizes)
+        self.values = np.concatenate([np.zeros(end), *(item.start for item in self._items)])
+        self.rest, self.span = self.values.copy(), np.zeros(1)
+        self.of_forces, self.of_beams = self.values[:first], self.values[first:end]
         if first:
             contacts.tables = contacts.tables._replace(memory=self.of_forces)
-        self.lasting = contacts.tables.lasting > 0 or bool(some)
-        self.dissipates = contacts.tables.lasting not in (0, TURNS) or bool(some)
-        self._parts, self._kernels, at = dict[int, slice](), dict[int, Any](), first
+        self.evolve = bool(some or self._items)
+        self.lasting = contacts.tables.lasting > 0 or self.evolve
+        self.dissipates = contacts.tables.lasting not in (0, TURNS) or self.evolve
+        self._parts, self._kernels, at = dict[Any, slice](), dict[int, Any](), first
         self._beams, self._all = some, list(beams)
         for (beam, _), n in zip(some, sizes):
             self._parts[id(beam)] = part = slice(at, at + n)
             self._kernels[id(beam)] = beam.kernel.remembering(self.values[part], self.span)
             at += n
+        for item in self._items:
+            self._parts[item.element._key] = part = slice(at, at + len(item.start))
+            item.remember(self.values[part], self.span)
+            at = part.stop
 
     def kernel(self, beam: Beam) -> Any:
         """The kernel of a beam with the history that is set."""
@@ -90,12 +97,12 @@ class Histories:
 
         It takes a share of the time for which histories are lent.
         """
-        self.values[:] = 0.0 if history is None else history
+        self.values[:] = self.rest if history is None else history
         self.span[0] = share * self._increment
 
     def get(self) -> Array | None:
         """A copy of the history that is set; None if nothing has happened."""
-        return self.values.copy() if self.values.size and self.values.any() else None
+        return None if np.array_equal(self.values, self.rest) else self.values.copy()
 
     def begin(self, u: Array, t: float, history: Array | None = None) -> Array | None:
         """Set the history of a start at u and t, or a given one; returns it.
@@ -110,7 +117,7 @@ class Histories:
     def accept(self, u0: Array, u: Array, t: float) -> float:
         """Set the history after an increment in statics from u0 to u; returns what it dissipates.
         """
-        lost = self._forces.settle(u, t)
+        lost = self._forces.settle(u, t) + sum(item.settle(u0, u, t) for item in self._items)
         for beam, s in self._beams:
             for e in self.kernel(beam).elements:
                 if isinstance(e, ElementsWithHistory):
@@ -130,33 +137,37 @@ class Histories:
         theirs = state.system.histories
         if theirs is self:
             return state.memory
-        out, known = np.zeros(self.values.size), False
+        out, known = self.rest.copy(), False
         a, b = self._contacts.tables, theirs._contacts.tables
         n = self.of_forces.size
         if n == theirs.of_forces.size and np.array_equal(a.ints, b.ints) and np.array_equal(
                 a.floats, b.floats):
             out[:n], known = state.memory[:n], n > 0
         for part, other in self._shared(theirs):
-            out[part], known = state.memory[other], True
+            if part.stop - part.start == other.stop - other.start:
+                out[part], known = state.memory[other], True
         return out if known else None
 
     def _shared(self, theirs):
-        """Parts of the same beams: the objects, or those in the same place with such materials."""
+        """Parts of the same items, and of the same beams: the objects, or those in the same place
+        with such materials."""
+        for key in (item.element._key for item in self._items):
+            if key in theirs._parts:
+                yield self._parts[key], theirs._parts[key]
         for k, beam in enumerate(self._all):
             other = beam if id(beam) in theirs._parts else (
                 theirs._all[k] if k < len(theirs._all) else None)
             if id(beam) not in self._parts or id(other) not in theirs._parts:
                 continue
-            one, two = self._parts[id(beam)], theirs._parts[id(other)]
-            if one.stop - one.start == two.stop - two.start and _laws(beam) == _laws(other):
-                yield one, two
+            if _laws(beam) == _laws(other):
+                yield self._parts[id(beam)], theirs._parts[id(other)]
 
-    def require_none(self, what: str, instead: str) -> None:
-        """Raise InputError if a material has a history."""
-        if self._beams:
-            beam = self._beams[0][0]
-            raise InputError(f"{what} does not know the history of materials, as that of {beam!r}: "
-                             f"{instead}")
+    def require_none(self, scheme: Any, because: str) -> None:
+        """Raise InputError if a material or a user-defined item has a history."""
+        if self.evolve:
+            one = [*(beam for beam, _ in self._beams), *self._items][0]
+            raise InputError(f"{scheme!r} does not know histories, as that of {one!r}: {because}; "
+                             "use 'energy-momentum' or 'generalized-alpha'")
 
 
 def _laws(beam):

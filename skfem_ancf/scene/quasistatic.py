@@ -158,7 +158,7 @@ class _Record:
         turns = self._turns.begin(u) if before is None else self._turns.follow(before, u[None])[0]
         memory = instant.result.memory
         if memory is None:
-            memory = np.zeros(self.system.histories.values.size)
+            memory = self.system.histories.rest
         y = Motion(instant.t, u, zero, zero, zero, instant.result.multipliers,
                    instant.result.multipliers, 0.0, instant.result.rubbed, memory, turns)
         self._motions.append(y)

@@ -23,6 +23,8 @@ from ..places import Vector
 STEP = 1e-6
 #: Relative perturbation of the reference configuration for checks of user-defined elements.
 ASIDE = 0.01
+#: The span of a mean at one time.
+TINY = 1e-300
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
@@ -43,6 +45,14 @@ class ForceElement(Item):
     :meth:`resistance`. In statics velocities are zero. Load factors do not scale it. The
     energy-momentum scheme conserves the energy if there is a :meth:`potential`; the work of
     velocity-dependent forces is in ``history.dissipated``.
+
+    An element with a memory, such as friction or a controller that integrates, defines
+    ``start()``, its history at rest, shape (k,), and ``evaluate(x, v, t, history, dt)`` instead of
+    :meth:`force`. That returns the force and the history at the end of an increment of time
+    ``dt`` from ``history``, and changes nothing: all solvers, states and checkpoints keep the
+    history. Its ``stiffness(x, v, t, history, dt)``, ``resistance(x, v, t, history, dt)`` and
+    ``potential(x, history)``, the stored energy, are optional. A further increment of ``dt = 0``
+    should give the same force. Set ``symmetric = False`` where what slips has no potential.
 
     Attributes
     ----------
@@ -90,6 +100,27 @@ class ForceElement(Item):
     >>> history = scene.integrate(t_end=0.02, dt=1e-3)
     >>> bool(-0.3 < tip[1] < -0.2), bool(history.dissipated[-1] > 0)
     (True, True)
+
+    Dry friction along x: the force of a spring from an anchor that slips at a limit.
+
+    >>> class Rubbing(ForceElement):
+    ...     symmetric = False
+    ...     def __init__(self, k, most, at):
+    ...         self.k, self.most, self.at = k, most, at
+    ...     def bind(self, scene):
+    ...         return [point(scene, None, self.at)]
+    ...     def start(self):
+    ...         return np.array([self.at[0]])
+    ...     def evaluate(self, x, v, t, history, dt):
+    ...         pull = np.clip(self.k * (x[0, 0] - history[0]), -self.most, self.most)
+    ...         return np.array([[-pull, 0.0]]), np.array([x[0, 0] - pull / self.k])
+    ...     def potential(self, x, history):
+    ...         return 0.5 * self.k * (x[0, 0] - history[0]) ** 2
+    >>> bar = Scene(beam).clamp("left").add(Rubbing(1e6, 1.0, (1, 0)))
+    >>> bar = bar.fix("right", "r^1", displacement=lambda t: 1e-5 * np.sin(np.pi * t / 2))
+    >>> run = bar.run([1.0, 3.0, 5.0], increments=20)  # a cycle of hysteresis
+    >>> bool(np.isclose(run.dissipated[-1] - run.dissipated[20], 4 * 1.0 * (1e-5 - 1e-6)))
+    True
     """
 
     distributed = False
@@ -196,6 +227,86 @@ def derivative(function: Callable[[Array], Any], x: Array) -> Array:
     return out
 
 
+class Remembering:
+    """A bound force element with a memory, at the history that is set: as one without memory.
+
+    ``history`` (k,) is that at the start of an increment, ``span`` (1,) the time since; views of
+    those of a scene.
+    """
+
+    def __init__(self, element: Any) -> None:
+        self.element = element
+        self.start = np.array(require_finite(f"start() of {element!r}", element.start(), (None,)))
+        self.remember(self.start, np.zeros(1))
+
+    def __getattr__(self, name):
+        return getattr(vars(self)["element"], name)
+
+    def __repr__(self) -> str:
+        return repr(self.element)
+
+    def remember(self, history: Array, span: Array) -> None:
+        """Use a part of the history of a scene, and its span."""
+        self._values, self.history, self.span = history, history.view(), span
+        self.history.flags.writeable = False
+
+    def evaluate(self, x: Array, v: Array, t: float, dt: float | None = None
+                 ) -> tuple[Array, Array]:
+        """Force and history after ``dt``, by default the span."""
+        dt = float(self.span[0]) if dt is None else dt
+        force, after = self.element.evaluate(x, v, t, self.history, dt)
+        if np.shape(after) != self.start.shape:
+            raise InputError(f"evaluate(x, v, t, history, dt) of {self!r} must return the force "
+                             f"and a history of the shape of start(), {self.start.shape}, got "
+                             f"{np.shape(after)}")
+        return np.asarray(force), np.asarray(after)
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        return self.evaluate(x, v, t)[0]
+
+    def mean_force(self, x: Array, y: Array, t: float, span: float) -> Array:
+        """The mean force (n, 2) of a step about t: of its ends; with the span 0 that at the end."""
+        end = self.force(y, 0.0 * y, t + 0.5 * span)
+        return 0.5 * (self.evaluate(x, 0.0 * x, t - 0.5 * span, 0.0)[0] + end) if span else end
+
+    def _derivative(self, name, function, at, *x):
+        own = getattr(self.element, name)
+        if own.__func__ is not getattr(ForceElement, name):
+            return own(*x, self.history, float(self.span[0]))
+        return derivative(function, at)
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        return self._derivative("stiffness", lambda y: self.force(y, v, t), x, x, v, t)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        return self._derivative("resistance", lambda w: self.force(x, w, t), v, x, v, t)
+
+    def potential_at(self, x: Array, t: float, history: Array | None = None) -> float | None:
+        own = self.element.potential
+        if own.__func__ is ForceElement.potential:
+            return None
+        return float(own(x, self.history if history is None else history))
+
+    def accept(self, x: Array, y: Array, v: Array, t: float) -> float:
+        """Set the history at the end of an increment from x to y; returns what it dissipates."""
+        dt, after = float(self.span[0]), self.evaluate(y, v, t)[1]
+        mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)
+        lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
+            self.potential_at(y, t, after) or 0.0)
+        self._values[:] = after
+        return float(lost)
+
+    def settle(self, u0: Array, u: Array, t: float) -> float:
+        """As :meth:`accept` in statics, between displacements (N,)."""
+        x, y = (np.array([link(w) for link in self.links]) for w in (u0, u))
+        return self.accept(x, y, 0.0 * y, t)
+
+
+def recalled(element: Any) -> Any:
+    """A bound force element as solvers see it: one with a memory is :class:`Remembering`."""
+    return Remembering(element) if hasattr(element, "start") else element
+
+
 def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
     """A copy of a force element, bound to a scene and checked.
 
@@ -229,6 +340,7 @@ def _links(element, links):
 
 def try_force(bound: Any, sizes: Any = None) -> None:
     """Raise InputError unless the methods of a user-defined force element are consistent."""
+    bound = recalled(bound)
     x = np.array([x.start for x in bound.links])
     n, zero = len(x), np.zeros_like(x)
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
@@ -244,7 +356,7 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
                          "symmetric: it has no potential. Set symmetric = False in its class")
-    if bound.potential_at(y, 0.0) is not None:
+    if not hasattr(bound, "start") and bound.potential_at(y, 0.0) is not None:
         beside(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
 
 

@@ -110,7 +110,7 @@ def _of(kinds, kind, y, w, rows, out):
 
 
 #: Values of ``what``.
-ELASTIC, RESISTING, DERIVATIVES, TURNED = range(4)
+ELASTIC, RESISTING, DERIVATIVES, TURNED, SETTLED = range(5)
 
 
 @source
@@ -136,7 +136,7 @@ def _evaluate(tables, what, t, factor, y, w, out):
 
 
 @source
-def _add_force(tables, what, t, u, v, start, f):
+def _add_force(tables, what, t, span, u, v, start, f):
     """Add the force for vectors at u and, without ``start``, rates at v."""
     size = tables.start.size
     if size == 0:
@@ -144,7 +144,7 @@ def _add_force(tables, what, t, u, v, start, f):
     y, w, F = np.empty(size), np.empty(size), np.zeros(size)
     vectors_of(tables, u, 1.0, y)
     vectors_of(tables, v, start, w)
-    _evaluate(tables, what, t, 0.0, y, w, F)
+    _evaluate(tables, what, t, span, y, w, F)
     add_products(f, tables.of, tables.weight, F, tables.at)
 
 
@@ -154,14 +154,14 @@ def add_elastic_force(tables, t, span, u0, u1, f):
 
     It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
     """
-    _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
+    _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
 def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
-    _add_force(tables, np.int64(RESISTING), t, u, v, 0.0, f)
+    _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
     add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
 
@@ -228,6 +228,21 @@ def settle_contact(tables, t, span, u0, u1, out):
     out[0] = 0.0
     follow_turns(tables, u1)
     add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
+
+
+@source
+def settle_elements(tables, t, u0, u1, v, out):
+    """Set the histories of user-defined elements at the end of a step, with the velocity v there.
+
+    What they dissipate is added to out, (1,).
+    """
+    if tables.custom > 0:
+        n = tables.start.size
+        y, w = np.empty(n), np.empty(2 * n)
+        vectors_of(tables, u0, 1.0, y)
+        vectors_of(tables, u1, 1.0, w[:n])
+        vectors_of(tables, v, 0.0, w[n:])
+        custom_elements(tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
 
 
 @source

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.types import Array
 from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
-from .base import ForceElement, Part
+from .base import ForceElement, Part, Remembering, recalled
 from .control import Control
 from .springs import TorsionalSpring
 from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
@@ -23,7 +23,8 @@ KINDS = 4
 
 
 class Forces:
-    """The bound force elements of a scene; ``custom`` are the user-defined ones.
+    """The bound force elements of a scene; ``custom`` are the user-defined ones, as solvers see
+    them; ``remembering`` are those with a memory.
 
     ``far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given, with
     places that differ by more than 1. ``symmetric``: all derivatives are symmetric. ``resists``:
@@ -39,9 +40,10 @@ class Forces:
         for element in self.elements:
             found = element.parts()
             if found is None:
-                self.custom.append(element)
+                self.custom.append(recalled(element))
             else:
                 parts += found
+        self.remembering = [e for e in self.custom if isinstance(e, Remembering)]
         order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
         self.parts = [parts[k] for k in order]
         self._place = np.argsort(order) if order else np.zeros(0, np.int64)
@@ -284,15 +286,18 @@ class Forces:
                 out: Array) -> None:
         """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.custom_elements`.
 
-        ``what`` is 0: the mean force at zero velocity between positions a and b; 1: the force at a
-        due to velocities b; 2: the derivatives by positions, plus a factor times those by
-        velocities; 3: keep the angles of torsional springs at a.
+        ``what`` is 0: the mean force at zero velocity between positions a and b, over a span of
+        time ``factor``; 1: the force at a due to velocities b; 2: the derivatives by positions,
+        plus a factor times those by velocities; 3: keep the angles of torsional springs at a; 4:
+        set the histories at the end of a step from a to b, with velocities in the second half of
+        b, and add what it dissipates.
         """
         self.recall()
         for element, (rows, places) in zip(self.custom, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
             if what == 0:
-                out[rows] -= np.ravel(element.mean_force(x, y, t))
+                remembers = isinstance(element, Remembering)
+                out[rows] -= np.ravel(element.mean_force(x, y, t, *[factor] * remembers))
             elif what == 1:
                 if element.resists and np.any(y):
                     out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
@@ -300,6 +305,10 @@ class Forces:
             elif what == 3:
                 if isinstance(element, TorsionalSpring):
                     self.contacts.turns[self._springs.index(element)] = element.angle_of(x)
+            elif what == 4:
+                if isinstance(element, Remembering):
+                    v = b[len(a):][rows].reshape(-1, 2)
+                    out[0] += element.accept(x, y, v, t)
             else:
                 found = np.array(element.stiffness(x, y, t))
                 if element.resists and factor != 0.0:

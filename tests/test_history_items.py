@@ -1,0 +1,280 @@
+"""Items of one's own with a memory: a law, a contact law, controllers, each in one class here.
+
+They need nothing but ``start`` and ``evaluate``; all solvers keep their history.
+"""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, Item, MeshBeam,
+                        RigidBody, Scene, StVenantKirchhoff, sweep)
+from skfem_ancf.actions.forces import ForceElement, point
+
+MATERIAL = StVenantKirchhoff(2e7, 0.3, 1000.0)
+TIP = (1.0, 0.0)
+
+
+class Maxwell(ForceElement):
+    """A law: spring and dashpot in series along y; the history is place and force."""
+
+    def __init__(self, k, tau, at=TIP):
+        self.k, self.tau, self.at = k, tau, at
+
+    def bind(self, scene):
+        return [point(scene, None, self.at)]
+
+    def start(self):
+        return np.array([self.at[1], 0.0])
+
+    def evaluate(self, x, v, t, history, dt):
+        s = dt / self.tau
+        a, b = np.exp(-s), -np.expm1(-s) / s if s > 0.0 else 1.0
+        F = a * history[1] + self.k * b * (x[0, 1] - history[0])
+        return np.array([[0.0, -1.0]]) * F, np.array([x[0, 1], F])
+
+    def potential(self, x, history):
+        return 0.5 * history[1] ** 2 / self.k
+
+
+class Ground(ForceElement):
+    """A contact law: the end on a floor by penalty, with Coulomb friction from an anchor."""
+
+    symmetric = False
+
+    def __init__(self, floor=-0.01, k=1e5, mu=0.5, at=TIP):
+        self.floor, self.k, self.mu, self.at = floor, k, mu, at
+
+    def bind(self, scene):
+        return [point(scene, None, self.at)]
+
+    def start(self):
+        return np.array([self.at[0], 1.0])  # the anchor, and 1 if it was in contact
+
+    def evaluate(self, x, v, t, history, dt):
+        N = self.k * np.maximum(self.floor - x[0, 1], 0.0)
+        if not N > 0.0:
+            return np.zeros((1, 2)) * x, np.array([self.at[0], 0.0])
+        anchor = history[0] if history[1] > 0.0 else x[0, 0]
+        T = np.clip(self.k * (x[0, 0] - anchor), -self.mu * N, self.mu * N)
+        return np.array([[-T, N]]), np.array([x[0, 0] - T / self.k, 1.0])
+
+
+class Integral(ForceElement):
+    """A controller: proportional and integral; the history is the integral and the last error."""
+
+    symmetric = False
+
+    def __init__(self, target, kp, ki, at=TIP):
+        self.target, self.kp, self.ki, self.at = target, kp, ki, at
+
+    def bind(self, scene):
+        return [point(scene, None, self.at)]
+
+    def start(self):
+        return np.array([0.0, self.target])
+
+    def evaluate(self, x, v, t, history, dt):
+        error = self.target - x[0, 1]
+        total = history[0] + 0.5 * dt * (history[1] + error)
+        return np.array([[0.0, 1.0]]) * (self.kp * error + self.ki * total), np.array(
+            [total, error])
+
+
+class Ratchet(Item):
+    """On all degrees of freedom: it holds the end at its highest place, by an item's energy."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.r = point(layout, 0, TIP)
+        bound.dofs, bound.row = bound.r.dofs, bound.r.row((0.0, 1.0), layout.N)
+        return bound
+
+    def start(self):
+        return np.zeros(1)
+
+    def evaluate(self, u, v, t, history, dt):
+        up = self.row @ u
+        top = np.maximum(history, up)
+        return -self.k * (up - top[0]) * self.row, top
+
+    def stiffness(self, u, v, t, history, dt):
+        return -self.k * (self.row @ u < history[0]) * np.outer(self.row, self.row)
+
+    def energy(self, u, history):
+        return 0.5 * self.k * (self.row @ u - history[0]) ** 2
+
+
+ITEMS = {"law": lambda: Maxwell(50.0, 0.05), "contact": Ground, "controller": lambda: Integral(
+    -0.02, 50.0, 400.0), "item": lambda: Ratchet(200.0)}
+
+
+def bare(n=4):
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, n + 1), height=0.05), ElementBeamANCF(2),
+                MATERIAL, width=0.05)
+    return Scene(beam).clamp("left")
+
+
+def down_and_up(t):
+    return np.interp(t, [0.0, 1.0, 2.0], [0.0, 3.0, 1.0])
+
+
+def loaded(name, n=4):
+    up = 1.0 if name == "item" else -1.0
+    return bare(n).point_force((0.2, up), at=TIP, amplitude=down_and_up).add(ITEMS[name]())
+
+
+@pytest.mark.parametrize("name", ITEMS)
+def test_statics_and_what_is_asked_about_its_states(name):
+    scene = loaded(name)
+    run = scene.run([1.0, 2.0], increments=24)
+    assert np.any(run.state(-1).memory != scene.system.histories.rest)
+    state = run.state(24)
+    for one in (state, copy.copy(state), pickle.loads(pickle.dumps(state))):
+        again = scene.run(2.0, increments=24, start=one)
+        assert_allclose(again.u[-1], run.u[-1], rtol=0, atol=1e-6)
+        assert_allclose(again.state(0).memory, state.memory, rtol=0, atol=1e-9)
+    # a state has its forces: reactions and loads are in balance
+    applied = 3.0 * np.array([0.2, 1.0 if name == "item" else -1.0])
+    own = state.reactions("left").force + applied
+    bound = scene.system.forces.remembering[0]
+    with scene.system.histories.lent(state.memory):
+        x = np.array([link(state.u) for link in bound.links])
+        ours = bound.force(x, 0.0 * x, 1.0).sum(axis=0)
+    assert_allclose(own + ours, 0.0, atol=1e-5)
+    assert np.all(scene.modes(2, state).frequencies > 0.0)
+    at_once = scene.solve_static()
+    assert str(at_once.verdict).startswith("stable")
+    path = scene.continuation(max_load=1.0, ds=1e-3)
+    assert path.load[-1] == 1.0 and path.state(-1).memory is not None
+
+
+def test_increments_that_are_cut_start_from_the_history_before():
+    fine, rough = (loaded("law").run([1.0, 2.0], increments=n, max_iterations=most)
+                   for n, most in ((24, 30), (4, 3)))
+    assert len(rough) > 2 * 9
+    assert_allclose(rough.u[-1], fine.u[-1], rtol=0, atol=2e-4)
+
+
+@pytest.mark.parametrize("name", ITEMS)
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "hht", "newmark", "energy-momentum"])
+def test_motions_go_on_from_states_and_checkpoints(name, scheme, tmp_path):
+    scene, options = loaded(name), {"dt": 2e-3, "scheme": scheme}
+    whole = scene.integrate(0.08, **options)
+    assert len(np.unique(whole.state(-1).memory)) > 0 and np.all(np.isfinite(whole.total_energy))
+    half = scene.integrate(0.04, **options)
+    state = half.state(-1)  # another system starts with other accelerations
+    for one, slack in ((state, 1e-9), (pickle.loads(pickle.dumps(state)), 2e-5)):
+        rest = scene.integrate(0.08, start=one, **options)
+        assert_allclose(rest.u[-1], whole.u[-1], rtol=0, atol=slack)
+    file = tmp_path / "run.npz"
+    scene.integrate(0.08, checkpoint=file, every=10, **options)
+    assert_allclose(scene.resume(file).state(-1).memory, whole.state(-1).memory, atol=1e-10)
+    fine = scene.integrate(0.08, 1e-3, scheme=scheme)
+    assert_allclose(fine.displacement(TIP)[-1], whole.displacement(TIP)[-1], atol=2e-3)
+
+
+@pytest.mark.parametrize("scheme", ["radau", "gauss", "energy-momentum-4"])
+def test_schemes_that_know_no_histories_name_those_that_do(scheme):
+    with pytest.raises(InputError, match="use 'energy-momentum' or 'generalized-alpha'"):
+        loaded("law").integrate(0.01, 1e-3, scheme=scheme)
+
+
+def tip_of(k):
+    return bare().point_force((0.0, -1.0), at=TIP, amplitude=down_and_up).add(Maxwell(k, 0.5)).run(
+        [1.0, 2.0], increments=4)
+
+
+def test_a_sweep_and_other_meshes():
+    found = sweep(tip_of, {"k": [10.0, 20.0]}, lambda run: run.displacement(TIP)[-1, 1])
+    assert not found.failures and found["value"][0] != found["value"][1]
+    scene = loaded("law")
+    finer = scene.replace(beams=[b.replace(mesh=b.mesh.refined()) for b in scene.beams])
+    a, b = (s.run(1.0, increments=4).displacement(TIP)[-1, 1] for s in (scene, finer))
+    assert_allclose(b, a, rtol=3e-2)
+    # another scene of the same items knows the state
+    other = copy.copy(scene).gravity((0.0, 0.0))
+    state = scene.run(1.0, increments=4).state(-1)
+    assert_allclose(other.system.histories.of_state(state), state.memory)
+
+
+# values
+
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum"])
+def test_a_mass_on_a_maxwell_element_moves_as_its_equation_says(scheme):
+    """m x'' = -F, F' = k x' - F / tau; stored, kinetic and dissipated energy are constant."""
+    m, k, tau, v = 2.0, 30.0, 0.7, 1.5
+    body = RigidBody(mass=m, inertia=0.1, position=(1.0, 0.0))
+    scene = Scene(body).initial_velocity((0.0, v)).add(Maxwell(k, tau))
+    history = scene.integrate(4.0, 5e-3, scheme=scheme)
+    exact = solve_ivp(lambda t, y: [y[1], -y[2] / m, k * y[1] - y[2] / tau], (0.0, 4.0),
+                      [0.0, v, 0.0], rtol=1e-10, atol=1e-12, t_eval=history.t).y
+    assert_allclose(history.displacement(TIP)[:, 1], exact[0], atol=2e-4)
+    total = history.total_energy + history.dissipated
+    assert np.ptp(total) < (1e-10 if scheme == "energy-momentum" else 2e-3) * total[0]
+    lost = total[0] - 0.5 * m * exact[1] ** 2 - 0.5 * exact[2] ** 2 / k
+    assert_allclose(history.dissipated, lost, atol=1e-3 * total[0])
+
+
+def test_an_integral_controller_reaches_its_target():
+    """Of an elastic beam: the error decays as e_0 exp(-ki t / (kp + K))."""
+    E, h, kp, ki, target = 2e7, 0.05, 5.0, 40.0, 1e-3
+    beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], height=h), ElementBeamCable(3),
+                StVenantKirchhoff(E, 0.3), width=h)
+    K = 3.0 * E * h**4 / 12.0
+    run = Scene(beam).clamp("left").add(Integral(target, kp, ki)).run(1.0, increments=200)
+    error = target - run.displacement(TIP)[:, 1]
+    assert_allclose(error, error[0] * np.exp(-ki * run.t / (kp + K)), rtol=2e-4)
+    assert_allclose(error[0], target * K / (kp + K), rtol=1e-4)
+
+
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum"])
+def test_a_body_slides_on_friction_of_ones_own_and_stops(scheme):
+    """After v^2 / (2 mu g); its energy is dissipated."""
+    m, g, mu, v, k = 2.0, 10.0, 0.3, 0.5, 1e5
+    body = RigidBody(mass=m, inertia=0.1, position=(1.0, 0.0))
+    scene = Scene(body).gravity((0.0, -g)).initial_velocity((v, 0.0)).add(
+        Ground(m * g / k, k, mu))
+    history = scene.integrate(0.4, 1e-3, scheme=scheme)
+    x = history.displacement(TIP)
+    assert_allclose(x[-1, 0], v**2 / (2.0 * mu * g), rtol=1e-2)
+    assert np.ptp(x[300:, 0]) < 2.0 * mu * m * g / k
+    assert_allclose(history.dissipated[-1], 0.5 * m * v**2, rtol=2e-2)
+
+
+def test_a_ratchet_holds_what_was_reached():
+    scene = bare().add(Ratchet(1e6)).point_force((0.0, 1.0), at=TIP, amplitude=lambda t: np.interp(
+        t, [0.0, 1.0, 2.0], [0.0, 1.0, -1.0]))
+    w = scene.run([1.0, 2.0], increments=5).displacement(TIP)[:, 1]
+    assert_allclose(w[6:], w[5], rtol=1e-3)
+    assert_allclose(w[5], bare().point_force((0.0, 1.0), at=TIP).solve_static().displacement(
+        TIP)[1], rtol=1e-6)
+
+
+# what it refuses
+
+class Odd(Maxwell):
+    def __init__(self, what):
+        super().__init__(50.0, 0.05)
+        self.what = what
+
+    def evaluate(self, x, v, t, history, dt):
+        force, after = super().evaluate(x, v, t, history, dt)
+        if self.what == "changes":
+            history[:] = after
+        return (force[0] if self.what == "force" else force,
+                after[:1] if self.what == "history" else after)
+
+
+@pytest.mark.parametrize("what, words", [
+    ("changes", "read-only"), ("force", "shape"), ("history", "shape of start")])
+def test_what_is_wrong_with_an_item_is_said(what, words):
+    with pytest.raises(InputError, match=words):
+        bare().add(Odd(what))
