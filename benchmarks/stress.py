@@ -25,7 +25,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.core.progress import progress_bar
 from skfem_ancf.core.quadrature import gauss
-from skfem_ancf.equations.momentum import angular_momentum, momentum
+from skfem_ancf.dynamics.history import angular_momentum, momentum
 
 NU, WIDTH, G = 0.3, 0.01, 9.81
 

@@ -10,8 +10,7 @@ from .actions.joints import (Hinge, Joint, Motor, OnCircle, OnLine, PlaneSection
                              PrescribedPosition, PrescribedTurn, Sleeve, Slot, Weld)
 from .actions.form_load import FormLoad
 from .actions.loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
-from .actions.moving import MovingForce, Train
-from .actions.point_force import PointForce
+from .actions.point_force import MovingForce, PointForce, Train
 from .actions.obstacles import Circle, Contact, Line, Obstacle, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support
 from .beam.beam import Beam, reference_coordinates
@@ -20,13 +19,12 @@ from .beam.rigid import RigidBody
 from .core.errors import (AncfError, CallError, CallbackError, CheckpointError, ConvergenceError,
                           FileError, InputError, Interrupted, MeshError, MissingExtra, ModelWarning,
                           NameUnknown, StabilityWarning, SupportError)
-from .core.steps import Ramp, Steps
 from .dynamics import EnergyMomentum, Gauss, GeneralizedAlpha, HHT, Newmark, Radau, Scheme
 from .dynamics.history import History
 from .dynamics.sensors import Readings
 from .equations.matrices import SceneMatrices
 from .equations.stability import Verdict
-from .scene.quasistatic import StepHistory
+from .scene.quasistatic import Ramp, StepHistory, Steps
 from .elements import (ElementBeam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                        ElementBeamCable, ElementBeamPatelShabana)
 from . import forms

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         KelvinVoigt, MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES
-from skfem_ancf.equations.momentum import momentum
+from skfem_ancf.dynamics.history import momentum
 from skfem_ancf.materials import Material
 
 

@@ -8,7 +8,7 @@ from scipy.optimize import fsolve
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.equations.momentum import angular_momentum, momentum
+from skfem_ancf.dynamics.history import angular_momentum, momentum
 
 G = 9.81
 E, H = 1e9, 0.01

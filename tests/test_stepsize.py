@@ -11,7 +11,7 @@ from skfem_ancf import Scene
 from skfem_ancf.core.errors import InputError
 from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha
 from skfem_ancf.dynamics.base import in_steps
-from skfem_ancf.equations.momentum import momentum
+from skfem_ancf.dynamics.history import momentum
 
 
 def positions(scene):

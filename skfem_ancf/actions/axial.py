@@ -25,8 +25,7 @@ from ..sections.jumps import Pieces, pieces
 from ..mesh.places import as_point
 from .item import Item
 from .loads import DeadLoad, Load, number_at
-from .moving import TimedLoad
-from .off_axis import is_off_axis
+from .point_force import TimedLoad, is_off_axis
 
 
 class FollowerForce(Load):

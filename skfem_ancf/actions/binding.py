@@ -11,8 +11,7 @@ from scipy import sparse
 from ..beam.layout import Layout
 from ..core.errors import InputError, explained, require_finite, shown
 from ..core.types import Array
-from .forces.base import ForceElement, Part, bind_force, derivative, try_force
-from .forces.unscaled import Unscaled
+from .forces.base import ForceElement, Part, Unscaled, bind_force, derivative, try_force
 from .item import Item, beside, require_entries
 from .joints.base import Joint, bind_joint, require_derivatives
 from .loads import Load, bind_load

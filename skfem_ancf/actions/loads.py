@@ -21,8 +21,7 @@ from ..beam.surfaces import add_nodal, divided, surfaces_of
 from ..core.errors import (AncfError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_finite_scalar, require_function,
                            require_slope, shown, warn)
-from ..core.immutable import read_only
-from ..core.origin import ours
+from ..core.immutable import ours, read_only
 from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
 from .item import Item, beside, require_entries

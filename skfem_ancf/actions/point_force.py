@@ -2,23 +2,99 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import on_points
-from ..beam.kinematics import locate
-from ..beam.layout import Layout, WhichMember
+from ..beam.distribution import Distribution, on_points
+from ..beam.kernels.section import beam_gradients
+from ..beam.kinematics import locate, probe_reference
+from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
-from ..core.errors import require_finite
-from ..core.types import TimeFunction
+from ..core.errors import (InputError, ask, require_direction, require_finite,
+                           require_finite_scalar, require_positive)
+from ..core.types import Array, TimeFunction
 from .item import Item
 from .loads import DeadLoad, Load, number_at
-from .moving import MovingForce
-from .off_axis import OffAxisForce, is_off_axis
+
+# a dead force on a point of a cable beside its axis: a force on the axis and a couple
+
+def is_off_axis(beam: Beam, X: Array) -> bool:
+    """True for a point X (2,) of the reference cell of a cable that is not on its axis."""
+    return not beam.has_sections and bool(abs(X[1] - 0.5) > beam.finder.allowed)
+
+
+class OffAxisForce(Load):
+    """A dead force F at ``r + Y n``, n the unit normal of the axis, with its potential.
+
+    Parameters
+    ----------
+    force
+        The force, shape (2,).
+    e, X
+        Element of the cable, and reference point (2,).
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`; the beam is a Beam.
+    """
+
+    constant = False
+
+    def __init__(self, force: Array, e: int, X: Array, beam: Any, amplitude: Any = None) -> None:
+        super().__init__(beam, amplitude)
+        self.total, self._place, here = force, (e, float(X[0])), np.array([e])
+        self._dofs, self._weights = probe_reference(beam, e, np.array([X[0], 0.5]))
+        slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]), here)
+        self._slopes, self._start = slopes[0, 0, 0], frame[0, 0, 0]
+        Y = float(beam.mesh.mapping().offset(X.reshape(2, 1, 1), here)[0, 0])
+        #: minus the potential of the couple is this vector times the unit tangent
+        self._arm = Y * np.array([force[1], -force[0]])
+
+    def _tangent(self, u: Array) -> tuple[Array, Any]:
+        d = self._start + u[self._dofs] @ self._slopes
+        return d, np.sqrt(d @ d)
+
+    def _nodal(self, couple: Array) -> Array:
+        return self.total[:, None] * self._weights + couple[:, None] * self._slopes
+
+    def _at(self, u: Array) -> Array:
+        d, size = self._tangent(u)
+        return self._nodal((self._arm - d * (self._arm @ d) / size**2) / size)
+
+    def _spread(self, nodal: Array) -> Array:
+        out = np.zeros(self.beam.N, nodal.dtype)
+        out[self._dofs] = nodal
+        return out
+
+    def force(self, u: Array) -> Array:
+        return self._spread(self._at(u))
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        (a, p), (b, q) = self._tangent(u0), self._tangent(u1)
+        couple = 0.5 * (1.0 / p + 1.0 / q) * self._arm - 0.5 * (self._arm @ (a + b)) * (a + b) / (
+            (p + q) * p * q)
+        return self._spread(self._nodal(couple))
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        (d, size), a = self._tangent(u), self._arm
+        along = a @ d
+        D = (3.0 * along / size**2 * np.outer(d, d) - np.outer(a, d) - np.outer(d, a)
+             - along * np.eye(2)) / size**3
+        values = np.einsum("ij,k,l->ikjl", D, self._slopes, self._slopes)
+        rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
+        columns = np.broadcast_to(self._dofs[None, None], values.shape)
+        return rows.ravel(), columns.ravel(), values.ravel()
+
+    def potential(self, u: Array) -> float:
+        (d, size), (start, before) = self._tangent(u), self._tangent(0.0 * u)
+        return -float(np.sum(self.total[:, None] * self._weights * u[self._dofs])
+                      + self._arm @ (d / size - start / before))
+
+    def distribution(self, u: Array) -> Distribution:
+        e, xi = self._place
+        return Distribution(stations=(e + xi,), points=((e, xi, self._at(u).T),))
 
 
 class PointForce(Load):
@@ -32,7 +108,7 @@ class PointForce(Load):
         The point (x, y) in the reference configuration, shape (2,), or "right" for the axis at that
         end; None for the centre of mass of a rigid body. At a point of a cable beside its axis the
         force has a couple. For a function of time see
-        :class:`~skfem_ancf.actions.moving.MovingForce`.
+        :class:`~skfem_ancf.actions.point_force.MovingForce`.
     beam, amplitude
         As for :class:`~skfem_ancf.actions.loads.Load`; the beam may be a RigidBody.
     """
@@ -61,3 +137,172 @@ class PointForce(Load):
             return OffAxisForce(self.total, e, X, beam, self.amplitude)
         vector, distribution = on_points(beam, [(self.total, e, X)])
         return DeadLoad(beam, vector, self.amplitude, distribution)
+
+
+# moving loads: a force that moves along a beam, and a train of forces
+
+_NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
+
+
+class TimedLoad(Load):
+    """A force that depends on time and not on the displacement.
+
+    A subclass defines :meth:`places` or :meth:`at`. Single static solutions take the load at time
+    1; :meth:`skfem_ancf.Scene.run` and motions take the current time.
+    """
+
+    constant = False
+    # of the load at a time
+    _time: float | None = None
+    _vector: Any = None
+    _distribution: Any = None
+    _last: Any = None
+
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
+        """Forces (2,) at time t, each with its element and reference point (2,)."""
+        raise NotImplementedError
+
+    def at(self, t: float) -> tuple[Array, Distribution]:
+        """Force (N,) at time t and its distribution; by default from :meth:`places`."""
+        return on_points(self.beam, self.places(t))
+
+    @property
+    def first_order(self) -> bool:
+        return False
+
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        last, time = self._last, 1.0 if t is None else float(t)
+        if last is None or last._time != time:
+            last = self._last = self._now(time)._with(_time=time)
+        return self.factor(t), last
+
+    def _now(self, time: float) -> Load:
+        vector, distribution = self.at(time)
+        return self._with(_vector=vector, _last=None, _distribution=distribution)
+
+    def force(self, u: Array) -> Array:
+        return self.acting(None)[1].force(u) if self._vector is None else self._vector
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        return self.force(u1)
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        return _NONE
+
+    def potential(self, u: Array) -> float:
+        return -float(self.force(u) @ u)
+
+    def distribution(self, u: Array) -> Distribution | None:
+        if self._distribution is None:
+            return self.acting(None)[1].distribution(u)
+        return self._distribution
+
+
+class MovingForce(TimedLoad):
+    """A dead force whose point moves over the body; ``scene.point_force(F, at=function)``.
+
+    Parameters
+    ----------
+    force
+        The force, shape (2,).
+    at
+        A function of time that returns the point (x, y) in the reference configuration, shape (2,);
+        None while the force is not on the beam.
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamCable(),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(beam).pin("left").fix("right", "r^2")
+    >>> scene = scene.point_force((0, -0.1), at=lambda t: (t, 0.0))
+    >>> history = scene.run(1.0, increments=4)
+    >>> history.reactions("left").force[:4, 1].round(3).tolist()
+    [0.1, 0.075, 0.05, 0.025]
+    """
+
+    def __init__(self, force: ArrayLike, at: Callable[[float], ArrayLike], beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.total, self.where = require_finite("force", force, (2,)), at
+
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
+        place = ask("at(t={:g})", self.where, t)
+        if place is None:
+            return []
+        place = require_finite(f"what at(t={t:g}) returns", place, (2,))
+        return [(self.total, *locate(self.beam, place))]
+
+    def _now(self, time: float) -> Load:
+        places = self.places(time)
+        if places and is_off_axis(self.beam, places[0][2]):
+            return OffAxisForce(*places[0], self.beam)
+        return super()._now(time)
+
+
+class Train(TimedLoad):
+    """Forces at fixed distances that move along the axis of a beam, from its left end.
+
+    Parameters
+    ----------
+    forces
+        The force of each axle, shape (n,), along ``direction``.
+    distances
+        Distance of each from the first along the axis, shape (n,).
+    speed
+        Length per time, positive.
+    beam
+        The beam, its name or number.
+    start
+        Position of the first axle along the axis at time 0.
+    direction
+        Direction of the forces, of any length, shape (2,).
+    amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+
+    Examples
+    --------
+    Two axles of a lorry, 4 m apart, on a girder of 20 m:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, Train
+    >>> girder = Beam(MeshBeam.init_line(np.linspace(0, 20, 9), height=0.6), ElementBeamCable(),
+    ...               StVenantKirchhoff(3e10, 0.2, 2500), width=0.4)
+    >>> scene = Scene(girder).pin("left").fix("right", "r^2")
+    >>> history = scene.add(Train([5e4, 8e4], [0.0, 4.0], speed=10.0)).run(2.4, increments=6)
+    >>> history.reactions("left").force[2:4, 1].round(-2).tolist()
+    [94000.0, 68000.0]
+    """
+
+    # of a bound one
+    _ends: Array
+
+    def __init__(self, forces: ArrayLike, distances: ArrayLike, speed: float,
+                 beam: WhichBeam = None, start: float = 0.0, direction: ArrayLike = (0.0, -1.0),
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.forces = require_finite("forces", np.atleast_1d(forces), (None,))
+        self.distances = require_finite("distances", np.atleast_1d(distances), (None,))
+        if len(self.forces) != len(self.distances):
+            raise InputError(f"each of the {len(self.forces)} forces has a distance from the "
+                             f"first, got {len(self.distances)} distances")
+        self.speed = require_positive("speed", speed)
+        self.start = require_finite_scalar("start", start)
+        self.direction = require_direction("direction", direction)
+
+    def bind(self, beam: Beam) -> Load:
+        return self._with(beam=beam, _ends=np.cumsum(np.append(0.0, beam.mesh.lengths)))
+
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
+        s, ends, places = self.start + self.speed * t - self.distances, self._ends, []
+        slack, along = 1e-12 * ends[-1], self.direction / np.hypot(*self.direction)
+        for force, x in zip(self.forces, s):
+            if -slack <= x <= ends[-1] + slack:
+                x = min(max(x, 0.0), ends[-1])
+                e = min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
+                xi = (x - ends[e]) / (ends[e + 1] - ends[e])
+                places.append((force * along, e, np.array([xi, 0.5])))
+        return places

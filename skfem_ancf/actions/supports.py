@@ -16,7 +16,7 @@ from ..core.types import Place
 from ..mesh.places import is_point, node_of
 from .item import Item
 from .joints.hinge import Hinge
-from .joints.plane_section import PlaneSection
+from .joints.guides import PlaneSection
 from .joints.prescribed import PrescribedDisplacement
 
 

@@ -22,16 +22,13 @@ from .forces import Control, Drag, Foundation, PointMass, Spring, TorsionalSprin
 from .forces.springs import end_of
 from .joints import Hinge, Weld
 from .joints.glue import Glue
-from .joints.guides import OnCircle, OnLine
-from .joints.nodes import Nodes
-from .joints.plane_section import PlaneSection
+from .joints.guides import OnCircle, OnLine, PlaneSection
+from .joints.nodes import COMPONENTS, Nodes
 from .joints.prescribed import (PrescribedAngle, PrescribedDisplacement, PrescribedPosition,
                                 PrescribedTurn)
-from .joints.settlements import COMPONENTS
 from .joints.sliders import Sleeve, Slot
 from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
-from .moving import TimedLoad
-from .point_force import PointForce
+from .point_force import PointForce, TimedLoad
 from .places import Vector, is_ground, named_place, point, section
 from .supports import Support
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.linalg import BandMatrix
 from ..core.quadrature import gauss, product_rule, tensor
 from ..core.types import Array, Rule
-from ..formulations.ecm import AXIS
+from ..formulations.continuum import AXIS
 
 #: Additional points along an element of variable section.
 MORE = 4

@@ -14,6 +14,7 @@ from ..core.errors import CheckpointError, CheckpointWarning, require_integer, r
 from ..core.types import Array, StrPath
 from ..equations.system import System
 from .base import Motion, Scheme
+from .choice import SCHEMES, get_scheme
 from .run import Run, task_of
 from .sensors import Sensor
 
@@ -102,8 +103,6 @@ class Checkpoint:
 def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
            sensors: Sequence[tuple[str, Sensor]] = ()) -> tuple[Run, Checkpoint]:
     """The Run of a checkpoint file, and the Checkpoint that continues to write it."""
-    from . import SCHEMES, get_scheme
-
     found = _read(path)
     try:
         if not np.array_equal(found["q0"], _start(system)):

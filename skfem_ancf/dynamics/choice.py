@@ -1,4 +1,4 @@
-"""The choice of a scheme by ``scheme="auto"``."""
+"""Schemes by name, and the choice of one by ``scheme="auto"``."""
 
 from __future__ import annotations
 
@@ -6,13 +6,31 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.errors import require_option
 from ..equations.system import System
 from .base import Scheme
-from .energy_momentum import EnergyMomentum
-from .gauss import Gauss
-from .generalized_alpha import GeneralizedAlpha
-from .radau import Radau
+from .collocation import Gauss, Radau
+from .energy_momentum import EnergyMomentum, EnergyMomentum4
+from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
 
+#: The schemes by name.
+SCHEMES = {cls.name: cls for cls in (EnergyMomentum, EnergyMomentum4, GeneralizedAlpha, HHT,
+                                    Newmark, Gauss, Radau)}
+
+
+def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
+    """A :class:`Scheme` from its name, its class or itself.
+
+    Raises
+    ------
+    NameUnknown
+        If the name is not known; the message lists the known ones.
+    """
+    if isinstance(scheme, Scheme):
+        return scheme
+    if isinstance(scheme, type) and issubclass(scheme, Scheme):
+        return scheme()
+    return SCHEMES[require_option("scheme", scheme, SCHEMES)]()
 #: Tolerance below which schemes of high order are cheaper.
 FINE = 1e-4
 #: Ratio of axial to bending frequencies above which a beam is stiff.

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import factorial
 from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError
+from ..core.errors import InputError, require_integer
+from ..core.immutable import read_only
+from ..core.quadrature import gauss
 from ..core.types import Array
 from ..equations.system import System
-from .base import Motion, Scheme
-from .differences import derivative, difference_row, grown
-from .stage_records import Method
+from .base import Motion, Scheme, derivative, difference_row, grown
+from .stage_tangent import Method
 
 #: Fraction of a step below which accelerations are interpolated, with prescribed motions.
 NEAR = 3e-3
@@ -129,3 +131,84 @@ class Collocation(Scheme):
 
     def lasting(self, integrator: Any, du: Array, time: float) -> Array:
         return integrator.damped(du, time) if integrator.system.damped else du
+
+
+# gauss methods
+
+#: Calibrated factors of the estimated error by number of points. The more points, the larger the
+#: phase of a vibration in a step, and the more the estimate falls short.
+SAFETY = {1: 1.0, 2: 0.9, 3: 1.4, 4: 3.0}
+
+
+class Gauss(Collocation):
+    """Collocation at the n Gauss points: order 2 n, symmetric and symplectic.
+
+    Quadratic invariants such as momentum and angular momentum are conserved to the tolerance of the
+    iteration; the energy stays close to its initial value for very long times. n = 1 is the
+    implicit midpoint rule. Nothing is damped: accelerations of a stiff beam at the end of a step
+    are dominated by vibrations that the steps do not resolve; use :class:`Radau` for those.
+
+    Joints that are linear in the degrees of freedom and do not move (rigid connections, hinges of
+    beams) keep the order; other joints and rigid bodies raise an InputError.
+
+    Parameters
+    ----------
+    points
+        1 to 4.
+
+    Examples
+    --------
+    >>> from skfem_ancf.dynamics import Gauss
+    >>> Gauss(3), Gauss(3).order
+    (<Gauss, 3 points>, 6)
+
+    References
+    ----------
+    Hairer, Lubich, Wanner: "Geometric Numerical Integration", II.1.3 and VI.4.
+    """
+
+    name = "gauss"
+    joined = False
+    filtered = 2
+
+    def __init__(self, points: int = 3) -> None:
+        self.number = require_integer("points", points, 1, 4)
+        n = self.number
+        self.safety = SAFETY[n]
+        self.order = 2 * n
+        self.error_constant = factorial(n)**2 / (factorial(2 * n) * factorial(2 * n + 1))
+
+    @property
+    def points(self) -> Array:
+        return gauss(self.number)[0]
+
+
+# the Radau IIA method
+
+POINTS = read_only(np.array([0.4 - 0.1 * np.sqrt(6.0), 0.4 + 0.1 * np.sqrt(6.0), 1.0]))
+
+
+class Radau(Collocation):
+    """Radau IIA with three points: order 5, L-stable.
+
+    Vibrations that a step does not resolve are damped at once: for stiff beams and large steps.
+
+    Examples
+    --------
+    >>> from skfem_ancf.dynamics import Radau
+    >>> Radau().points.round(4).tolist()
+    [0.1551, 0.6449, 1.0]
+
+    References
+    ----------
+    Hairer, Wanner: "Solving Ordinary Differential Equations II", IV.5, table 5.6.
+    """
+
+    name = "radau"
+    order = 5
+    error_constant = 1.0 / 7200.0
+    safety = 0.8
+
+    @property
+    def points(self) -> Array:
+        return POINTS

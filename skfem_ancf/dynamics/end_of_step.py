@@ -8,7 +8,7 @@ from ..core.source import indices, source
 from ..actions.tables import add_constraint_rate
 from .convergence import DEPENDENT, EXACTLY, FAILED, GO_ON
 from .dampers import damping_force
-from .rates import acceleration_of_joints, drive_rate
+from .records import acceleration_of_joints, drive_rate
 from .residual import free_velocity, kinetic_energy
 
 

@@ -7,8 +7,7 @@ from typing import Any
 from ..core.errors import InputError
 from ..core.types import Array
 from ..equations.system import System
-from .base import Motion, Scheme
-from .differences import derivative, grown
+from .base import Motion, Scheme, derivative, grown
 
 #: Fractions of a step of fourth order; all intermediate times lie within the step.
 LONG = 1.0 / (4.0 - 4.0**(1.0 / 3.0))

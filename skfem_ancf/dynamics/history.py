@@ -10,23 +10,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.forces.turns import Turns
+from ..actions.forces.springs import Turns
 from ..actions.joints.base import Joint
+from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember
 from ..beam.points import require_body
 from ..core.errors import InputError, require_finite, require_index, shown
 from ..core.types import Array, Place, StrPath
-from ..equations.momentum import angular_momentum, momentum
 from ..equations.system import System
 from ..io.tables import to_xarray
 from ..recovery.resultants import Resultants, over_time
 from ..results.points import MaterialPoints
-from ..results.springs import SpringForces
+from ..results.acting import SpringForces
 from ..results.state import Reaction, State
 from ..visuals.animation import animate
 from ..visuals.pyvista import Series
 from .base import Motion, Scheme
 from .sensors import Readings
+
+
+# linear and angular momentum of a scene
+
+def momentum(system: System, v: Array) -> Array:
+    """Linear momentum of a velocity (N,), shape (2,)."""
+    p, total = system.mass.multiply(v), np.zeros(2)
+    for member, s in zip(system.members, system.slices):  # a unit translation moves r alone
+        total += (member.rigid_motions()[:, :2].T @ p[s] if isinstance(member, Domain) else
+                  p[s].reshape(-1, member.nd)[:, :2].sum(axis=0))
+    return total
+
+
+def angular_momentum(system: System, u: Array, v: Array) -> float:
+    """Angular momentum about the origin, for displacement and velocity (N,)."""
+    p, total = system.mass.multiply(v), 0.0
+    for member, s in zip(system.members, system.slices):
+        q, pb = (member.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)
+        total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
+    return float(total)
+
 
 #: Attributes of a Motion that are stored.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
@@ -439,7 +460,7 @@ class History(MaterialPoints, SpringForces):
         subdivide, lagrange, undeformed, recover, fields, precision, encoding
             As for :func:`skfem_ancf.io.save_vtu`.
         """
-        from ..io.pvd import PvdWriter
+        from ..io.vtu import PvdWriter
         from ..core.progress import progress_bar
 
         writer = PvdWriter(filename, subdivide, lagrange, undeformed, recover, fields, precision,

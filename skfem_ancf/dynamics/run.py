@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ..actions.forces.turns import Turns
+from ..actions.forces.springs import Turns
 from ..core.errors import (AncfError, CheckpointError, InputError, ModelWarning, ask_number,
                            require_finite, require_finite_scalar, require_increasing,
                            require_positive, shown, warn)

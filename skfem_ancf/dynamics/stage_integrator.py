@@ -15,9 +15,8 @@ from .base import Motion
 from .collocation import Collocation
 from .course import Course
 from .integrator import Integrator
-from .rates import JointMotions
-from .stage_records import Interval, new_points
-from .stage_tangent import solve_for
+from .records import JointMotions
+from .stage_tangent import Interval, new_points, solve_for
 from .stages import collocate
 
 #: Samples of functions of time in a step: Chebyshev points.

@@ -1,12 +1,10 @@
 """Beam elements. A new element is one file and one line here."""
 
-from .ancf import ElementBeamANCF
+from .ancf import ElementBeamANCF, ElementBeamPatelShabana
 from .base import ElementBeam
 from .cable import ElementBeamCable
 from .choose import ORDER_OF_FIELD, choose_element
-from .cubic import ElementBeamANCFCubic
-from .hermite import ElementBeamANCFHermite
-from .patel_shabana import ElementBeamPatelShabana
+from .hermite import ElementBeamANCFCubic, ElementBeamANCFHermite
 
 #: Elements by name.
 ELEMENTS = {

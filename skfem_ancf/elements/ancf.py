@@ -6,8 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ..core.errors import require_integer, require_option
-from ..core.immutable import read_only
-from ..core.origin import ours
+from ..core.immutable import ours, read_only
 from ..core.quadrature import gauss_lobatto
 from ..core.types import Array
 from .base import ElementBeam, SectionFunctions
@@ -84,3 +83,31 @@ class ElementBeamANCF(ElementBeam):
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         return ([f"r_Y{k}" for k in range(len(self.section_points))],
                 [(float(y), 0, 1) for y in self.section_points])
+
+
+# the element of Patel and Shabana
+
+class ElementBeamPatelShabana(ElementBeam):
+    """Beam element with ``r``, ``r_X``, ``r_Y`` and ``r_YY`` on the axis.
+
+    Its space is that of :class:`ElementBeamANCF` of order 2, with other degrees of freedom.
+
+    References
+    ----------
+    Patel, Shabana: "Locking alleviation in the large displacement analysis of beam elements:
+    the strain split method", Acta Mechanica 229 (2018).
+
+    Examples
+    --------
+    >>> from skfem_ancf import ElementBeamPatelShabana
+    >>> ElementBeamPatelShabana().dofnames
+    ['r', 'r_X', 'r_Y', 'r_YY']
+    """
+
+    def __init__(self) -> None:
+        # P' = 1 for r_Y, and P' = eta for h r_YY: legendre coefficients in 2 eta
+        super().__init__(SectionFunctions(np.array([[1.0, 0.0], [0.0, 0.5]])),
+                         ["r_Y", "r_YY"], [(0.0, 0, 1), (0.0, 0, 2)], ["r_Y", "r_YY"])
+
+    def plane(self) -> ElementBeam | None:
+        return ElementBeamANCF(1) if ours(self) else None

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..core.types import Array
 from ..mesh.reference_cell import SECTIONS, hermite_basis
-from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
-from .sampling import Sampling, StabilisedMode
+from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, StabilisedMode, require_degree
 
 
 class ElementBeamCable(ElementBeam):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..core.origin import ours
+from ..core.immutable import ours
 from .ancf import ElementBeamANCF
 from .base import DEGREES, ElementBeam, require_degree
 
@@ -60,3 +60,24 @@ class ElementBeamANCFHermite(ElementBeamANCF):
                 + [name.replace("r_", "r_" + "X" * k) for k in each for name in names],
                 [(0.0, k, 0) for k in more]
                 + [(eta, k, m) for k in each for eta, _, m in functionals])
+
+
+# ANCF beam elements whose sections vary cubically along the axis: fourth order
+
+class ElementBeamANCFCubic(ElementBeamANCFHermite):
+    """:class:`ElementBeamANCF` with section slopes that are cubic (Hermite) along X.
+
+    The degrees of freedom of a node are ``r``, ``r_X``, the section slopes ``r_Y0`` ... and their
+    derivatives along the axis ``r_XY0`` ...: the space is the product of cubic polynomials in X and
+    polynomials of degree N in Y. With the formulation "assumed" the deflection converges at fourth
+    order, at any slenderness. Parameters and errors are those of :class:`ElementBeamANCF`.
+
+    Examples
+    --------
+    >>> from skfem_ancf import ElementBeamANCFCubic
+    >>> ElementBeamANCFCubic(2).dofnames
+    ['r', 'r_X', 'r_Y0', 'r_Y1', 'r_XY0', 'r_XY1']
+    """
+
+    def __init__(self, order: int, points: str = "chebyshev") -> None:
+        super().__init__(order, 3, points)

@@ -10,16 +10,13 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..actions.joints.base import Joint
-from ..actions.joints.director import UnitDirector
-from ..actions.joints.nodes import Nodes
-from ..actions.joints.part import Part
-from ..actions.joints.settlements import COMPONENTS
+from ..actions.joints.base import Joint, Part, UnitDirector
+from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam.beam import Beam
 from ..beam.rigid import RigidBody
 from ..core.caching import cached_property
 from ..core.errors import InputError, ModelWarning, SupportError, shown
-from ..core.origin import ours
+from ..core.immutable import ours
 from ..core.types import Array
 from .mobility import advice, first_of, free_rigid_motions, who
 from .redundancy import repeated, shared

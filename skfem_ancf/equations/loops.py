@@ -16,7 +16,7 @@ from ..core.band import ADDRESSES
 from ..core.code_cache import NotCompiled
 from ..core.jit import MADE, address, caller, compiled, reader
 from ..core.loops import BANDS
-from ..core.origin import ours
+from ..core.immutable import ours
 from ..core.source import F1, F2, F3
 from ..core.words import Words
 from .tables import Equations

@@ -5,9 +5,7 @@ from __future__ import annotations
 from ..core.errors import require_option
 from .assumed import Assumed
 from .base import COMPONENTS, Formulation, Term
-from .continuum import Continuum
-from .ecm import EnhancedContinuum
-from .strain_split import StrainSplit
+from .continuum import Continuum, EnhancedContinuum, StrainSplit
 
 #: The formulations by name.
 FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSplit, Assumed)}

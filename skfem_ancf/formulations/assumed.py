@@ -15,7 +15,7 @@ from ..materials.base import Material
 from ..materials.history import AtRest
 from ..mesh.mesh_beam import MeshBeam
 from .base import Formulation, Term, refuse_rigid_sections
-from .ecm import AXIS, split_moduli
+from .continuum import AXIS, split_moduli
 
 
 #: Poisson ratio in plane strain to which linear sections take laws that are not split.

@@ -1,6 +1,5 @@
 """Files for ParaView: one state as .vtu, a series of them as .pvd."""
 
-from .pvd import PvdWriter
-from .vtu import body_fields, save_vtu
+from .vtu import PvdWriter, body_fields, save_vtu
 
 __all__ = ["PvdWriter", "body_fields", "save_vtu"]

@@ -14,9 +14,8 @@ from ..beam.layout import select_member
 from ..core.archive import output_file
 from ..core.errors import InputError, MissingExtra, require_path, shown
 from ..core.types import Array, StrPath
-from ..recovery.arrays import body_of
 from ..recovery.fields import find_fields, unit_of, units_of
-from ..recovery.grids import grids
+from ..recovery.grids import body_of, grids
 
 #: The dimension and the labels of the components of vectors and tensors, and their columns in
 #: arrays of VTK.

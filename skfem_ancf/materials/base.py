@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
                            require_positive, require_slope, shown)
-from ..core.immutable import Immutable, rebuilt
-from ..core.origin import ours
+from ..core.immutable import Immutable, ours, rebuilt
 from ..core.quadrature import gauss
 from ..core.types import Array, HasShear, Law
 
@@ -51,7 +50,7 @@ class Material(Immutable):
     shear_correction
         "auto": ``10 (1 + nu) / (12 + 11 nu)`` where the section cannot represent the shear parabola
         (order 1, 2 and Patel-Shabana), else 1; for profiles and layers
-        :func:`skfem_ancf.sections.shear.shear_factor`. "paper": that number at every order. Or a
+        :func:`skfem_ancf.sections.across.shear_factor`. "paper": that number at every order. Or a
         positive number.
     thermal_expansion
         Strain per degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.

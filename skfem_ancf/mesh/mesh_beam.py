@@ -19,18 +19,16 @@ from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_finite_scalar, require_function, require_integer,
                            require_moderate, require_option, require_options, require_path,
                            require_positive, require_unmasked, shown)
-from ..core.origin import ours
-from ..core.packing import packed
+from ..core.immutable import ours, packed
 from ..core.types import Array, StrPath
 from . import files
-from .curve import Curve, check_curvature, derivative_of
+from .curve import Curve, axis_of, check_curvature, derivative_of
 from .location import Finder
 from .mapping import MappingBeam
 from .numbering import NumberedMesh, default_tags
 from .places import as_point, is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
-from .spline import axis_of
 from .taper import heights_of, scaled
 
 EPS = float(np.finfo(float).eps)

@@ -38,7 +38,7 @@ from ..core.caching import cached_property
 from ..core.linear import largest
 from ..core.quadrature import gauss
 from ..core.types import Array, Law
-from ..formulations.ecm import EnhancedContinuum
+from ..formulations.continuum import EnhancedContinuum
 from ..materials import LinearLaw
 from ..mesh.refinement import by_element
 from ..sections import Layer

@@ -30,9 +30,8 @@ from ..recovery.fields import Values, find_field
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import Resultants, resultants
 from ..recovery.section_forces import NotFound, NotRecovered
-from ..visuals import diagrams, html, matplotlib, pyvista
-from .acting import recover, stations
-from .springs import SpringForces
+from ..visuals import html, matplotlib, pyvista
+from .acting import SpringForces, recover, stations
 from .checks import Checks, check
 from .points import MaterialPoints
 
@@ -555,4 +554,4 @@ class State(Immutable, MaterialPoints, SpringForces):
     to_pyvista = pyvista.to_pyvista
     view = pyvista.view
     plot = matplotlib.plot_state
-    plot_resultants = diagrams.plot_resultants
+    plot_resultants = matplotlib.plot_resultants

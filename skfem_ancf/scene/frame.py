@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..actions.axial import LineLoad
 from ..actions.joints.base import bind_joint
-from ..actions.joints.nodes import Nodes, chain_ends
-from ..actions.joints.settlements import COMPONENTS
+from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
 from ..actions.loads import DeadLoad, EndMoment, Load, number_at
 from ..actions.places import members_at
 from ..actions.symbols import Symbol, at_node, force_symbol, symbols

@@ -19,7 +19,6 @@ from ..beam.layout import WhichBeam, WhichMember, select_beam
 from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, ask,
                            require_finite, require_finite_scalar, require_function, require_label,
                            require_positive, shown)
-from ..core.steps import Steps
 from ..core.types import Array, StrPath
 from ..dynamics import choose_scheme, get_scheme
 from ..dynamics.base import Scheme
@@ -43,7 +42,7 @@ from ..visuals.matplotlib import plot_scene
 from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
 from .model import Model
 from .plan import Plan, make_plan
-from .quasistatic import StepHistory, run
+from .quasistatic import StepHistory, Steps, run
 from .solve import critical_of, solve_linear, solve_static, system_of, velocity_of, warn_about
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..actions.forces.turns import Turns
+from ..actions.forces.springs import Turns
 from ..core.band import fix
 from ..core.linalg import NO_FACTORS
 from ..core.types import Array

@@ -13,9 +13,8 @@ from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
                            require_path, require_text, shown)
 from ..core.types import StrPath
-from ..recovery.arrays import COMPONENTS, body_of, facts_of
 from ..recovery.fields import FIELDS, find_fields
-from ..recovery.grids import CELL_TYPES, grids, in_space
+from ..recovery.grids import CELL_TYPES, COMPONENTS, body_of, facts_of, grids, in_space
 from .animation import pixels
 from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery

@@ -7,11 +7,9 @@ from typing import Any
 from ...core.errors import require_option
 from .base import Joint, bind_joint
 from .glue import Glue
-from .guides import OnCircle, OnLine
+from .guides import OnCircle, OnLine, PlaneSection
 from .hinge import Hinge
-from .motor import Motor
-from .plane_section import PlaneSection
-from .prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
+from .prescribed import Motor, PrescribedAngle, PrescribedPosition, PrescribedTurn
 from .sliders import Sleeve, Slot
 from .weld import Weld
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout
+from ...beam.rigid import RigidBody
 from ...core.errors import InputError, explained, require_finite, require_slope, shown
-from ...core.origin import ours
+from ...core.immutable import ours
 from ...core.types import Array
 from ...mesh.places import is_point
 from ..item import Item, beside, require_entries
@@ -294,3 +295,93 @@ class Aligned:
         columns = np.broadcast_to(self.e.dofs[None, None], values.shape).ravel()
         values = -factor * values.ravel()
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
+
+
+# unit length of the director of a rigid body
+
+class UnitDirector(Joint):
+    """(d . d - 1) / 2 = 0 for the director d of a rigid body, whose first DOF is ``first``."""
+
+    equations = ("length of the director",)
+    constant = False
+
+    def __init__(self, body: RigidBody, first: int) -> None:
+        self.name = body.name
+        self.dofs, self.start = first + 2 + np.arange(2), body.q0[2:]
+
+    def value(self, u: Array, t: float) -> Array:
+        du = u[self.dofs]  # d . d = 1 in the reference configuration
+        return np.array([self.start @ du + 0.5 * (du @ du)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return np.zeros(2, dtype=int), self.dofs, self.start + u[self.dofs]
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        return self.dofs, self.dofs, np.full(2, multipliers[0])
+
+
+# independent equations of a joint
+
+class Part(Joint):
+    """The independent equations of a bound joint, by increasing numbers."""
+
+    def __init__(self, joint: Joint, kept: Array) -> None:
+        self.joint, self.kept = joint, kept
+        self.equations = tuple(joint.equations[k] for k in kept)
+        self.constant, self.moving, self.name = joint.constant, joint.moving, joint.name
+        self.tabled = joint.tabled and ours(joint)
+        self._number = np.full(len(joint.equations), -1)
+        self._number[kept] = np.arange(len(kept))
+        self._freeze()
+
+    def __repr__(self) -> str:
+        return repr(self.joint)
+
+    def bind(self, layout: Layout) -> None:  # the joint is bound already
+        pass
+
+    def _of(self, rows: Array, *others: Array) -> tuple[Any, ...]:
+        rows = self._number[rows]
+        keep = rows >= 0
+        return (rows[keep], *(x[..., keep] for x in others))
+
+    def _all(self, multipliers: Array) -> Array:
+        out = np.zeros(len(self._number))
+        out[self.kept] = multipliers
+        return out
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.asarray(self.joint.value(u, t))[self.kept]
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self._of(*self.joint.entries(u, t))
+
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array] | None:
+        return self.joint.curvature(u, t, self._all(multipliers))
+
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        return self.joint.quadratic(u, t, v)[self.kept]
+
+    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
+        return self._of(*self.joint.mean_entries(u0, u1, t))
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        return self.joint.mean_turning(u0, u1, v0, v1, t, self._all(multipliers))
+
+    def lost(self, u: Array) -> str:
+        return self.joint.lost(u)
+
+    def offset(self, times: Array, N: int) -> Array:
+        return self.joint.offset(times, N)[:, self.kept]
+
+    @property
+    def turning(self) -> bool:
+        return self.joint.turning
+
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
+        return self._of(*self.joint.slope_entries(times, N))
+
+    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
+        return self._of(*self.joint.second_entries(N))
