@@ -101,7 +101,9 @@ class BeamPoints:
 
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum (..., 2, n) of weighted DOFs (..., N) at each point."""
-        out: Any = 0.0
+        if u.ndim == 1:
+            return np.asarray(np.add.reduce(weights[:, None] * u[self.dofs]))
+        out: Any = 0.0  # without an array of all summands
         for w, d in zip(weights, self.dofs):
             out = out + w * u[..., d]
         return out

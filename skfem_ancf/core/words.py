@@ -21,7 +21,7 @@ _NOTHING = c_char * 0
 class Words:
     """The words of a named tuple, which live as long as this object.
 
-    Fields are contiguous arrays of floats or integers, numbers, or named tuples.
+    Fields are contiguous arrays of floats or integers, numbers, named tuples or their Words.
     """
 
     def __init__(self, x: tuple[Any, ...]) -> None:
@@ -45,6 +45,8 @@ def _collect(x, found):
             found += _address(value), *value.shape
         elif isinstance(value, tuple):
             _collect(value, found)
+        elif isinstance(value, Words):
+            found += value.words.tolist()
         elif hint is float:
             found += _INTEGER.unpack(_FLOAT.pack(value))
         else:

@@ -270,6 +270,9 @@ class ElementBeam(Immutable, Element):
         """Functions for height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
         axis, of_node, number = self._factors[:3, i]
         xi, eta = X
+        if not self.section.number:
+            value, slope = [hermite_basis(self._along[0], xi, d)[i] for d in (0, 1)]
+            return np.array([value, slope, 0.0 * value])
         out = np.zeros((3, len(axis), *xi.shape), np.result_type(X, float))
         of_axis, of_section = axis >= 0, axis < 0
         for d in (0, 1):
@@ -301,6 +304,8 @@ class ElementBeam(Immutable, Element):
         """
         power, slope = self._factors[3:, i]
         unit, axes = self._unit(X, i), 0 if type(h) is float else np.ndim(h)
+        if not self.section.number:
+            return *unit, slope
         if axes == unit.ndim - 1:  # the same points of each element
             unit = unit[:, :, None]
         column = (-1,) + (1,) * (unit.ndim - 2)

@@ -1,6 +1,6 @@
 """Large parts of compiled code behind addresses: kernels, force elements, contact, laws."""
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from ..actions.contact.kernels import of_contacts
 from ..actions.contact.tables import ContactTables, Question
 from ..actions.forces.kernels import Kinds, of_kinds, turns_of
 from ..beam.kernels import blocks, loops as kernels
-from ..beam.kernels.compiled import CompiledTables, compiled_tables
+from ..beam.kernels.compiled import CompiledTables, compiled_pattern, compiled_tables
 from ..beam.kernels.law import LINEAR, point_of
 from ..beam.strain_energy import FlatBody
 from ..core.band import ADDRESSES
@@ -208,8 +208,14 @@ def _flat_body(body, words):
     return FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table)
 
 
+@lru_cache(64)
+def _words_of(pattern):
+    return Words(compiled_pattern(pattern))
+
+
 def _compiled(t):
-    t, function = compiled_tables(t, _ADDRESSES), point_of(t.law)
+    t, function = compiled_tables(t, _ADDRESSES)._replace(
+        pattern=_words_of(t.pattern)), point_of(t.law)
     if function is None:
         return t
     try:

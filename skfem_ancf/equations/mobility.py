@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from scipy import sparse
 
 from ..actions.joints.nodes import chain_ends
@@ -55,13 +56,12 @@ def _motions(c, joints):
     """
     if c.frame is not None:
         return _motions_of_frame(c, joints)
-    out = np.zeros((c.N, 3 * len(c.members))) if c.N <= DENSE else None
-    values = []
-    for k, (member, s) in enumerate(zip(c.members, c.slices)):
-        values.append(member.rigid_motions() / (1.0, 1.0, member.size))
-        if out is not None:
-            out[s, 3 * k:3 * k + 3] = values[-1]
-    if out is None:
+    values = [member.rigid_motions() / (1.0, 1.0, member.size) for member in c.members]
+    if len(values) == 1:
+        out = values[0]
+    elif c.N <= DENSE:
+        out = scipy.linalg.block_diag(*values)
+    else:
         out = _sparse(np.concatenate(values), np.repeat(
             np.arange(len(values)), [member.N for member in c.members]))
     return out, joints @ out, lambda: [(who(c.members, k), b.origin, b.size)

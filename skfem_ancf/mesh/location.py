@@ -215,6 +215,8 @@ class Finder:
         return out
 
     def _find(self, x, noise):
+        if self._line is not None:
+            return self._on_line(x, noise)
         e, X, outside = self._nearest(x, noise)
         left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
         if len(left):
@@ -260,19 +262,25 @@ class Finder:
 
     @cached_property
     def _line(self):
+        """The direction of a single straight line, and where its elements begin; or None."""
         mesh, d = self.mesh, self.mesh.p_X[:, 0]
         one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
-        return (d, d @ mesh.p) if one else None
+        return (d, d @ mesh.p[:, :-1]) if one else None
+
+    def _on_line(self, x, noise):
+        """As :meth:`_find` on a single straight line."""
+        d, start = self._line
+        # a point of the section between two elements is one of the left
+        e = (start + noise * self.mesh.lengths)[1:].searchsorted(d @ x)
+        X = self.inverse(x[:, :, None], e)[..., 0]
+        outside = self._outside(X, noise)
+        outside[outside > 1.0] = np.inf
+        return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
 
     def _nearest(self, x, noise):
         """The nearest element, or its neighbour where the point is beyond the common node."""
-        if self._line is None:
-            distance, near = self._tree.query(x.T)
-            e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
-        else:
-            d, nodes = self._line
-            e = np.minimum(np.maximum(nodes.searchsorted(d @ x) - 1, 0), len(nodes) - 2)
-            todo = np.arange(x.shape[1])
+        distance, near = self._tree.query(x.T)
+        e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
         X, outside = np.empty(x.shape), np.empty(x.shape[1])
         X[:], outside[:] = 0.5, np.inf
         steps = 0
@@ -286,8 +294,6 @@ class Finder:
             on, steps = (other >= 0) & (steps < WALK), steps + 1
             todo = todo[on]
             e[todo] = other[on]
-        if self._line is not None:
-            outside[outside > 1.0] = np.inf
         return e, X, outside
 
     def _best(self, x, candidates, noise):

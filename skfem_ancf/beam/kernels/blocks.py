@@ -110,7 +110,7 @@ def displaced(t, first, u, U, d, r):
 @source
 def strains(t, first, d, r, E):
     """Strains of the samples."""
-    rows, x = t.rows, block(t.x, first)
+    rows, x = t.pattern.rows, block(t.x, first)
     if t.kind != SECTION:
         cable_strains(block(t.rest, first), d, r, E)
         return
@@ -183,7 +183,7 @@ def cable_directions(r, s, X):
 @source
 def changes(t, X, d, E):
     """Change of the strains for a change d of the rows in directions X."""
-    rows, ways = t.rows, t.ways
+    rows, ways = t.pattern.rows, t.pattern.ways
     for s in range(len(E)):
         a, x, o = d[rows[0, s]], X[ways[0, s]], E[s]
         for e in range(len(o)):
@@ -247,7 +247,7 @@ def stresses(t, first, E, change, T):
     With a ``change`` about E, their work on it is the change of the energy.
     """
     if t.law.kind == LINEAR:
-        times(t.pairs, block(t.H, first), E, T)
+        times(t.pattern.pairs, block(t.H, first), E, T)
     else:
         law_stresses(t, first, E, change, T)
 
@@ -273,7 +273,7 @@ def moduli(t, first, E):
     """Weighted moduli between samples, (nq, W)."""
     if t.law.kind == LINEAR:
         return block(t.H, first)
-    H = np.empty((t.pairs.shape[1], t.width))
+    H = np.empty((t.pattern.pairs.shape[1], t.width))
     law_moduli(t, first, E, H)
     return H
 
@@ -295,7 +295,7 @@ def put_law_moduli(t, first, E, H):
 @source
 def between_samples(t, first, M, H):
     """Moduli between samples from those at the points, (9, points, W)."""
-    pairs, along, w, points = t.pairs, t.along, block(t.weights, first), t.weights.shape[1]
+    pairs, along, w, points = t.pattern.pairs, t.along, block(t.weights, first), t.weights.shape[1]
     H[:] = 0.0
     for q in range(len(H)):
         s, r, h = pairs[0, q], pairs[1, q], H[q]
@@ -347,7 +347,7 @@ def put(t, first, T, more, out):
 @source
 def push(t, first, X, T, U, B, F, f):
     """Add the forces of stresses in directions X; with U, those of the constant stiffness too."""
-    rows, ways = t.rows, t.ways
+    rows, ways = t.pattern.rows, t.pattern.ways
     B[:] = 0.0
     for s in range(len(T)):
         a, x, c = B[rows[0, s]], X[ways[0, s]], T[s]

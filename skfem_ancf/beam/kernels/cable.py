@@ -11,6 +11,8 @@ Rows are d/dX and d^2/dX^2 at each point.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ...core.errors import InputError
@@ -23,7 +25,7 @@ from ...sections import Across
 from .kernel import ElementKernel, strains
 from .histories import fibres
 from .law import LINEAR, NO_LAW, law_tables
-from .tables import CABLE, OF_WEIGHTS, StrainTables, products_of
+from .tables import CABLE, OF_WEIGHTS, StrainTables, pattern_of
 
 #: Stiffness of the mode that two points of a cubic axis miss, in EI over the squared length of the
 #: beam; the third point has a quarter of it.
@@ -49,15 +51,36 @@ def _square(across):
     return float(np.max((EI - ES**2 / EA) / EA))
 
 
-def _has_alone(t):
+def _unit(element, points):
+    """Derivatives of the axis by xi at each point, the first and the second: (rows, nb)."""
+    slopes = np.stack([element.axis(points, d).T for d in (1, 2)], axis=1)
+    return slopes.reshape(2 * len(points), -1)
+
+
+@lru_cache(64)
+def _unit_at_gauss(element, n):
+    return _unit(element, gauss(n)[0])
+
+
+@lru_cache(64)
+def _samples(n, moduli):
+    """The Pattern of n points with the moduli EA, EI, and -ES if three, and the order of these."""
+    s = np.arange(n)
+    rows = 2 * np.array([[*s, *s], [*s, *s]])
+    rows[1, n:] += 1
+    pairs = np.concatenate([[c * n + s, d * n + s] for c, d in (
+        (0, 0), (1, 1), (0, 1))[:moduli]], axis=1)
+    order = np.lexsort(pairs[::-1])
+    return pattern_of(CABLE, rows, pairs[:, order]), order
+
+
+def _has_alone(mesh):
     """True if an element has no neighbour."""
+    t = mesh.t
+    if mesh.is_chain:
+        return t.shape[1] == 1
     joined = t[0, 1:] == t[1, :-1]
     return not np.all(np.append(False, joined) | np.append(joined, False))
-
-
-def cross(a: Array, b: Array) -> Array:
-    """The out-of-plane component of a x b, vectors (..., 2)."""
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 class CableKernel(ElementKernel):
@@ -72,13 +95,12 @@ class CableKernel(ElementKernel):
             alpha, length = getattr(formulation, "alpha", 1.0), float(mesh.chain_lengths.min())
             self._rule = softened(alpha * MIDDLE * _square(across) / length**2)
         else:
-            if self.constant is None and _has_alone(mesh.t):
+            if self.constant is None and _has_alone(mesh):
                 n = max(n, element.axis_degree)  # no neighbour stabilises modes of fewer points
             self._rule = gauss(n)
         self.points, self._across = self._rule[0], across
         self.points_number = len(self.points)
-        longest = mesh.lengths.max()
-        same = mesh.is_uniform or longest - mesh.lengths.min() <= 1e-13 * longest
+        same = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * mesh.lengths.max()
         laws = [layer.material.law() for layer in across.layers]
         if any(isinstance(law, AtRest) for law in laws):
             self.tables = self._with_fibres(mesh, element, same)
@@ -87,28 +109,24 @@ class CableKernel(ElementKernel):
 
     def _table(self, mesh, element, same):
         """Tables of the reference element scaled by the lengths, for one or all elements."""
-        ne, nb, n = mesh.nelements, self.nd, self.points_number
+        ne, nb, n, w = mesh.nelements, self.nd, self.points_number, self._rule[1]
         L = (mesh.lengths[:1] if same else mesh.lengths)[:, None]
-        unit = np.stack([element.axis(self.points, d).T for d in (1, 2)], axis=1).reshape(2 * n, -1)
-        scale = np.tile(np.concatenate([1.0 / L, 1.0 / L**2], axis=1), n)
-        G = unit * (scale[:, :, None] * (L ** np.tile(np.arange(float(nb // 2)), 2))[:, None])
+        scale = np.empty((len(L), 2 * n))
+        scale[:, ::2], scale[:, 1::2] = 1.0 / L, 1.0 / L**2
+        unit = _unit_at_gauss(element, n) if self._rule is gauss(n) else _unit(element, self.points)
+        G = unit * (scale[:, :, None] * element.powers(1.0, L)[:, None])
         EA, ES, EI = self._across.moments(
             self.points, np.zeros(1, int) if same and self._across.constant else None)
-        s, coupled = np.arange(n), [(0, 0, EA), (1, 1, EI)]
-        coupled += [(0, 1, -ES)] if np.any(ES) else []
-        pairs = np.concatenate([[c * n + s, d * n + s] for c, d, _ in coupled], axis=1)
-        H, order = [x * self._rule[1] * L for *_, x in coupled], np.lexsort(pairs[::-1])
-        pairs, H = pairs[:, order], np.concatenate(H, axis=1)[:, order]
-        rows = 2 * np.array([[*s, *s], [*s, *s]])
-        rows[1, n:] += 1
+        moduli = [EA, EI, -ES] if ES.any() else [EA, EI]
+        pattern, order = _samples(n, len(moduli))
+        H = (np.concatenate([x * w for x in moduli], axis=1) * L)[:, order]
         frame = self._frame(mesh, element, n, G)
         C = (np.zeros((0, 2 * nb - 2, 2 * nb - 2)) if self.constant is None else
              self.constant[:, 2:, 2:])
         each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
         return StrainTables(
-            CABLE, nb * mesh.t[0].astype(np.int64),
-            np.outer(np.arange(ne), each).astype(np.int64), *map(np.ascontiguousarray, (
-                G[:, :, 1:], frame, rows, pairs, *products_of(rows, pairs), H, C)),
+            pattern, nb * mesh.t[0].astype(np.int64), np.outer(np.arange(ne), each),
+            *map(np.ascontiguousarray, (G[:, :, 1:], frame, H, C)),
             NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
 
     def _with_fibres(self, mesh, element, same):
@@ -117,11 +135,7 @@ class CableKernel(ElementKernel):
             raise InputError("a cable whose law has a history needs a constant section: for a "
                              "taper, or functions of position, use an element with sections")
         whole, n, L = self._table(mesh, element, same), self.points_number, mesh.lengths[:, None]
-        s = np.arange(n)
-        pairs = np.concatenate([[c * n + s, d * n + s] for c, d in (
-            (0, 0), (0, 1), (1, 1))], axis=1)
-        order = np.lexsort(pairs[::-1])
-        out = []
+        (pattern, order), out = _samples(n, 3), []
         for layer in self._across.layers:
             Y, A = fibres(self._across, layer, getattr(layer.material, "points", 2))
             along = np.concatenate([np.repeat(np.eye(n), len(Y), 0), np.kron(
@@ -129,26 +143,23 @@ class CableKernel(ElementKernel):
             weights = (L[:1] if same else L) * np.kron(self._rule[1], A)
             E = layer.material.axial_modulus
             H = np.concatenate([E * np.sum(A * Y**k) * (-1.0) ** k * (L[:1] if same else L)
-                                * self._rule[1] for k in range(3)], axis=1)
+                                * self._rule[1] for k in (0, 2, 1)], axis=1)
             law = law_tables(layer.material.law(), self)
             if law.kind == LINEAR:
                 along, weights = np.zeros((0, 2 * n)), np.zeros((1, 0))
             at = whole.at.copy()
             at[:, OF_WEIGHTS] = np.arange(len(L)) if len(weights) > 1 else 0
-            C = whole.C[:0] if out else whole.C
             out.append(whole._replace(
-                at=at, pairs=pairs[:, order].copy(), H=np.ascontiguousarray(H[:, order]), C=C,
-                law=law, along=along, weights=weights,
-                **dict(zip(("products", "terms", "of"), products_of(
-                    whole.rows, pairs[:, order])))))
+                at=at, pattern=pattern, H=np.ascontiguousarray(H[:, order]),
+                C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights))
         return out
 
     def _frame(self, mesh, element, n, G):
         """r_X and r_XX in the reference configuration, (1 or ne, rows, 2)."""
         if mesh.is_straight:
             p, k = mesh.p, 1 if mesh.is_uniform else mesh.nelements
-            e, frame = (p[:, mesh.t[1]] - p[:, mesh.t[0]]) / mesh.lengths, np.zeros((k, 2 * n, 2))
-            frame[:, ::2] = e.T[:k, None]
+            (left, right), frame = mesh.t[:, :k], np.zeros((k, 2 * n, 2))
+            frame[:, ::2] = ((p[:, right] - p[:, left]) / mesh.lengths[:k]).T[:, None]
             return frame
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
@@ -180,8 +191,6 @@ class CableKernel(ElementKernel):
 
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
-        t, (eps, kappa) = self.tables[0], first_order(self.strain(u))
-        a, b = t.frame[:, ::2], t.frame[:, 1::2]
-        kappa0 = (cross(a, b) / np.sum(a * a, axis=-1)).T
+        (eps, kappa), kappa0 = first_order(self.strain(u)), self.elements[0].rest[3]
         Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
         return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])

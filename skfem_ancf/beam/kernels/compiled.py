@@ -14,10 +14,40 @@ import numpy as np
 from ...core.source import F2, F3, I1, I2
 from .elements import scaled
 from .law import LawTables
-from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, StrainTables
+from .tables import OF_C, OF_FRAME, OF_G, OF_H, OF_WEIGHTS, SECTION, Pattern, StrainTables
 
 #: Number of elements together.
 W = 16
+_NOTHING = np.zeros((0, 0, 0))
+
+
+class CompiledPattern(NamedTuple):
+    """The Pattern for compiled code."""
+
+    rows: I2  # g and h of each sample, (2, ns)
+    ways: I2  # the directions in which they change its strain; -1 if g = h, (2, ns)
+    pairs: I2  # samples s <= t of each modulus, (2, nq)
+    terms: I2  # product, skew product or -1, two directions, modulus, (5, nt)
+    factors: F2  # of the terms, (1, nt)
+    of: I1  # product of each sample, (ns,)
+    products: I2  # rows g <= h, sorted, (2, np)
+    skew: I2  # those with g < h, (2, nz)
+
+
+@lru_cache(64)
+def compiled_pattern(pattern: Pattern) -> CompiledPattern:
+    """The CompiledPattern of a Pattern."""
+    (g, h), ns, (p, a, b, q), (k, l) = (
+        pattern.rows, pattern.ns, pattern.terms, pattern.products)
+    s, section = np.arange(ns), pattern.kind == SECTION
+    first = h if section else 3 * (s % (ns // 2)) + 2 * s // ns  # three at each point of cables
+    second = np.where(g == h, -1, g if section else first + 1)
+    number, skew = np.concatenate([first, second]), np.cumsum(k != l) - 1
+    skew[k == l] = -1
+    return CompiledPattern(
+        pattern.rows, np.array([first, second]), pattern.pairs,
+        np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None],
+        pattern.of, pattern.products, np.ascontiguousarray(pattern.products[:, k != l]))
 
 
 class CompiledTables(NamedTuple):
@@ -29,6 +59,7 @@ class CompiledTables(NamedTuple):
     """
 
     kernels: I1  # addresses of compiled functions
+    pattern: CompiledPattern
     kind: int  # SECTION or CABLE
     width: int  # W, as a number that LLVM does not know
     start: I1  # first DOF of each element, (ne,)
@@ -39,15 +70,7 @@ class CompiledTables(NamedTuple):
     sigma: F3  # factors of the strains, (n, ns, W), or empty
     x: F3  # rows in the reference configuration, (n, rows, 2 W)
     rest: F3  # of cables: |r_X| and curvature there, (n, points, 2 W), or empty
-    rows: I2  # g and h of each sample, (2, ns)
-    ways: I2  # the directions in which they change its strain; -1 if g = h, (2, ns)
-    pairs: I2  # samples s <= t of each modulus, (2, nq)
     H: F3  # weighted moduli, (n, nq, W)
-    terms: I2  # product, skew product or -1, two directions, modulus, (5, nt)
-    factors: F2  # of the terms, (1, nt)
-    of: I1  # product of each sample, (ns,)
-    products: I2  # rows g <= h, sorted, (2, np)
-    skew: I2  # those with g < h, (2, nz)
     P: F2  # from coefficients to K, (m (m + 1) / 2, np)
     Q: F2  # from skew coefficients to Z, (m (m - 1) / 2, nz)
     K: F3  # constant stiffness, (n, m (m + 1) / 2, 3 W), or empty
@@ -60,35 +83,27 @@ class CompiledTables(NamedTuple):
 
 def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
     """The CompiledTables of a StrainTables."""
-    ne, ns = len(t.start), t.rows.shape[1]
+    ne, pattern, section = len(t.start), t.pattern, t.kind == SECTION
 
     def each(x, column):  # (1 or ne, ...)
         return x[t.at[:, column]] if len(x) > 1 else x
 
     G, R, D = scaled(each(t.G, OF_G))
-    own, (g, h), frame = len(G) > 1, t.rows, each(t.frame, OF_FRAME) / R[:, :, None]
-    section = t.kind == SECTION
-    sigma = R[:, g] * R[:, h] if section else np.concatenate(
-        [R[:, g[:ns // 2]], R[:, h[ns // 2:]] / R[:, g[ns // 2:]]], axis=1)
-    s = np.arange(ns)  # three directions at each point of cables
-    first = h if section else 3 * (s % (ns // 2)) + 2 * s // ns
-    second = np.where(g == h, -1, g if section else first + 1)
-    number, (p, a, b, q) = np.concatenate([first, second]), t.terms
-    k, l = t.products
-    skew = np.cumsum(k != l) - 1
-    skew[k == l] = -1
+    own, frame, H = len(G) > 1, each(t.frame, OF_FRAME), each(t.H, OF_H)
+    sigma = np.ones((1, pattern.ns))
+    if len(R) > 1 and not own:
+        (g, h), n, (a, b) = pattern.rows, pattern.ns // 2, pattern.pairs
+        sigma = R[:, g] * R[:, h] if section else np.concatenate(
+            [R[:, g[:n]], R[:, h[n:]] / R[:, g[n:]]], axis=1)
+        frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
     K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
-    return CompiledTables._make((
-        kernels, t.kind, W, t.start, *map(np.ascontiguousarray, (
-            G[0], _blocks(G.reshape(ne, -1) if own else G[:0, 0]),
-            G.any(axis=0).ravel().astype(np.int64), _scales(D), _scales(sigma),
-            _blocks(frame), np.zeros((0, 0, 0)) if section else _rest(frame), t.rows,
-            np.array([first, second]), t.pairs,
-            _blocks(each(t.H, OF_H) * sigma[:, t.pairs[0]] * sigma[:, t.pairs[1]]),
-            np.array([p, skew[p], number[a], number[b], q]), np.where(a == b, 0.5, 1.0)[None], t.of,
-            t.products, t.products[:, k != l], *_products(G[0], t.products, own), K, Z,
-            _coupled(K, Z, D.shape[1]))),
-        t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS))))
+    P, Q = _products(G[0], pattern.products, own)
+    used = G.any(axis=0).ravel().astype(np.int64)
+    return CompiledTables(
+        kernels, compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
+        _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, _scales(D), _scales(sigma),
+        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z,
+        _coupled(K, Z, D.shape[1]), t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS)))
 
 
 def _rest(x):
@@ -99,10 +114,10 @@ def _rest(x):
 
 def _blocks(x):
     """(1 or ne, n, ...) to (1 or blocks, n, ... W); the last element fills the last block."""
+    if x.size == 0:
+        return np.zeros((0, x.shape[1], 0))
     x = np.repeat(x, W, axis=0) if len(x) == 1 else np.concatenate(
         [x, np.repeat(x[-1:], -len(x) % W, axis=0)])
-    if x.size == 0:
-        return np.zeros((0, *x.shape[1:2], 0)) if x.ndim > 1 else np.zeros((0, 0, 0))
     x = x.reshape(len(x) // W, W, *x.shape[1:])
     last = np.ascontiguousarray(x.transpose(0, *range(2, x.ndim), 1))
     return last.reshape(len(x), x.shape[2], -1)
@@ -115,7 +130,7 @@ def _lower(m, k):
 
 def _scales(x):
     """Blocks of factors (1 or ne, n), empty if all are one."""
-    return np.zeros((0, 0, 0)) if (x == 1.0).all() else _blocks(x)
+    return _NOTHING if (x == 1.0).all() else _blocks(x)
 
 
 def _products(G, products, own):
@@ -131,7 +146,7 @@ def _products(G, products, own):
 def _symmetric_and_skew(C, D):
     """K and Z of matrices C (k, 2 m, 2 m) for scaled unknowns."""
     if not len(C):
-        return np.zeros((0, 0, 0)), np.zeros((0, 0, 0))
+        return _NOTHING, _NOTHING
     m = D.shape[1]
     C = C.reshape(len(C), m, 2, m, 2) / (D[:, :, None, None, None] * D[:, None, None, :, None])
     (i, j), (a, b) = _lower(m, 0), _lower(m, -1)

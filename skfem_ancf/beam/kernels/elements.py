@@ -99,13 +99,7 @@ class Elements:
         self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
         self.x = self._last(t.frame, OF_FRAME)
         self.start, self.rest = t.start, self.measured(self.x)
-        # ends: sample, row, and number of the direction
-        (g, h), n = t.rows, self.ns // 2
-        self._second = second = (g != h).nonzero()[0]
-        own = np.arange(self.ns)
-        self._sample, self._row = np.concatenate([own, second]), np.concatenate([g, h[second]])
-        self._direction = (np.concatenate([own, second + n]) if t.kind == CABLE else
-                          np.concatenate([h, g[second]]))
+        self._second, self._sample, self._row, self._direction = t.pattern.ends
         # relative DOFs (2 m, ne)
         self._dofs = t.start + np.arange(2, 2 * self.m + 2)[:, None]
         self._left = t.start + np.arange(2)[:, None]
@@ -123,15 +117,6 @@ class Elements:
     def moduli(self) -> Array:
         """Weighted moduli between samples, (nq, ne or 1)."""
         return self._last(self.t.H, OF_H)
-
-    @cached_property
-    def _summands(self):
-        """Moduli and strains of the summands of the stresses, sorted, and the first of each."""
-        (s, z), pairs = self.t.pairs, self.t.pairs
-        both, q = np.concatenate([pairs, pairs[::-1, s != z]], axis=1), np.arange(len(s))
-        order = both[0].argsort(kind="stable")
-        return (np.concatenate([q, q[s != z]])[order], both[1, order],
-                both[0, order].searchsorted(np.arange(self.ns)))
 
     @cached_property
     def C(self) -> Array | None:
@@ -204,7 +189,7 @@ class Elements:
     def linear_stress(self, strain: Array, moduli: Array | None = None) -> Array:
         """Weighted stresses (ns, ne) by moduli (nq, ne) between samples."""
         H = self.moduli if moduli is None else moduli
-        modulus, other, begin = self._summands
+        modulus, other, begin = self.t.pattern.summands
         products = H.take(modulus, 0, None, CLIP) * strain.take(other, 0, None, CLIP)
         return np.add.reduceat(products, begin)
 
@@ -311,23 +296,11 @@ class Elements:
 
     @cached_property
     def _terms(self):
-        """Coefficients of the tangent: directions a and b, moduli q, rows k and l, and factors.
-
-        Terms of the products of the samples come first, for the geometric part.
-        """
-        t, ns, second = self.t, self.ns, self._second
-        first, rest = np.full(t.products.shape[1], -1), np.ones(t.terms.shape[1], bool)
-        first[t.terms[0, ::-1]] = np.arange(len(rest))[::-1]
-        own = first[t.of]
-        rest[own] = False
-        p, a, b, q = t.terms[:, np.concatenate([own, rest.nonzero()[0]])]
-        end = np.zeros(2 * ns, int)
-        end[:ns], end[ns + second] = np.arange(ns), ns + np.arange(len(second))
-        (k, l), (g, h), R = t.products[:, p], t.rows, self.R[:, 0]
-        factor = np.where(a == b, 0.5, 1.0)[:, None] * R[k] * R[l]
-        geometric = np.where(g == h, 0.5, 1.0)[:, None] * R[g] * R[h]
-        return (self._direction[end[a]], self._direction[end[b]], q, k, l, factor[:, None],
-                geometric[:, None])
+        """:attr:`Pattern.coefficients` with the factors R of the rows."""
+        (*found, k, l, factor, geometric), (g, h), R = (
+            self.t.pattern.coefficients, self.t.rows, self.R[:, 0])
+        return (*found, k, l, (factor * R[k] * R[l])[:, None],
+                (geometric * R[g] * R[h])[:, None])
 
     @cached_property
     def _products(self):

@@ -23,7 +23,7 @@ def force(t, u, v, given, out, f):
     Given stresses act in place of those of the strain; without ``out``, they act without the
     constant stiffness.
     """
-    R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v.copy(), v.size > 0
+    R, m, ns, du, moving = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v.copy(), v.size > 0
     if moving:
         add_multiple(-1.0, u, du)
     work, samples = np.empty((3 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
@@ -56,7 +56,7 @@ def force(t, u, v, given, out, f):
 @source
 def linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
-    R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
+    R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     work, samples = np.empty((2 * m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
     d, dd, r, B, X = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:4 * R], rows[4 * R:]
@@ -68,7 +68,7 @@ def linearised(t, u, du, given, out, f):
             strains(t, first, d, r, E)
         H, D = moduli(t, first, E), directions(t, r, d[:0], X)
         changes(t, D, dd, E)
-        times(t.pairs, H, E, T)
+        times(t.pattern.pairs, H, E, T)
         if out.size > 0:
             put(t, first, T, given, out)
         if f.size > 0:
@@ -78,11 +78,12 @@ def linearised(t, u, du, given, out, f):
 @source
 def tangent(t, u, given, out, f, A, ld):
     """Tangent, force and stresses at u; the geometric part has the given stresses, if any."""
-    R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
+    R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
     U, F, rows, E, T = work[:m], work[m:2 * m], work[2 * m:], samples[0], samples[1]
     d, r, B, Y = rows[:R], rows[R:2 * R], rows[2 * R:3 * R], rows[3 * R:]
-    w, z = np.empty((t.products.shape[1], 3 * t.width)), np.empty((t.skew.shape[1], t.width))
+    terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
+    w, z = np.empty((terms, 3 * t.width)), np.empty((skew, t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
@@ -105,13 +106,14 @@ def tangent(t, u, given, out, f, A, ld):
 @source
 def unsymmetric(t, u, v, A, ld):
     """Add ``B(u)^T H (B(v) - B(u))`` to a matrix in two halves."""
-    R, m, ns, n = t.G.shape[0], t.G.shape[1], t.rows.shape[1], 3 * t.G.shape[0] // 2
+    R, m, ns, n = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], 3 * t.G.shape[0] // 2
     du = v.copy()
     add_multiple(-1.0, u, du)
     work = np.empty((m + 3 * R + 2 * n, 2 * t.width))
     U, d, r, s = work[:m], work[m:m + R], work[m + R:m + 2 * R], work[m + 2 * R:m + 3 * R]
     E, X, Y = np.empty((ns, t.width)), work[m + 3 * R:m + 3 * R + n], work[m + 3 * R + n:]
-    w, z = np.empty((t.products.shape[1], 4 * t.width)), np.empty((t.skew.shape[1], 4 * t.width))
+    terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
+    w, z = np.empty((terms, 4 * t.width)), np.empty((skew, 4 * t.width))
     K, Z = np.empty((m * (m + 1) // 2, 4 * t.width)), np.empty((m * (m - 1) // 2, 4 * t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
@@ -135,7 +137,7 @@ def unsymmetric(t, u, v, A, ld):
 @source
 def add_difference(t, H, X, D, w, z):
     """Coefficients xx, xy, yx, yy of ``X^T H D``, symmetric and skew in the functions."""
-    terms, factors = t.terms, t.factors[0]
+    terms, factors = t.pattern.terms, t.pattern.factors[0]
     for k in range(len(factors)):
         n, p, a, b, h = terms[1, k], terms[0, k], terms[2, k], terms[3, k], H[terms[4, k]]
         x, y, X0, Y0, c = X[a], D[b], X[b], D[a], 0.5 * factors[k]
@@ -175,7 +177,7 @@ def add_to_halves(start, first, ld, m, K, Z, A):
 @source
 def gradients(t, u, out):
     """Write the derivatives of strains and of weighted stresses, (2, ne, ns, 2 nb)."""
-    R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
+    R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     both = out.reshape(2, len(t.start), ns, 2 * m + 2)
     U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
     E, Y = np.empty((ns, t.width)), np.empty((3 * R // 2, 2 * t.width))
@@ -184,7 +186,7 @@ def gradients(t, u, out):
         displaced(t, first, u, U, d, r)
         strains(t, first, d, r, E)
         put_derivatives(t, first, directions(t, r, d[:0], Y), B)
-        H, pairs = moduli(t, first, E), t.pairs
+        H, pairs = moduli(t, first, E), t.pattern.pairs
         C[:] = 0.0
         for q in range(len(H)):
             s, p, h = pairs[0, q], pairs[1, q], H[q]
@@ -201,7 +203,7 @@ def gradients(t, u, out):
 @source
 def put_derivatives(t, first, X, B):
     """Derivatives of the strains by the scaled unknowns, (ns, 2 m W)."""
-    rows, ways, m, shared = t.rows, t.ways, t.G.shape[1], len(t.own) == 0
+    rows, ways, m, shared = t.pattern.rows, t.pattern.ways, t.G.shape[1], len(t.own) == 0
     G = np.empty((t.G.size, t.width))
     for n in range(len(G)):
         for e in range(t.width):
@@ -262,7 +264,7 @@ def shifted(t, first, E, change, shift, S):
 @source
 def eigen_mean(t, u, v, shift, f):
     """Change of the mean force from u to v by eigenstrains (3, points, ne) of a nonlinear law."""
-    R, m, ns, du = t.G.shape[0], t.G.shape[1], t.rows.shape[1], v.copy()
+    R, m, ns, du = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v.copy()
     add_multiple(-1.0, u, du)
     work, samples = np.empty((m + 4 * R + 3 * R // 2, 2 * t.width)), np.empty((3, ns, t.width))
     U, rows, E, C, T = work[:m], work[m:], samples[0], samples[1], samples[2]
@@ -284,10 +286,11 @@ def eigen_mean(t, u, v, shift, f):
 @source
 def eigen_tangent(t, u, given, A, ld):
     """Change of the tangent at u by eigenstrains: stresses for linear laws, else strains."""
-    R, m, ns = t.G.shape[0], t.G.shape[1], t.rows.shape[1]
+    R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
     E, T = np.empty((ns, t.width)), np.empty((ns, t.width))
-    w, z = np.empty((t.products.shape[1], 3 * t.width)), np.empty((t.skew.shape[1], t.width))
+    terms, skew = t.pattern.products.shape[1], t.pattern.skew.shape[1]
+    w, z = np.empty((terms, 3 * t.width)), np.empty((skew, t.width))
     for first in range(0, len(t.start), W):
         displaced(t, first, u, U, d, r)
         w[:] = 0.0
@@ -301,7 +304,7 @@ def eigen_tangent(t, u, given, A, ld):
             shifted(t, first, E, E[:0], given, S)
             from_points(t, first, S, T)
             shifted(t, first, E, E[:0], given, M)
-            H = np.empty((t.pairs.shape[1], t.width))
+            H = np.empty((t.pattern.pairs.shape[1], t.width))
             between_samples(t, first, M, H)
             add_material(t, H, r, w, z)
         add_geometric(t, r, T, w)

@@ -18,7 +18,7 @@ from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
 from .kernel import ElementKernel
 from .law import LINEAR, law_tables
-from .tables import SECTION, StrainTables, products_of
+from .tables import SECTION, StrainTables, pattern_of
 
 #: Relative size of a modulus between samples that is round-off.
 ORTHOGONAL = 1e-14
@@ -75,11 +75,9 @@ class SectionKernel(ElementKernel):
             along = np.concatenate([np.where(c == k, mixed, 0.0) for k in range(3)])
         each = [len(x) > 1 for x in (G, frame, H, C, weights)]
         self.tables.append(StrainTables(
-            SECTION, nb * self.t[0].astype(np.int64),
-            np.outer(np.arange(ne), each).astype(np.int64), *map(np.ascontiguousarray, (
-                G, frame, samples.rows, pairs, *products_of(samples.rows, pairs), H, C)), law,
-            *map(np.ascontiguousarray, (
-                    along, weights))))
+            pattern_of(SECTION, samples.rows, pairs), nb * self.t[0].astype(np.int64),
+            np.outer(np.arange(ne), each), *map(np.ascontiguousarray, (G, frame, H, C)), law,
+            *map(np.ascontiguousarray, (along, weights))))
         return samples, volumes
 
     @property

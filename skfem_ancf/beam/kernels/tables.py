@@ -14,13 +14,17 @@ component i of function k and component j of function l. Few operations give the
 rest is a matrix product.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.caching import cached_property
 from ...core.source import F2, F3, I1, I2
+from ...core.types import Array
 from .law import LawTables
 
 #: Kinds of strains.
@@ -29,47 +33,120 @@ SECTION, CABLE = range(2)
 OF_G, OF_FRAME, OF_H, OF_C, OF_WEIGHTS = range(5)
 
 
+class Pattern:
+    """What samples of strain depend on and what couples them, without values.
+
+    Attributes
+    ----------
+    kind
+        SECTION or CABLE.
+    rows
+        g and h of each sample, (2, ns).
+    pairs
+        Samples s <= t of each modulus, sorted by s, with all s = t, (2, nq).
+    products
+        Rows g <= h of the products in tangents, sorted, (2, np).
+    terms
+        Product, rows a and b of the samples (g first, then h), modulus, sorted, (4, nt).
+    of
+        Product of g and h of each sample, (ns,).
+    """
+
+    def __init__(self, kind: int, rows: Array, pairs: Array) -> None:
+        self.kind, self.rows, self.pairs, self.ns = kind, rows, pairs, rows.shape[1]
+        self.products, self.terms, self.of = _products(rows, pairs)
+
+    @cached_property
+    def ends(self) -> tuple[Array, ...]:
+        """Samples with a second end; sample, row, and number of the direction of each end."""
+        (g, h), own, n = self.rows, np.arange(self.ns), self.ns // 2
+        second = (g != h).nonzero()[0]
+        return (second, np.concatenate([own, second]), np.concatenate([g, h[second]]),
+                np.concatenate([own, second + n] if self.kind == CABLE else [h, g[second]]))
+
+    @cached_property
+    def summands(self) -> tuple[Array, ...]:
+        """Moduli and strains of the summands of the stresses, sorted, and the first of each."""
+        (s, z), pairs = self.pairs, self.pairs
+        both, q = np.concatenate([pairs, pairs[::-1, s != z]], axis=1), np.arange(len(s))
+        order = both[0].argsort(kind="stable")
+        return (np.concatenate([q, q[s != z]])[order], both[1, order],
+                both[0, order].searchsorted(np.arange(self.ns)))
+
+    @cached_property
+    def coefficients(self) -> tuple[Array, ...]:
+        """Directions a and b, moduli, rows k and l, and factors of the coefficients of tangents.
+
+        Those of the products of the samples come first; the last item has their factors in the
+        geometric part.
+        """
+        (second, _, _, direction), ns, terms = self.ends, self.ns, self.terms
+        first, rest = np.full(self.products.shape[1], -1), np.ones(terms.shape[1], bool)
+        first[terms[0, ::-1]] = np.arange(len(rest))[::-1]
+        own = first[self.of]
+        rest[own] = False
+        p, a, b, q = terms[:, np.concatenate([own, rest.nonzero()[0]])]
+        end = np.zeros(2 * ns, int)
+        end[:ns], end[ns + second] = np.arange(ns), ns + np.arange(len(second))
+        (k, l), (g, h) = self.products[:, p], self.rows
+        return (direction[end[a]], direction[end[b]], q, k, l, np.where(a == b, 0.5, 1.0)[:, None],
+                np.where(g == h, 0.5, 1.0)[:, None])
+
+
 class StrainTables(NamedTuple):
     """Elements with the same samples of strain; k = 1 if all elements have equal values."""
 
-    kind: int  # SECTION or CABLE
+    pattern: Pattern
     start: I1  # first DOF of each element, (ne,)
     at: I2  # numbers of an element's G, frame, H, C and weights, (ne, 5)
     G: F3  # derivatives of all shape functions but the first, (k, rows, nb - 1)
     frame: F3  # rows x in the reference configuration, (k, rows, 2)
-    rows: I2  # g and h of each sample, (2, ns)
-    pairs: I2  # samples s <= t of each modulus, sorted by s, with all s = t, (2, nq)
-    products: I2  # rows g <= h of the products in tangents, sorted, (2, np)
-    terms: I2  # product, rows a and b of the samples (g first, then h), modulus, sorted, (4, nt)
-    of: I1  # product of g and h of each sample, (ns,)
     H: F2  # weighted moduli: T[s] = sum H[s, t] strain[t], (k, nq); at zero strain if nonlinear
     C: F3  # constant stiffness, (k, 2 nb - 2, 2 nb - 2), or (0, ...)
     law: LawTables
     along: F2  # for nonlinear laws: from samples to integration points, (3 points, ns)
     weights: F2  # for nonlinear laws: weights of the points, (k, points)
-    address: int = 0  # of the compiled kernels
+
+    @property
+    def kind(self) -> int:
+        """SECTION or CABLE."""
+        return self.pattern.kind
+
+    @property
+    def rows(self) -> Array:
+        """Rows g and h of each sample, (2, ns)."""
+        return self.pattern.rows
+
+    @property
+    def pairs(self) -> Array:
+        """Samples s <= t of each modulus, (2, nq)."""
+        return self.pattern.pairs
 
 
-@lru_cache(64)
-def _products(rows, pairs, size):
-    g, h = np.frombuffer(rows, np.int64).reshape(2, size)
+def _products(rows, pairs):
+    (g, h), size = rows, rows.shape[1]
     ends = [[s] if g[s] == h[s] else [s, size + s] for s in range(size)]
     row = np.concatenate([g, h])
     terms = [(*sorted((a, b), key=lambda c: row[c]), q)
-             for q, (s, t) in enumerate(np.frombuffer(pairs, np.int64).reshape(2, -1).T)
+             for q, (s, t) in enumerate(pairs.T)
              for a in ends[s] for b in ends[t] if s < t or a <= b]
     of, found = (np.sort(x, axis=0) for x in (np.array([g, h]), row[np.transpose(terms)[:2]]))
-    products = np.unique(np.concatenate([of, found], axis=1), axis=1)
+    products = np.unique(np.concatenate([of, found], axis=1), axis=1).copy()
     number = {tuple(x): k for k, x in enumerate(products.T.tolist())}
     numbers = [[number[tuple(x)] for x in y.T.tolist()] for y in (found, of)]
     terms = sorted((p, *x) for p, x in zip(numbers[0], terms))
     return products, np.transpose(np.array(terms, np.int64)).copy(), np.array(numbers[1], np.int64)
 
 
-def products_of(rows: Any, pairs: Any) -> Any:
-    """``products``, ``terms`` and ``of`` of :class:`StrainTables` from rows and pairs."""
-    return _products(*(np.ascontiguousarray(x, np.int64).tobytes() for x in (rows, pairs)),
-                     rows.shape[1])
+def pattern_of(kind: int, rows: Array, pairs: Array) -> Pattern:
+    """The :class:`Pattern` of samples; the same object for equal ones."""
+    return _pattern(kind, rows.shape[1], rows.tobytes(), pairs.tobytes())
+
+
+@lru_cache(64)
+def _pattern(kind, size, rows, pairs):
+    return Pattern(kind, *(np.frombuffer(x, np.int64).reshape(2, -1).copy() for x in (
+        rows, pairs)))
 
 
 def apart(t: StrainTables) -> StrainTables:

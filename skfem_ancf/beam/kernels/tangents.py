@@ -15,7 +15,7 @@ from .tables import SECTION
 @source
 def add_material(t, H, X, w, z):
     """Add coefficients of the products to w (np, 3 W) and z (nz, W)."""
-    terms, factors = t.terms, t.factors[0]
+    terms, factors = t.pattern.terms, t.pattern.factors[0]
     for k in range(len(factors)):
         n, c = terms[1, k], factors[k]
         o, x, y, h = w[terms[0, k]], X[terms[2, k]], X[terms[3, k]], H[terms[4, k]]
@@ -32,7 +32,7 @@ def add_material(t, H, X, w, z):
 @source
 def add_geometric(t, r, T, w):
     """Add coefficients of the geometric part."""
-    of, rows = t.of, t.rows
+    of, rows = t.pattern.of, t.pattern.rows
     if t.kind != SECTION:
         add_cable_geometric(of, r, T, w)
         return
@@ -70,8 +70,8 @@ def products(t, first, w, z, K, Z):
         np.dot(t.Q, z, Z)
         return
     G, m = block(t.own, first), t.G.shape[1]
-    own_products(G, t.used, m, t.products, w, 1, K)
-    own_products(G, t.used, m, t.skew, z, -1, Z)
+    own_products(G, t.used, m, t.pattern.products, w, 1, K)
+    own_products(G, t.used, m, t.pattern.skew, z, -1, Z)
 
 
 @source
