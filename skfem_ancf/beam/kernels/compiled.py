@@ -97,13 +97,14 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
             [R[:, g[:n]], R[:, h[n:]] / R[:, g[n:]]], axis=1)
         frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
     K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
-    P, Q = _products(G[0], pattern.products, own)
+    P, Q, coupled = map(np.ascontiguousarray, (
+        *_products(G[0], pattern.products, own), _coupled(K, Z, D.shape[1])))
     used = G.any(axis=0).ravel().astype(np.int64)
     return CompiledTables(
         kernels, compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, _scales(D), _scales(sigma),
-        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z,
-        _coupled(K, Z, D.shape[1]), t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS)))
+        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled,
+        t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS)))
 
 
 def _rest(x):
