@@ -200,8 +200,6 @@ def turning(beam: Any, u: Array) -> float:
 
 def folded(beam: Any, u: Array) -> bool:
     """True if the axis folds back within an element: a chord is opposite to an end tangent."""
-    nodes = u.reshape(-1, beam.nd)[:, :4].T
-    x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
-    left, right = t = beam.mesh.t
-    ends = (x[:, right] - x[:, left])[:, None] * tangent[:, t]
-    return bool((ends[0] + ends[1] < 0.0).any())
+    r, r_X = (beam.q0_local + u).view(complex).reshape(-1, beam.nd // 2)[:, :2].T
+    chord = r[beam.mesh.t[1]] - r[beam.mesh.t[0]]
+    return bool(((chord * r_X[beam.mesh.t].conj()).real < 0.0).any())

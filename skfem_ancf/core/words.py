@@ -13,7 +13,8 @@ from typing import Any, get_type_hints
 import numpy as np
 
 
-_DTYPES, _FLOAT, _INTEGER = (np.dtype(float), np.dtype(np.int64)), Struct("d"), Struct("q")
+_DTYPES, _FLOAT, _INTEGER = (
+    frozenset([np.dtype(float), np.dtype(np.int64)]), Struct("d"), Struct("q"))
 #: A ctypes array that may lie anywhere.
 _NOTHING = c_char * 0
 
@@ -42,7 +43,7 @@ def _collect(x, found):
         if isinstance(value, np.ndarray):
             if value.dtype not in _DTYPES or not value.flags.c_contiguous:
                 raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
-            found += _address(value), *value.shape
+            found += _address(value) if value.size else 0, *value.shape
         elif isinstance(value, tuple):
             _collect(value, found)
         elif isinstance(value, Words):

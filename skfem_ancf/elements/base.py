@@ -266,24 +266,25 @@ class ElementBeam(Immutable, Element):
                          for node in (0, 1)
                          for k, (_, slope, power) in enumerate(self.functionals)]).T
 
+    @cached_property
+    def _places(self) -> tuple[Array, ...]:
+        """Numbers of the axis functions and of the others, with the two factors of these."""
+        axis, node, number = self._factors[:3]
+        of_section, = (axis < 0).nonzero()
+        return (axis >= 0).nonzero()[0], of_section, node[of_section], number[of_section]
+
     def _unit(self, X: Array, i: Any = slice(None)) -> Array:
         """Functions for height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
-        axis, of_node, number = self._factors[:3, i]
-        xi, eta = X
+        (xi, eta), (m, n), (of_axis, of_section, node, number) = X, self._along, self._places
+        A, dA = [hermite_basis(m, xi, d) for d in (0, 1)]
         if not self.section.number:
-            value, slope = [hermite_basis(self._along[0], xi, d)[i] for d in (0, 1)]
-            return np.array([value, slope, 0.0 * value])
-        out = np.zeros((3, len(axis), *xi.shape), np.result_type(X, float))
-        of_axis, of_section = axis >= 0, axis < 0
-        for d in (0, 1):
-            out[d, of_axis] = hermite_basis(self._along[0], xi, d)[axis[of_axis]]
-        if self.section.number:
-            of_node, number = of_node[of_section], number[of_section]
-            S, dS = [hermite_basis(self._along[1], xi, d)[of_node] for d in (0, 1)]
-            P, dP = self.section(eta - 0.5)
-            P, dP = P[number], dP[number]
-            out[0, of_section], out[1, of_section], out[2, of_section] = S * P, dS * P, S * dP
-        return out
+            return np.array([A[i], dA[i], 0.0 * A[i]])
+        S, dS = [hermite_basis(n, xi, d).take(node, axis=0) for d in (0, 1)]
+        P, dP = [x.take(number, axis=0) for x in self.section(eta - 0.5)]
+        out = np.zeros((3, len(of_axis) + len(of_section), *xi.shape), np.result_type(X, float))
+        out[0, of_axis], out[1, of_axis] = A, dA
+        out[0, of_section], out[1, of_section], out[2, of_section] = S * P, dS * P, S * dP
+        return out[:, i]
 
     def local(self, X: Array, h: float | Array, i: slice = slice(None),
               rate: float | Array = 0.0) -> tuple[Array, Array, Array, Array]:

@@ -191,6 +191,12 @@ class CableKernel(ElementKernel):
 
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
-        (eps, kappa), kappa0 = first_order(self.strain(u)), self.elements[0].rest[3]
+        e = self.elements[0]
+        length0, kappa0 = e.rest[2:]
+        if np.iscomplexobj(u):
+            eps, kappa = first_order(self.strain(u))
+        else:
+            length, kappa = e.at(self._checked(u))[2][2:]
+            eps, kappa = length - length0, kappa - kappa0
         Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
         return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])

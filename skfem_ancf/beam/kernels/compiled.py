@@ -90,21 +90,22 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
 
     G, R, D = scaled(each(t.G, OF_G))
     own, frame, H = len(G) > 1, each(t.frame, OF_FRAME), each(t.H, OF_H)
-    sigma = np.ones((1, pattern.ns))
+    scales = _NOTHING, _NOTHING
     if len(R) > 1 and not own:
         (g, h), n, (a, b) = pattern.rows, pattern.ns // 2, pattern.pairs
         sigma = R[:, g] * R[:, h] if section else np.concatenate(
             [R[:, g[:n]], R[:, h[n:]] / R[:, g[n:]]], axis=1)
         frame, H = frame / R[:, :, None], H * sigma[:, a] * sigma[:, b]
+        scales = _scales(D), _scales(sigma)
     K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
     P, Q, coupled = map(np.ascontiguousarray, (
         *_products(G[0], pattern.products, own), _coupled(K, Z, D.shape[1])))
-    used = G.any(axis=0).ravel().astype(np.int64)
+    used = (G if own else G[:0]).any(axis=0).ravel().astype(np.int64)
     return CompiledTables(
         kernels, compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
-        _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, _scales(D), _scales(sigma),
-        _blocks(frame), _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled,
-        t.law, t.along, _blocks(each(t.weights, OF_WEIGHTS)))
+        _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
+        _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, t.along,
+        _blocks(each(t.weights, OF_WEIGHTS)))
 
 
 def _rest(x):
@@ -117,8 +118,9 @@ def _blocks(x):
     """(1 or ne, n, ...) to (1 or blocks, n, ... W); the last element fills the last block."""
     if x.size == 0:
         return np.zeros((0, x.shape[1], 0))
-    x = np.repeat(x, W, axis=0) if len(x) == 1 else np.concatenate(
-        [x, np.repeat(x[-1:], -len(x) % W, axis=0)])
+    if len(x) == 1:
+        return x[..., None].repeat(W, axis=-1).reshape(1, x.shape[1], -1)
+    x = np.concatenate([x, np.repeat(x[-1:], -len(x) % W, axis=0)])
     x = x.reshape(len(x) // W, W, *x.shape[1:])
     last = np.ascontiguousarray(x.transpose(0, *range(2, x.ndim), 1))
     return last.reshape(len(x), x.shape[2], -1)
@@ -139,9 +141,9 @@ def _products(G, products, own):
     if own:
         return np.zeros((0, 0)), np.zeros((0, 0))
     (i, j), (a, b), (g, h) = _lower(G.shape[1], 0), _lower(G.shape[1], -1), products
-    one, two, skew = G[g].T, G[h].T, g != h
-    return (one[i] * two[j] + one[j] * two[i],
-            one[a][:, skew] * two[b][:, skew] - one[b][:, skew] * two[a][:, skew])
+    both = G[g].T[:, None] * G[h].T
+    other = both.swapaxes(0, 1)
+    return (both + other)[i, j], (both - other)[a, b][:, g != h]
 
 
 def _symmetric_and_skew(C, D):
