@@ -262,6 +262,9 @@ def require_index(name: str, value: object, n: int) -> int:
     return require_integer(name, value, -n, n - 1) % n
 
 
+_FLOAT = np.dtype(float)
+
+
 def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None,
                    example: str = "") -> Array:
     """An array of finite real numbers as float64; None in ``shape`` is any extent.
@@ -269,7 +272,7 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     The message on a wrong shape ends with the value, and with an ``example`` of what works.
     """
     given = array
-    if not (type(array) is np.ndarray and array.dtype == np.float64):
+    if not (type(array) is np.ndarray and array.dtype is _FLOAT):
         array = _real_array(name, array)
     if shape is not None and array.shape != shape and (array.ndim != len(shape) or True in [
             wanted not in (None, n) for wanted, n in zip(shape, array.shape)]):

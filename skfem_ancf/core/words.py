@@ -8,7 +8,7 @@ from __future__ import annotations
 from ctypes import addressof, c_char
 from functools import cache
 from struct import Struct
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
 
@@ -17,6 +17,8 @@ _DTYPES, _FLOAT, _INTEGER = (
     frozenset([np.dtype(float), np.dtype(np.int64)]), Struct("d"), Struct("q"))
 #: A ctypes array that may lie anywhere.
 _NOTHING = c_char * 0
+
+T = TypeVar("T")
 
 
 class Words:
@@ -32,6 +34,16 @@ class Words:
         self.address = self.words.ctypes.data
 
 
+_CONSTANT: dict[int, Words] = {}
+
+
+def constant(x: T) -> T:
+    """A named tuple that lives as long as the process, whose words are made once."""
+    words = Words(cast("tuple[Any, ...]", x))
+    _CONSTANT[id(x)] = words
+    return x
+
+
 @cache
 def hints(kind: Any) -> tuple[Any, ...]:
     """Types of the fields of a named tuple."""
@@ -45,7 +57,11 @@ def _collect(x, found):
                 raise TypeError(f"{type(x).__name__} takes contiguous arrays of floats or integers")
             found += _address(value) if value.size else 0, *value.shape
         elif isinstance(value, tuple):
-            _collect(value, found)
+            known = _CONSTANT.get(id(value))
+            if known is None:
+                _collect(value, found)
+            else:
+                found += known.words.tolist()
         elif isinstance(value, Words):
             found += value.words.tolist()
         elif hint is float:

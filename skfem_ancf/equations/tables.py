@@ -18,17 +18,18 @@ from ..beam.kernels.tables import linearised
 from ..core.callbacks import handle_of
 from ..core.sampling import sample
 from ..core.source import F1, I1
+from ..core.words import constant
 from ..actions.tables import JointTables, LoadTables
 from .user_defined import UserDefined
 from ..core.types import Array
 
 #: Empty tables.
 _NO_INTS = np.zeros(0, np.int64)
-_NO_JOINTS = JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
-                         np.zeros(0), 0)
-_NO_MOMENTS = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
-                         np.zeros(0), _NO_INTS)
-_NO_BODY = FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64))
+_NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
+                                  np.zeros(0), 0))
+_NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
+                                  np.zeros((0, 2)), np.zeros(0), _NO_INTS))
+_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64)))
 _NO_EIGENSTRAINS = np.zeros((0, 0))
 
 

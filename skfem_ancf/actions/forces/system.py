@@ -11,6 +11,7 @@ import numpy as np
 
 from ...beam.domain import Domain
 from ...core.types import Array
+from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
 from .base import ForceElement, Part, Remembering, recalled
@@ -351,8 +352,8 @@ class Forces:
 
 _X, _I = np.zeros(0), np.zeros(0, np.int64)
 #: For scenes without force elements.
-NO_FORCES = ForceTables(_X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I,
-                        0, NO_CONTACTS)
+NO_FORCES = constant(ForceTables(
+    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS))
 
 
 def _resists(part):
