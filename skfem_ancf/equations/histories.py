@@ -102,7 +102,7 @@ class Histories:
 
     def get(self) -> Array | None:
         """A copy of the history that is set; None if nothing has happened."""
-        return None if np.array_equal(self.values, self.rest) else self.values.copy()
+        return None if (self.values == self.rest).all() else self.values.copy()
 
     def begin(self, u: Array, t: float, history: Array | None = None) -> Array | None:
         """Set the history of a start at u and t, or a given one; returns it.
@@ -117,6 +117,8 @@ class Histories:
     def accept(self, u0: Array, u: Array, t: float) -> float:
         """Set the history after an increment in statics from u0 to u; returns what it dissipates.
         """
+        if not self.values.size:
+            return 0.0
         lost = self._forces.settle(u, t) + sum(item.settle(u0, u, t) for item in self._items)
         for beam, s in self._beams:
             for e in self.kernel(beam).elements:
