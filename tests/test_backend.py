@@ -90,13 +90,13 @@ def test_work_in_numpy_is_counted_until_compiling_pays(auto, monkeypatch):
     """Many small solutions are one large task, and so are an analysis or steps of it."""
     s, loads = auto
     one, price = ITERATIONS * s.system.backend.seconds(1), backend.compiling(
-        s.system.backend._missing("balance")) / backend.SERVES
+        s.system.backend._missing("equilibrium")) / backend.SERVES
     number = 0
     while not loads and number < 1000:
         reason = s.plan()["compiled loop"]
         s.solve_static()
         number += 1
-    assert loads == ["balance"]
+    assert loads == ["equilibrium"]
     assert number == pytest.approx(price / one, abs=1)  # as the last of them would pay it
     assert "s once, in this process NumPy takes about" in reason
     assert scene().plan()["compiled loop"].endswith("compiled code is loaded")
@@ -114,7 +114,7 @@ def test_code_on_disk_is_loaded_sooner_but_not_at_once(auto, monkeypatch):
                                    abs=1)
     assert backend._worked > 0.0  # other functions follow at once
     s.integrate(0.02, 1e-3)
-    assert loads[0] == "balance" and loads[-1] == "steps"
+    assert loads[0] == "equilibrium" and loads[-1] == "steps"
 
 
 def test_small_tasks_run_in_numpy(auto):

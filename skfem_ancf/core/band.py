@@ -29,7 +29,7 @@ REPEATED = 1e-13
 
 
 #: Addresses of the compiled functions of bands, see :mod:`skfem_ancf.core.loops`.
-ADDRESSES = np.zeros(4, np.int64)
+ADDRESSES = np.zeros(5, np.int64)
 
 
 class Band(NamedTuple):
@@ -203,6 +203,22 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
     if not solve_dependent(S, b):
         return False
     x -= b @ Y
+    return True
+
+
+@source
+def solve_definite(A, L, fixed, b, x):
+    """x = A^-1 b by L D L^T factors in L, with these rows fixed; False unless A is definite."""
+    fix(A, fixed)
+    copy(A.flat, L.flat)
+    copy(b, x)
+    if not factorize(L):
+        return False
+    rows = L.flat.reshape(x.size, L.ld)
+    for j in range(x.size):
+        if not rows[j, 0] > 0.0:
+            return False
+    solve(L, x)
     return True
 
 

@@ -155,21 +155,34 @@ def compiled(function: Any) -> Any:
 def entry(function: Any, args: Any) -> Any:
     """A compiled function for Python, for arguments of these types; named tuples become words.
 
-    If the first argument is a named tuple, the function takes the address of its words.
+    If the first argument is a named tuple, the function takes the address of its words. Named
+    tuples of numbers are passed as these.
     """
     names: dict[str, Any] = {"function": njit(inline="always", **OPTIONS)(function)}
-    given = [f"a{k}" for k in range(len(args))]
+    takes, given, signature = list[str](), list[str](), list[Any]()
     for k, x in enumerate(args):
-        if isinstance(x, tuple):
-            names[f"read{k}"], given[k] = reader(type(x)), f"read{k}(a{k})"
-    arguments = ", ".join(f"a{k}" for k in range(len(args)))
-    code = f"def run({arguments}):\n    return function({', '.join(given)})\n"
+        one = [f"a{k}"]
+        if not isinstance(x, tuple):
+            given += one
+            signature.append(typeof(x))
+        elif _of_numbers(x):
+            one = [f"a{k}_{name}" for name in x._fields]
+            names[f"kind{k}"] = type(x)
+            given.append(f"kind{k}({', '.join(one)})")
+            signature += map(type_of, hints(type(x)))
+        else:
+            names[f"read{k}"] = reader(type(x))
+            given.append(f"read{k}(a{k})")
+            signature.append(types.int64)
+        takes += one
+    code = f"def run({', '.join(takes)}):\n    return function({', '.join(given)})\n"
     exec(compile(code, function.__code__.co_filename, "exec"), names)  # noqa: S102
     run = names["run"]
     run.__name__, run.__module__ = function.__name__, function.__module__
-    signature = tuple(types.int64 if isinstance(x, tuple) else typeof(x) for x in args)
-    found = _kept(_named(run), lambda **kept: njit(signature, nogil=True, **kept, **OPTIONS))
+    found = _kept(_named(run), lambda **kept: njit(tuple(signature), nogil=True, **kept, **OPTIONS))
     tuples = [k for k, x in enumerate(args) if k > 0 and isinstance(x, tuple)]
+    flat = [k for k in reversed(tuples) if _of_numbers(args[k])]  # the last first
+    tuples = [k for k in tuples if k not in flat]
     known: dict[int, Words] = {}
 
     def call(*args):
@@ -180,9 +193,16 @@ def entry(function: Any, args: Any) -> Any:
                 words = _words(args[k], known)
             numbers[k] = words.address
             alive += (words,)
+        for k in flat:
+            numbers[k:k + 1] = numbers[k]
         return found(*numbers)
 
-    return call if tuples else found
+    return call if tuples or flat else found
+
+
+def _of_numbers(x):
+    """True if a named tuple has numbers only."""
+    return all(hint in SCALARS for hint in hints(type(x)))
 
 
 #: Number of tuples whose words are cached.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse import coo_matrix, csc_matrix, issparse
 
-from .band import HALVES, SPARE, Band, solve
+from .band import HALVES, SPARE, Band, as_lapack, solve_many
 from .types import Array
 
 #: Eigenvalue that is round-off, for a unit diagonal.
@@ -191,21 +191,24 @@ class BandMatrix:
         if self._factor[0] == "pb":
             return lapack.dpbtrs(self._factor[1], b, lower=1)[0]
         if self._factor[0] == "ldl":
-            x = np.array(b, dtype=float)
-            solve(self.band, x)
-            return x
+            x = np.array(b.T, dtype=float, ndmin=2)
+            solve_many(self._factor[1], x, x)
+            return x.T.reshape(b.shape)
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
 
-    def take_factors(self) -> None:
-        """Declare that the entries are now factors of :mod:`skfem_ancf.core.band`."""
-        self._factor = ("ldl",) if self.symmetric else ("gb", self.ab, self.band.pivots)
+    def take_factors(self, band: Band) -> None:
+        """Take its factors of :mod:`skfem_ancf.core.band`, which may have replaced its entries."""
+        ab = band.flat.reshape(self.n, self._ld).T
+        self._factor = ("ldl", band) if self.symmetric else ("gb", ab, band.pivots)
+        self.positive_definite = self.definite
 
     def to_cholesky(self) -> None:
         """Convert L D L^T factors with positive D to Cholesky factors."""
         if self._factor[0] == "ldl":
-            c = self.ab * np.sqrt(self.ab[0])
-            c[0] = np.sqrt(self.ab[0])
+            ab = as_lapack(self._factor[1])
+            c = ab * np.sqrt(ab[0])
+            c[0] = np.sqrt(ab[0])
             self._factor = ("pb", np.asfortranarray(c))
 
     @property
@@ -214,14 +217,14 @@ class BandMatrix:
         if self._factor is None or not self.symmetric:
             return False
         if self._factor[0] == "ldl":
-            return bool(np.minimum.reduce(self._flat[::self._ld]) > 0.0)
+            return bool(np.minimum.reduce(self._factor[1].flat[::self._ld]) > 0.0)
         return self._factor[0] == "pb"
 
     def pivots(self) -> Array:
         """Pivots (n,) of the factors of a symmetric matrix."""
         if self._factor[0] == "pb":
             return self._factor[1][0] ** 2
-        return self._flat[::self._ld].copy()
+        return self._factor[1].flat[::self._ld].copy()
 
     def inertia(self) -> Inertia:
         """Inertia of a symmetric matrix, by Sylvester's law.
@@ -288,8 +291,8 @@ class BandMatrix:
         """Sign of the determinant, 1 or -1."""
         if self._factor is None:
             self.factorize()
-        if self._factor[0] == "pb":
-            return 1
+        if self._factor[0] != "gb":
+            return -1 if int(np.sum(self.pivots() < 0.0)) % 2 else 1
         _, lu, pivots = self._factor
         exchanges = int(np.sum(pivots != np.arange(self.n)))
         return -1 if (exchanges + int(np.sum(lu[2 * self.bandwidth] < 0.0))) % 2 else 1

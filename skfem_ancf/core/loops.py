@@ -27,7 +27,7 @@ def multiply(A, x, y):
 
 def factorize(A):
     done = np.empty(1)
-    _call_factorize(A.kernels[1], (A, done))
+    _call_factorize(A.kernels[1 if A.top == 0 else 3], (A, done))
     return done[0] > 0.0
 
 
@@ -37,7 +37,7 @@ def solve(A, x):
 
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
     done = np.empty(1)
-    _call_joined(A.kernels[3], (A, J, J1, free, anew, Y, S, b, x, done))
+    _call_joined(A.kernels[4], (A, J, J1, free, anew, Y, S, b, x, done))
     return done[0] > 0.0
 
 
@@ -102,13 +102,13 @@ def add_multiple(c, x, y):
 
 
 @source
+def put_symmetric_factors(A, done):
+    done[0] = 1.0 * _factorize_lower(A.flat, A.ld, A.width)
+
+
+@source
 def put_factors(A, done):
-    if A.top > 0:
-        done[0] = 1.0 * _exchanging(A)
-    elif A.top < 0:
-        done[0] = 1.0 * _factorize_halves(A)
-    else:
-        done[0] = 1.0 * _factorize_lower(A.flat, A.ld, A.width)
+    done[0] = 1.0 * _exchanging(A) if A.top > 0 else 1.0 * _factorize_halves(A)
 
 
 @source
@@ -423,9 +423,11 @@ def put_joined(A, J, J1, free, anew, Y, S, b, x, done):
 
 
 #: Large functions with annotations of their arguments, in the order of their addresses.
-BANDS = {put_product: (Band, F1, F1), put_factors: (Band, F1), put_solution: (Band, F1),
-         put_joined: (Band, F2, F2, F1, bool, F2, F2, F1, F1, F1)}
-_call_multiply, _call_factorize, _call_solve, _call_joined = (
+BANDS = {put_product: (Band, F1, F1), put_symmetric_factors: (Band, F1), put_solution: (Band, F1),
+         put_factors: (Band, F1), put_joined: (Band, F2, F2, F1, bool, F2, F2, F1, F1, F1)}
+#: Those of statics are the first three.
+STATIC = 3
+_call_multiply, _call_factorize, _call_solve, _, _call_joined = (
     caller(*hints) for hints in BANDS.values())
 
 

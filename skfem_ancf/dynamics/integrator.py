@@ -278,7 +278,7 @@ class Integrator:
         if dt != self.dt:
             self.dt, state.factors[0] = dt, 0
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
-        call = self._backend.of(function, OF_STEP * len(rows))
+        call = self._backend.of(function, OF_STEP * len(rows), calls=True)
         pivots = self._matrices.U.pivots
         if pivots.any() and not isinstance(call, partial):  # compiled code has none
             pivots[:], state.factors[0] = 0, 0

@@ -23,13 +23,14 @@ logger = logging.getLogger(__name__)
 #: Compiled functions and parts of this process by name.
 LOADED: dict[str, Any] = {}
 #: Parts that are called by address and that most scenes use, and those of some functions.
-PARTS = "StrainTables", "elements", "contacts", "bands", "unsymmetric"
-NEEDED = {"steps": ["bands", "unsymmetric"], "collocate": ["bands", "gradients"]}
+PARTS = "StrainTables", "elements", "contacts", "band", "bands", "unsymmetric"
+NEEDED = {"equilibrium": ["band"], "steps": ["band", "bands", "unsymmetric"],
+          "collocate": ["band", "bands", "gradients"]}
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
 COMPILING = {"StrainTables": 10.0, "elements": 3.0, "contacts": 11.0, "unsymmetric": 3.0,
-             "bands": 5.0, "balance": 5.0, "tangent": 1.0, "force": 1.0, "linearised": 1.0,
+             "band": 2.0, "bands": 4.0, "equilibrium": 7.0, "tangent": 1.0, "force": 1.0, "linearised": 1.0,
              "steps": 20.0}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
@@ -146,35 +147,32 @@ class Backend:
         return (sum(beam.mesh.nelements for beam in system.beams),
                 sum(len(group.first) for _, group in system.forces.contacts.groups))
 
-    def of(self, kernel: Callable, iterations: float = 1.0) -> Callable:
+    def of(self, kernel: Callable, iterations: float = 1.0, calls: bool = False) -> Callable:
         """A kernel bound to the equations, its first argument, in NumPy or compiled.
 
-        ``iterations`` are those of the work that is done with it. NumPy may warn of overflow.
+        ``iterations`` are those of the work that is done with it. With ``calls`` it calls Python.
+        NumPy may warn of overflow.
         """
-        return self.leaves(kernel, iterations=iterations)[0]
-
-    def leaves(self, *kernels: Callable, iterations: float) -> list[Callable]:
-        """As :meth:`of` for some kernels, all as the first is chosen."""
         global _worked
-        if self.choose(kernels[0].__name__, iterations).way == "plain":
+        if self.choose(kernel.__name__, iterations).way == "plain":
             _worked += self.seconds(iterations)
-            return [self._in_numpy(kernel) for kernel in kernels]
-        return [self._compiled(kernel) for kernel in kernels]
+            return self._in_numpy(kernel)
+        return self._compiled(kernel, calls or self.tables.calls_back)
 
     def _in_numpy(self, kernel):
         return partial(kernel, self.tables.plain)
 
-    def _compiled(self, kernel):
+    def _compiled(self, kernel, calls):
         loaded: list[Any] = []
 
         def run(*args):
             if not loaded:
-                loaded.append(self._loaded(kernel, args))
+                loaded.append(self._loaded(kernel, args, calls))
             return loaded[0](*args)
 
         return run
 
-    def _loaded(self, kernel, args):
+    def _loaded(self, kernel, args, calls):
         """A kernel as the first call needs it: compiled, or in NumPy if that is impossible."""
         if PROBLEMS or self._plain is not None:  # found since it was chosen
             return self._in_numpy(kernel)
@@ -183,7 +181,7 @@ class Backend:
         except Exception as error:  # a user's function, or an incompatible Numba
             self._give_up(kernel, error)
             return self._in_numpy(kernel)
-        if kernel.__name__ not in NEEDED and not self.tables.calls_back:
+        if not calls:
             return function
 
         def interruptible(*args):
@@ -191,6 +189,10 @@ class Backend:
                 return function(*args)
 
         return interruptible
+
+    def keep_factors(self) -> None:
+        """Let the tangent have the factors of the last compiled iteration."""
+        self.tables.system.K.take_factors(self._flat[0].factors)
 
     def _give_up(self, kernel, error):
         if isinstance(error, code_cache.NotCompiled):

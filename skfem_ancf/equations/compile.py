@@ -23,7 +23,7 @@ def compile_all() -> None:
                        StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.01)).clamp("left")
     system, zero = scene.system, np.zeros(scene.system.N)
     works: dict[str, Callable[[], object]] = {
-             "balance": lambda: scene.solve_static(),
+             "equilibrium": lambda: scene.solve_static(),
              "tangent": lambda: system.assemble(zero),
              "force": lambda: system.internal_force(zero + 1e-9),
              "linearised": lambda: system.linearised_stress(

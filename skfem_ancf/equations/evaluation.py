@@ -11,7 +11,7 @@ from ..actions.tables import (add_joint_force, add_load_stiffness, constraint,
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
 from ..core.band import diagonal, dot, largest, weighted_square
-from ..core.source import F1, indices, source
+from ..core.source import indices, primitive, source
 
 
 @source
@@ -56,34 +56,33 @@ def linearised(e, u, du, stresses, independent):
 class Target(NamedTuple):
     """The static equilibrium to find."""
 
-    factors: F1  # of the loads
-    before: F1  # the same for the first tangent
     scale: float  # load factor of user-defined loads
     when: float  # time of loads; NaN for full size
     at: float  # time of joints
-    c: F1  # tables of the joints at that time
-    g: F1
-    gap: F1  # residual that may remain, (N,)
-    prescribed: F1  # required changes of the fixed DOFs
+    moving: bool  # fixed DOFs have to move
+    solver: int  # handle of the linear solver
+    definite: bool  # compiled code may solve by itself, as long as the tangent is definite
 
 
 #: Rows of the vectors of a static iteration: displacement and its last correction, internal and
-#: external force, residual, inverse diagonal of the tangent.
-U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, ROWS = range(7)
+#: external force, residual, inverse diagonal of the tangent; residual that may remain, and
+#: prescribed changes of the fixed DOFs.
+U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, MOVED, ROWS = range(9)
 #: Smallest stiffness of a DOF in norms, relative to the mean; DOFs of a rigid body have none.
 SMALLEST = 1e-14
 
 
 @source
-def balance(e, target, first, last, mixed, x, m, stresses, out):
+def balance(e, target, factors, acting, first, last, mixed, g, x, m, stresses):
     """Set forces, residual, tangent and its inverse diagonal; if ``last``, without the tangent.
 
-    ``m`` are the multipliers and residuals of joints, ``stresses`` those of the strain and the
-    independent ones. If ``mixed``, the geometric part uses the last stresses, linearised along the
-    correction. To ``out`` go the norms of residual and larger force, and the largest relative
-    residual of joints.
+    ``acting`` are the load factors for the tangent; ``m`` the multipliers and residuals of joints,
+    and in row 3 their c; ``stresses`` those of the strain and the independent ones. If ``mixed``,
+    the geometric part uses the last stresses, linearised along the correction. Returns the norms of
+    residual and larger force, and the largest relative residual of joints.
     """
     u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
+    gap, opened = x[GAP], 0.0
     if last:
         force(e, u, target.at, f)
     else:
@@ -92,28 +91,26 @@ def balance(e, target, first, last, mixed, x, m, stresses, out):
             for i in indices(u.size):
                 before[i] = u[i] - du[i]
             linearised(e, before, du, stresses[0], stresses[1])
-        factors = target.before if first else target.factors
         t = np.inf if first and np.isnan(target.when) else target.when
-        tangent(e, u, factors, t, target.scale, target.at, mixed, stresses[0], stresses[1], f)
+        tangent(e, u, acting, t, target.scale, target.at, mixed, stresses[0], stresses[1], f)
         diagonal(e.K, weights)
         invert(weights, e.sizes)
-    external_force(e.loads, target.factors, target.when, target.scale, u, load)
+    external_force(e.loads, factors, target.when, target.scale, u, load)
     for i in indices(u.size):
-        R[i] = load[i] - f[i] - target.gap[i]
-    out[2] = 0.0
+        R[i] = load[i] - f[i] - gap[i]
     if phi.size > 0:
-        constraint(e.joints, target.c, target.g, target.at, u, phi)
+        constraint(e.joints, m[3], g, target.at, u, phi)
         opening, pull = np.empty(phi.size), np.zeros(u.size)
         for k in indices(phi.size):
             opening[k] = phi[k] / e.joints.sizes[k]
-        out[2] = largest(opening)
-        add_joint_force(e.joints, target.g, target.at, u, m[0], pull)
+        opened = largest(opening)
+        add_joint_force(e.joints, g, target.at, u, m[0], pull)
         for i in indices(u.size):
             R[i] -= pull[i]
     for i in indices(u.size):
         R[i] *= e.free[i]
-    out[0] = np.sqrt(weighted_square(R, weights))
-    out[1] = np.sqrt(max(weighted_square(f, weights), weighted_square(load, weights)))
+    size = np.sqrt(max(weighted_square(f, weights), weighted_square(load, weights)))
+    return np.sqrt(weighted_square(R, weights)), size, opened
 
 
 @source
@@ -138,8 +135,14 @@ def mean_stiffness(diagonal, sizes):
 LEFT, TRIES, PARTS = 0.5, 12, 16
 
 
-@source
+@primitive("skfem_ancf.equations.loops")
 def hold_back(e, t, u, R, du, dm):
+    """:func:`put_hold_back`, in compiled code by address."""
+    put_hold_back(e, t, u, R, du, dm)
+
+
+@source
+def put_hold_back(e, t, u, R, du, dm):
     """Line search for a correction that runs into obstacles; scales du and dm.
 
     The residual along the correction, of the equations linearised without contact plus the actual

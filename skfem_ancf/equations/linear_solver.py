@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.band import fix
 from ..core.caching import cached_property
+from ..core.callbacks import handle_of
 from ..core.linalg import NO_FACTORS, BandMatrix, Inertia
 from ..core.types import Array
 from .condensation import Condensed
@@ -33,7 +34,7 @@ class LinearSolver:
     """
 
     def __init__(self, system: Any) -> None:
-        self._system = proxy(system)
+        self._system, self.handle = proxy(system), handle_of(self)
         self._at: tuple[Array, float] = np.zeros(0), 0.0
         self._joined: Schur | NullSpace | None = None
         self._pattern = Pattern()

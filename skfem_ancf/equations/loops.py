@@ -15,17 +15,18 @@ from ..beam.strain_energy import FlatBody
 from ..core.band import ADDRESSES
 from ..core.code_cache import NotCompiled
 from ..core.jit import MADE, address, caller, compiled, reader
-from ..core.loops import BANDS
 from ..core.immutable import ours
+from ..core.loops import BANDS, STATIC
 from ..core.source import F1, F2, F3
 from ..core.words import Words
+from .evaluation import put_hold_back
 from .tables import Equations
 
 _KINDS = Annotated[Kinds, MADE], int, F1, F1, float, F1
 _CONTACTS = ContactTables, Annotated[Question, MADE], F1, F1, F1
-_LAW = F1, F3, F3
+_LAW, _HELD = (F1, F3, F3), (Equations, float, F1, F1, F1, F1)
 _read, _call_law = reader(CompiledTables), caller(*_LAW)
-_call_kinds, _call_contacts = caller(*_KINDS), caller(*_CONTACTS)
+_call_kinds, _call_contacts, _call_hold_back = caller(*_KINDS), caller(*_CONTACTS), caller(*_HELD)
 
 
 def tables_of(body, k):
@@ -141,12 +142,17 @@ def run_kinds(tables, what, y, w, factor, out):
         _call_kinds(tables.address, (kinds, what, y, w, factor, out))
 
 
+def hold_back(e, t, u, R, du, dm):
+    _call_hold_back(e.forces.contacts.search, (e, t, u, R, du, dm))
+
+
 def run_contacts(tables, asked, u, v, out):
     _call_contacts(tables.address, (tables, asked, u, v, out))
 
 
 #: Other separately compiled functions, with annotations of their arguments.
-PARTS = {"elements": (of_kinds, _KINDS), "contacts": (of_contacts, _CONTACTS)}
+PARTS = {"elements": (of_kinds, _KINDS), "contacts": (of_contacts, _CONTACTS),
+         "hold_back": (put_hold_back, _HELD)}
 
 
 @cache
@@ -154,8 +160,9 @@ def part(name: str) -> int:
     """Compile or load a part; the address of one of :data:`PARTS`, else 0."""
     for kernel, k in KERNELS.get(name, {}).items():
         _ADDRESSES[k] = address(kernel, _HINTS[kernel])
-    if name == "bands":
-        ADDRESSES[:] = [address(*one) for one in BANDS.items()]
+    if name in ("band", "bands"):
+        some = slice(STATIC) if name == "band" else slice(STATIC, None)
+        ADDRESSES[some] = [address(*one) for one in list(BANDS.items())[some]]
     return address(*PARTS[name]) if name in PARTS else 0
 
 
@@ -191,14 +198,16 @@ def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
     forces, loads = plain.forces, plain.loads
     body = _flat_body(plain.body, words)
     if forces.contacts.number > 0:
-        forces = forces._replace(contacts=forces.contacts._replace(address=part("contacts")))
+        forces = forces._replace(contacts=forces.contacts._replace(
+            address=part("contacts"), search=part("hold_back")))
     if forces.number > 0:
         forces = forces._replace(address=part("elements"))
     if len(loads.eigenstrains):
         loads = loads._replace(eigenstrained=_flat_body(loads.eigenstrained, words))
     viscous, copies = (body if x is plain.body else _flat_body(x, words)
                        for x in (plain.viscous, plain.copies))
-    found = plain._replace(body=body, viscous=viscous, copies=copies, forces=forces, loads=loads)
+    found = plain._replace(body=body, viscous=viscous, copies=copies, forces=forces, loads=loads,
+                           factors=plain.K._replace(flat=np.empty(plain.K.flat.size)))
     return found, Words(found), words
 
 

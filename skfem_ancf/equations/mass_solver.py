@@ -37,7 +37,7 @@ class MassSolver:
                 raise InputError("the mass matrix is singular to round-off: a mass or inertia of "
                                  f"{shown(s.forces.masses)} is too large compared with the beams")
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
-        M.take_factors()
+        M.take_factors(M.band)
         if not self.by_nodes and M.definite:
             M.to_cholesky()  # for LAPACK; kernels use the band
         return M

@@ -31,6 +31,7 @@ _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)
                                   np.zeros((0, 2)), np.zeros(0), _NO_INTS))
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, KIND + 1), np.int64)))
 _NO_EIGENSTRAINS = np.zeros((0, 0))
+_NO_FACTORS = Band(np.zeros(0), _NO_INTS, 1, 0, 0)
 
 
 class Equations(NamedTuple):
@@ -49,6 +50,7 @@ class Equations(NamedTuple):
     history: F1  # Histories.values
     span: F1  # Histories.span
     lasting: int  # 1 if steps change the history
+    factors: Band  # work of compiled code: factors of K
 
 
 class Tables:
@@ -73,7 +75,8 @@ class Tables:
                                system.constraints.fixed, system.constraints.mask, system.K.band,
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes,
-                               histories.values, histories.span, int(histories.lasting))
+                               histories.values, histories.span, int(histories.lasting),
+                               _NO_FACTORS)
 
     @property
     def system(self) -> Any:
@@ -93,7 +96,7 @@ class Tables:
         forces, packs = self.plain.forces, self.plain.body.packs
         used = {"StrainTables": len(packs) > 0, "elements": forces.number > 0,
                 "laws": any(t.law.kind != LINEAR for t in packs),
-                "contacts": forces.contacts.number > 0,
+                "contacts": forces.contacts.number > 0, "hold_back": forces.contacts.number > 0,
                 "eigenstrains": len(self.plain.loads.eigenstrains) > 0}
         return [name for name, yes in used.items() if yes]
 
@@ -140,10 +143,11 @@ class Tables:
     @property
     def stresses(self) -> Array:
         """A work array for the stresses of all beams."""
-        return np.zeros(self._stress_size)
+        return np.zeros(self.stresses_size)
 
     @cached_property
-    def _stress_size(self):
+    def stresses_size(self) -> int:
+        """Number of stresses of all beams."""
         return stress_size(self.plain.body)
 
     # loads

@@ -35,7 +35,7 @@ def make_plan(system: System, kind: str) -> Plan:
         plan["compiled loop"] = "no: one solve"
     else:
         way, reason = (system.backend.choose("steps", STEPS * OF_STEP) if dynamic else
-                       system.backend.choose("balance", ITERATIONS))
+                       system.backend.choose("equilibrium", ITERATIONS))
         plan["compiled loop"] = "no" if way == "plain" else "yes"
         plan["compiled loop"] += f", for {STEPS} steps: {reason}" if dynamic else f": {reason}"
     if dynamic:

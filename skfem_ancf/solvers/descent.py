@@ -11,6 +11,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..actions.forces.springs import Turns
 from ..core.band import fix
+from ..core.callbacks import handle_of
 from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
@@ -96,7 +97,7 @@ class Descent:
     """
 
     def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
-        self.system, self.saw_unstable = system, False
+        self.system, self.saw_unstable, self.handle = system, False, handle_of(self)
         self._weights = position_weights(system)
         self._sizes = system.constraints.coordinate_sizes
         self._radius, self._largest = stride, min(5.0 * stride, LARGEST)

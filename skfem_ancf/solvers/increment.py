@@ -15,7 +15,7 @@ from ..equations.evaluation import Target
 from ..equations.system import System
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
-                        equilibrium)
+                        Start, find_equilibrium)
 from .outcome import Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed, Unstable
 from .touching import SOON, found_touching
 
@@ -103,11 +103,11 @@ class Increment:
         As of a body in a turned scene that just touches an obstacle.
         """
         system, (u, multipliers) = self.system, (self.start.u, self.start.multipliers)
-        target = self._target(system.backend.tables, u)
+        target, *_ = self._target(system.backend.tables, u, multipliers, system.solver)
         force = system.internal_force(u, self.time, self.load)
         missing = self.load * system.external_force(u) - force
         opening = system.constraints.constraint(u, self.load)
-        still = not (np.any(target.prescribed) or np.any(opening))
+        still = not (target.moving or np.any(opening))
         rests = still and stability.is_nothing(system, missing)
         return Equilibrium(u, multipliers, force) if rests else None
 
@@ -201,9 +201,11 @@ class Increment:
         backend = backend or system.backend
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not solver else 0)
-        target = self._target(backend.tables, u)
+        by = solver or system.solver
+        target, start, factors = self._target(backend.tables, u, multipliers, by)
         with np.errstate(all="ignore"):  # overflow shows in the residual
-            x = equilibrium(backend, target, rules, solver or system.solver, u, multipliers)
+            x = find_equilibrium(backend, target, rules, by, start, factors,
+                                 backend.tables.at(self.time))
         n = len(x.works)
         self.record.iterations += n
         self.record.force_residuals += x.residuals
@@ -229,25 +231,30 @@ class Increment:
         except NO_FACTORS:
             solver.forget()
 
-    def _target(self, tables, u):
-        """The :class:`~skfem_ancf.equations.evaluation.Target` of the level."""
-        constraints, route = self.system.constraints, self.options.route
-        gap, clock, fixed = route.gap, self.system.clock, constraints.fixed
-        values = constraints.values(self.time if clock is None else self.load, self.time)
+    def _target(self, tables, u, multipliers, solver):
+        """The Target of the level, the Start, and load factors, for a solver."""
+        system, route = self.system, self.options.route
+        gap, clock, fixed = route.gap, system.clock, system.constraints.fixed
+        values = system.constraints.values(self.time if clock is None else self.load, self.time)
         if gap is None:
-            gap = np.zeros(self.system.N)
+            gap = 0.0
         else:
             begin = route.u[fixed]
             values = begin + self.level * (values - begin)
             gap = (1.0 - self.level) * gap
+        moved, changes = 0.0, values - u[fixed]
+        if moving := bool(np.logical_or.reduce(changes)):
+            moved = np.zeros(system.N)
+            moved[fixed] = changes
         factors = first = tables.static_factors(self.load)
         if tables.prestressed:
             first = tables.static_factors(self.load, route.acting(self.start.load)[0])
         if clock is not None:
             factors = first = self.load * tables.factors(np.array([clock]))[0]
         when = np.nan if clock is None else clock
-        return Target(factors, first, self.load, when, self.time, *tables.at(self.time), gap,
-                      values - u[fixed])
+        definite = solver is system.solver and system.symmetric and not solver.coupled
+        target = Target(self.load, when, self.time, moving, solver.handle, definite)
+        return target, Start(u, multipliers, gap, moved), (factors, first)
 
     def _require_converged(self, status, n, rules):
         if status == CONVERGED:

@@ -7,16 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..actions.tables import add_constraint_rate
-from ..core.band import multiply
+from ..core.band import dot, multiply, solve_definite
+from ..core.callbacks import call_solver
+from ..core.source import indices, source
 from ..core.types import Array
-from ..equations import evaluation
 from ..equations.backend import Backend
-from ..equations.evaluation import ROWS, Target, U
+from ..equations.evaluation import (DU, FORCE, GAP, LOAD, MOVED, RESIDUAL, ROWS, U, Target, balance,
+                                    hold_back)
 
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
 ITERATIONS = 8
-#: How an iteration ends.
-CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
+#: How an iteration ends; the last is that of compiled code whose factors need LAPACK.
+CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE = range(5)
 #: Least number of corrections, unless the initial residual is round-off.
 LEAST = 2
 #: The largest relative residual of joints.
@@ -40,6 +42,15 @@ class Rules(NamedTuple):
     wary: int  # early end: 0, FIRST or WATCHED
 
 
+class Start(NamedTuple):
+    """The start of an iteration, and what may remain or has to move."""
+
+    u: Array  # (N,)
+    multipliers: Array  # (m,)
+    gap: Any  # residual that may remain, (N,), or 0
+    moved: Any  # prescribed changes of fixed DOFs, (N,), or 0
+
+
 class Iterate(NamedTuple):
     """The end of an iteration."""
 
@@ -51,46 +62,59 @@ class Iterate(NamedTuple):
     works: list[float]  # roots of the relative works of the corrections
 
 
-def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: Array,
-                multipliers: Array) -> Iterate:
-    """Iterate to equilibrium from u and the multipliers.
+def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, start: Start,
+                     factors: tuple[Array, Array], joints: tuple[Array, Array]) -> Iterate:
+    """Iterate to equilibrium.
 
     Parameters
     ----------
     backend
         The :class:`~skfem_ancf.equations.backend.Backend` of the equations.
-    target, rules
-        What to find, and how accurately.
+    target, rules, start
+        What to find, how accurately, and where to begin.
     solver
         Its ``solve_into`` solves the linear systems, such as a
         :class:`~skfem_ancf.equations.linear_solver.LinearSolver`.
-    u, multipliers
-        The start, (N,) and (m,); not changed.
+    factors
+        Load factors, (k,), and those of the first tangent.
+    joints
+        c (m,) and g (k,) of the joints at the time.
     """
-    e, at, out = backend.tables.plain, target.at, np.empty(3)
-    evaluate, hold_back = backend.leaves(evaluation.balance, evaluation.hold_back,
-                                         iterations=ITERATIONS)
-    x, m = np.zeros((ROWS, len(u))), np.zeros((2, len(multipliers)))
-    stresses, dm = np.zeros((2, backend.tables.stresses.size)), np.empty(len(multipliers))
-    x[U], m[0] = u, multipliers
-    u, du, force, load, R, _ = x
-    multipliers, phi = m
-    residuals: list[float] = []
-    works: list[float] = []
-    quiet, moving = False, bool(np.logical_or.reduce(target.prescribed))
+    x, m = np.zeros((ROWS, len(start.u))), np.zeros((4, len(start.multipliers)))
+    stresses, works = np.zeros((2, backend.tables.stresses_size)), np.empty(rules.iterations)
+    x[U], x[GAP], x[MOVED], residuals = start.u, start.gap, start.moved, np.empty(len(works) + 1)
+    m[0], m[3] = start.multipliers, joints[0]
+    run = backend.of(equilibrium, ITERATIONS, calls=not target.definite)
+    status, n, k, definite = run(target, rules, *factors, joints[1], x, m, stresses, residuals,
+                                 works)
+    if status == INDEFINITE:
+        return find_equilibrium(backend, target._replace(definite=False), rules, solver, start,
+                                factors, joints)
+    if definite:
+        backend.keep_factors()
+    return Iterate(status, x[U].copy(), m[0].copy(), x[FORCE].copy(), residuals[:n].tolist(),
+                   works[:k].tolist())
+
+
+@source
+def equilibrium(e, target, rules, factors, first, g, x, m, stresses, residuals, works):
+    """Iterate from x[U] and the multipliers m[0].
+
+    Returns the status, the numbers of residuals and of works written, and whether the last factors
+    are those of ``e.factors``.
+    """
+    u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
+    multipliers, phi, dm = m[0], m[1], m[2]
+    by_band = target.definite and e.factors.flat.size > 0
+    quiet, last, moving, k = False, False, target.moving, 0
     work = before = reference = np.inf
-    status = NOT_CONVERGED
-    for k in range(rules.iterations + 1):
+    while True:
         # the last residual needs no tangent
-        part = work / before if k > 1 and 0.0 < work < before else 1.0
-        last = (k >= LEAST or (k > 0 and quiet)) and (
-            work * part <= rules.tol * reference + rules.floor)
-        evaluate(target, k == 0, last, rules.mixed and k > 0, x, m, stresses, out)
-        rho, size, opening = out.tolist()
+        rho, size, opening = balance(e, target, factors, first if k == 0 else factors, k == 0,
+                                     last, rules.mixed and k > 0, g, x, m, stresses)
         if not rho < 1e300:
-            status = NOT_FINITE
-            break
-        residuals.append(rho / size if size > 0.0 else 0.0)
+            return NOT_FINITE, k, k, by_band and k > 0
+        residuals[k] = rho / size if size > 0.0 else 0.0
         if k == 0:
             small = rho <= 1e-3 * rules.tol * size
             # round-off, unless the correction shows that it is the load of a slender beam
@@ -98,34 +122,46 @@ def equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, u: 
         else:
             small = last and rho <= rules.tol * size + rules.force_floor
         if small and not moving and opening <= CLOSED:
-            status = CONVERGED
-            break
+            return CONVERGED, k + 1, k, by_band and k > 0
         if k == rules.iterations:
-            break
+            return NOT_CONVERGED, k + 1, k, by_band and k > 0
         if last:
-            evaluate(target, False, False, rules.mixed, x, m, stresses, out)
+            balance(e, target, factors, factors, False, False, rules.mixed, g, x, m, stresses)
         if moving:
-            moved = _move(e, target, u, R, phi)
+            _move(e, target, g, moved, u, R, phi)
+        if by_band:
+            if not solve_definite(e.K, e.factors, e.fixed, R, du):
+                return INDEFINITE, k + 1, k, False
+            good = True
+        else:
+            for i in indices(phi.size):
+                phi[i] = -phi[i]
+            good = call_solver(target.solver, target.at, u, multipliers, R, phi, du, dm)
         before, work = work, np.inf
-        if solver.solve_into(at, u, multipliers, R, -phi, du, dm):
-            work = float(abs(R @ du) + abs(phi @ dm) if phi.size else abs(R @ du)) ** 0.5
+        if good:
+            work = np.sqrt(abs(dot(R, du)) + abs(dot(phi, dm)))
         if not work < 1e300:
-            status = SINGULAR
-            break
+            return SINGULAR, k + 1, k, False
         if moving:
-            du += moved
-        elif e.forces.contacts.number:
-            hold_back(at, u, R, du, dm)
+            for i in indices(u.size):
+                du[i] += moved[i]
+        elif e.forces.contacts.number > 0:
+            hold_back(e, target.at, u, R, du, dm)
         moving = False
-        u += du
-        multipliers += dm
-        reference = float(max(abs(force @ u), abs(load @ u))) ** 0.5
-        works.append(work / reference if reference > 0.0 else 0.0)
-        if rules.wary and _diverging(rules.wary, k, works[-1]):
-            break
-    return Iterate(status, u.copy(), multipliers.copy(), force.copy(), residuals, works)
+        for i in indices(u.size):
+            u[i] += du[i]
+        for i in indices(dm.size):
+            multipliers[i] += dm[i]
+        reference = np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
+        works[k] = work / reference if reference > 0.0 else 0.0
+        k += 1
+        if rules.wary > 0 and _diverging(rules.wary, k - 1, works[k - 1]):
+            return NOT_CONVERGED, k, k, by_band
+        part = work / before if k > 1 and 0.0 < work < before else 1.0
+        last = (k >= LEAST or quiet) and work * part <= rules.tol * reference + rules.floor
 
 
+@source
 def _diverging(wary, k, work):
     """True if correction k indicates that the iteration will not converge."""
     if wary == FIRST:
@@ -133,11 +169,11 @@ def _diverging(wary, k, work):
     return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
 
 
-def _move(e, target, u, R, phi):
-    """The prescribed changes of the fixed DOFs (N,), of which residuals take account."""
-    moved, force = np.zeros(len(u)), np.empty(len(u))
-    moved[e.fixed] = target.prescribed
+@source
+def _move(e, target, g, moved, u, R, phi):
+    """Let residuals take account of the prescribed changes of fixed DOFs, (N,)."""
+    force = np.zeros(u.size)
     multiply(e.K, moved, force)
-    R -= force * e.free
-    add_constraint_rate(e.joints, target.g, target.at, u, moved, phi)
-    return moved
+    for i in indices(u.size):
+        R[i] -= force[i] * e.free[i]
+    add_constraint_rate(e.joints, g, target.at, u, moved, phi)
