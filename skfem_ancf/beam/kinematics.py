@@ -156,9 +156,9 @@ def _flat(beam, X, tind):
 
 
 def shortest(beam: Any, u: Array) -> float:
-    """The smallest axial stretch at the integration points."""
+    """The smallest axial stretch at the integration points, of cables in the outer fibres."""
     return float(beam.kernel.shortest(u) if beam.has_sections else
-                 np.min(beam.kernel.outer_stretches(u)))
+                 beam.kernel.outer_stretches(u).min())
 
 
 def deformation(beam: Any, u: Array) -> tuple[Array, Array]:
@@ -191,15 +191,13 @@ def tangents(beam: Any, u: Array | float) -> Array:
     return (beam.q0_local + u).view(complex)[1::beam.nd // 2]
 
 
-def turning(beam: Any, u: Array) -> float:
-    """Largest rotation of the axis over an element, from its tangents at the nodes."""
-    (left, right), turn = beam.mesh.t, tangents(beam, u) / tangents(beam, 0.0)
-    turn = turn[right] * turn[left].conj()
-    return float(abs(np.arctan2(turn.imag, turn.real)).max())
+def bent(beam: Any, u: Array) -> tuple[float, bool]:
+    """Largest rotation of the axis over an element, and True if it folds back within one.
 
-
-def folded(beam: Any, u: Array) -> bool:
-    """True if the axis folds back within an element: a chord is opposite to an end tangent."""
-    r, r_X = (beam.q0_local + u).view(complex).reshape(-1, beam.nd // 2)[:, :2].T
-    chord = r[beam.mesh.t[1]] - r[beam.mesh.t[0]]
-    return bool(((chord * r_X[beam.mesh.t].conj()).real < 0.0).any())
+    Then a chord is opposite to a tangent at its end.
+    """
+    ends = (beam.q0_local + u).view(complex).reshape(-1, beam.nd // 2)[beam.mesh.t]
+    (left, right), slopes = ends[..., 0], ends[..., 1]
+    back = (right - left).conj() * slopes
+    turn = slopes[1] * slopes[0].conj() * beam.mesh.turns.conj()
+    return (float(abs(np.arctan2(turn.imag, turn.real)).max()), bool((back.real < 0.0).any()))

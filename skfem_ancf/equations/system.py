@@ -20,7 +20,7 @@ from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..beam.beam import Beam
 from ..beam.domain import Domain
-from ..beam.kinematics import folded
+from ..beam.kinematics import bent
 from ..beam.points import Points
 from ..beam.rigid import RigidBody
 from ..core.caching import cached_property
@@ -327,7 +327,7 @@ class System:
 
     def folded(self, u: Array) -> bool:
         """True if the axis folds back within an element."""
-        return any(folded(beam, u[s]) for beam, s in zip(self.beams, self.slices))
+        return any(bent(beam, u[s])[1] for beam, s in zip(self.beams, self.slices))
 
     def stiffness_at_rest(self) -> sparse.csr_array:
         """The stiffness of force elements in the reference configuration, shape (N, N)."""

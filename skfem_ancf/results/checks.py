@@ -136,7 +136,9 @@ def warn_of(state: Any) -> None:
     warn_of_points(state.system)
     for beam, s in zip(state.system.beams, state.system.slices):
         u = state.u[s]
-        for text in _findings(beam, kinematics.shortest(beam, u), turning(beam, u)):
+        shortest = 1.0 if beam.has_sections and not beam.kernel.linear else (
+            kinematics.shortest(beam, u))
+        for text in _findings(beam, shortest, kinematics.bent(beam, u)[0]):
             warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
 
@@ -264,7 +266,7 @@ def _linear_findings(beam, u, base):
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
     """Largest rotation of the axis over an element, from its tangents at the nodes."""
     if base is None:
-        return kinematics.turning(beam, u)
+        return kinematics.bent(beam, u)[0]
     (left, right), turns = beam.mesh.t, _turns(beam, u, base)
     return float(np.max(np.abs(turns[right] - turns[left])))
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.kinematics import turning
+from ..beam.kinematics import bent
 from ..core.caching import cached_property
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
                            require_flag, require_integer, require_option, require_positive)
@@ -428,9 +428,11 @@ class Search:
     def _folds(self, u):
         """True if an axis folds back, or turns too far, within an element."""
         system = self.system
-        return system.folded(u) or any(
-            beam.element.axis_degree <= 7 and turning(beam, u[s]) > FOLDED
-            for beam, s in zip(system.beams, system.slices))
+        for beam, s in zip(system.beams, system.slices):
+            turn, folded = bent(beam, u[s])
+            if folded or (turn > FOLDED and beam.element.axis_degree <= 7):
+                return True
+        return False
 
     def _loose(self, u):
         """An unstabilised motion of an equilibrium, in words, from the last factors."""

@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...core.caching import cached_property
 from ...core.errors import InputError
 from ...core.linear import first_order
 from ...core.quadrature import gauss
@@ -189,14 +190,19 @@ class CableKernel(ElementKernel):
         """Extension and change of curvature at the points, (2, points, ne)."""
         return strains(self.elements[0], self._checked(u)).reshape(2, self.points_number, -1)
 
+    @cached_property
+    def _outer(self):
+        """Coordinates of the bottom and top fibres, and their lengths in the reference."""
+        Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
+        y = np.multiply.outer([-1.0, 1.0], np.atleast_2d(Y))
+        return y, 1.0 - y * self.elements[0].rest[3]
+
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
-        e = self.elements[0]
-        length0, kappa0 = e.rest[2:]
+        e, (y, length) = self.elements[0], self._outer
         if np.iscomplexobj(u):
             eps, kappa = first_order(self.strain(u))
         else:
-            length, kappa = e.at(self._checked(u))[2][2:]
-            eps, kappa = length - length0, kappa - kappa0
-        Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
-        return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])
+            size, kappa = e.at(self._checked(u))[2][2:]
+            eps, kappa = size - e.rest[2], kappa - e.rest[3]
+        return 1.0 + (eps - y * kappa) / length
