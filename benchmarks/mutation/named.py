@@ -83,7 +83,7 @@ NAMED = [
      "gap = 0.0 * gap",
      "test_a_restart_goes_by_way_of_the_loads_between"),
     ("newton: joints do not see moved supports", "solvers/iteration.py",
-     "add_constraint_rate(e.joints, target.g, target.at, u, moved, phi)",
+     "add_constraint_rate(e.joints, g, target.at, u, moved, phi)",
      "pass",
      "test_a_moved_support_and_a_joint_beside_it_take_no_more_iterations"),
     ("newton: no floor for a restart", "solvers/iteration.py",

@@ -191,13 +191,18 @@ def tangents(beam: Any, u: Array | float) -> Array:
     return (beam.q0_local + u).view(complex)[1::beam.nd // 2]
 
 
+def ends(beam: Any, q: Array) -> tuple[Array, Array]:
+    """Positions and derivatives r_X at both ends of each element, complex, of coordinates (N,)."""
+    both = q.view(complex).reshape(-1, beam.nd // 2)[beam.mesh.t]
+    return both[..., 0], both[..., 1]
+
+
 def bent(beam: Any, u: Array) -> tuple[float, bool]:
     """Largest rotation of the axis over an element, and True if it folds back within one.
 
     Then a chord is opposite to a tangent at its end.
     """
-    ends = (beam.q0_local + u).view(complex).reshape(-1, beam.nd // 2)[beam.mesh.t]
-    (left, right), slopes = ends[..., 0], ends[..., 1]
+    (left, right), slopes = ends(beam, beam.q0_local + u)
     back = (right - left).conj() * slopes
-    turn = slopes[1] * slopes[0].conj() * beam.mesh.turns.conj()
+    turn = slopes[1] * slopes[0].conj() * beam._turned_back
     return (float(abs(np.arctan2(turn.imag, turn.real)).max()), bool((back.real < 0.0).any()))

@@ -166,7 +166,7 @@ def entry(function: Any, args: Any) -> Any:
             given += one
             signature.append(typeof(x))
         elif _of_numbers(x):
-            one = [f"a{k}_{name}" for name in x._fields]
+            one = [f"a{k}_{name}" for name in vars(type(x))["_fields"]]
             names[f"kind{k}"] = type(x)
             given.append(f"kind{k}({', '.join(one)})")
             signature += map(type_of, hints(type(x)))

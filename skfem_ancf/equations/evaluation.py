@@ -73,13 +73,13 @@ SMALLEST = 1e-14
 
 
 @source
-def balance(e, target, factors, acting, first, last, mixed, g, x, m, stresses):
+def balance(e, target, factors, first, last, mixed, g, x, m, stresses):
     """Set forces, residual, tangent and its inverse diagonal; if ``last``, without the tangent.
 
-    ``acting`` are the load factors for the tangent; ``m`` the multipliers and residuals of joints,
-    and in row 3 their c; ``stresses`` those of the strain and the independent ones. If ``mixed``,
-    the geometric part uses the last stresses, linearised along the correction. Returns the norms of
-    residual and larger force, and the largest relative residual of joints.
+    ``factors`` are load factors and those for the first tangent; ``m`` the multipliers and
+    residuals of joints, and in row 3 their c; ``stresses`` those of the strain and the independent
+    ones. If ``mixed``, the geometric part uses the last stresses, linearised along the correction.
+    Returns the norms of residual and larger force, and the largest relative residual of joints.
     """
     u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
     gap, opened = x[GAP], 0.0
@@ -92,10 +92,11 @@ def balance(e, target, factors, acting, first, last, mixed, g, x, m, stresses):
                 before[i] = u[i] - du[i]
             linearised(e, before, du, stresses[0], stresses[1])
         t = np.inf if first and np.isnan(target.when) else target.when
-        tangent(e, u, acting, t, target.scale, target.at, mixed, stresses[0], stresses[1], f)
+        tangent(e, u, factors[1 if first else 0], t, target.scale, target.at, mixed, stresses[0],
+                stresses[1], f)
         diagonal(e.K, weights)
         invert(weights, e.sizes)
-    external_force(e.loads, factors, target.when, target.scale, u, load)
+    external_force(e.loads, factors[0], target.when, target.scale, u, load)
     for i in indices(u.size):
         R[i] = load[i] - f[i] - gap[i]
     if phi.size > 0:

@@ -410,12 +410,6 @@ class MeshBeam(NumberedMesh):
         return bool(np.maximum.reduce(np.abs(off), axis=None) <= tol)
 
     @cached_property
-    def turns(self) -> Array:
-        """Changes of direction of the axis over the elements, as complex numbers, (nelements,)."""
-        slopes = (self.p_X[0] + 1j * self.p_X[1])[self.t]
-        return np.asarray(slopes[1] * slopes[0].conj())
-
-    @cached_property
     def is_uniform(self) -> bool:
         """True if one table serves all elements: straight, of equal length, height and direction.
 

@@ -254,7 +254,7 @@ class Increment:
         when = np.nan if clock is None else clock
         definite = solver is system.solver and system.symmetric and not solver.coupled
         target = Target(self.load, when, self.time, moving, solver.handle, definite)
-        return target, Start(u, multipliers, gap, moved), (factors, first)
+        return target, Start(u, multipliers, gap, moved), np.array([factors, first])
 
     def _require_converged(self, status, n, rules):
         if status == CONVERGED:

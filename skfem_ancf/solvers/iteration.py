@@ -63,7 +63,7 @@ class Iterate(NamedTuple):
 
 
 def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any, start: Start,
-                     factors: tuple[Array, Array], joints: tuple[Array, Array]) -> Iterate:
+                     factors: Array, joints: tuple[Array, Array]) -> Iterate:
     """Iterate to equilibrium.
 
     Parameters
@@ -76,33 +76,34 @@ def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any
         Its ``solve_into`` solves the linear systems, such as a
         :class:`~skfem_ancf.equations.linear_solver.LinearSolver`.
     factors
-        Load factors, (k,), and those of the first tangent.
+        Load factors, and those of the first tangent, (2, k).
     joints
         c (m,) and g (k,) of the joints at the time.
     """
     x, m = np.zeros((ROWS, len(start.u))), np.zeros((4, len(start.multipliers)))
-    stresses, works = np.zeros((2, backend.tables.stresses_size)), np.empty(rules.iterations)
-    x[U], x[GAP], x[MOVED], residuals = start.u, start.gap, start.moved, np.empty(len(works) + 1)
+    stresses, record = np.zeros((2, backend.tables.stresses_size)), np.empty(
+        (2, rules.iterations + 1))
+    x[U], x[GAP], x[MOVED] = start.u, start.gap, start.moved
     m[0], m[3] = start.multipliers, joints[0]
     run = backend.of(equilibrium, ITERATIONS, calls=not target.definite)
-    status, n, k, definite = run(target, rules, *factors, joints[1], x, m, stresses, residuals,
-                                 works)
+    status, n, k, definite = run(target, rules, factors, joints[1], x, m, stresses, record)
     if status == INDEFINITE:
         return find_equilibrium(backend, target._replace(definite=False), rules, solver, start,
                                 factors, joints)
     if definite:
         backend.keep_factors()
-    return Iterate(status, x[U].copy(), m[0].copy(), x[FORCE].copy(), residuals[:n].tolist(),
-                   works[:k].tolist())
+    return Iterate(status, x[U].copy(), m[0].copy(), x[FORCE].copy(), record[0, :n].tolist(),
+                   record[1, :k].tolist())
 
 
 @source
-def equilibrium(e, target, rules, factors, first, g, x, m, stresses, residuals, works):
-    """Iterate from x[U] and the multipliers m[0].
+def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
+    """Iterate from x[U] and the multipliers m[0]; ``record`` gets residuals and works.
 
-    Returns the status, the numbers of residuals and of works written, and whether the last factors
-    are those of ``e.factors``.
+    Returns the status, the numbers of residuals and of works, and whether the last factors are
+    those of ``e.factors``.
     """
+    residuals, works = record[0], record[1]
     u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
     multipliers, phi, dm = m[0], m[1], m[2]
     by_band = target.definite and e.factors.flat.size > 0
@@ -110,8 +111,8 @@ def equilibrium(e, target, rules, factors, first, g, x, m, stresses, residuals, 
     work = before = reference = np.inf
     while True:
         # the last residual needs no tangent
-        rho, size, opening = balance(e, target, factors, first if k == 0 else factors, k == 0,
-                                     last, rules.mixed and k > 0, g, x, m, stresses)
+        rho, size, opening = balance(e, target, factors, k == 0, last, rules.mixed and k > 0,
+                                     g, x, m, stresses)
         if not rho < 1e300:
             return NOT_FINITE, k, k, by_band and k > 0
         residuals[k] = rho / size if size > 0.0 else 0.0
@@ -126,7 +127,7 @@ def equilibrium(e, target, rules, factors, first, g, x, m, stresses, residuals, 
         if k == rules.iterations:
             return NOT_CONVERGED, k + 1, k, by_band and k > 0
         if last:
-            balance(e, target, factors, factors, False, False, rules.mixed, g, x, m, stresses)
+            balance(e, target, factors, False, False, rules.mixed, g, x, m, stresses)
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
