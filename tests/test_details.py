@@ -24,7 +24,7 @@ from skfem_ancf.dynamics import steps
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.equations.evaluation import mean_stiffness
 from skfem_ancf.io import PvdWriter
-from skfem_ancf.mesh.taper import PLACES, halved
+from skfem_ancf.mesh.mapping import PLACES, halved
 from skfem_ancf.solvers import newton
 from skfem_ancf.solvers.tracing import Tracer
 

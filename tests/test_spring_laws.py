@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, RigidBody,
                         Scene, StVenantKirchhoff)
-from skfem_ancf.actions.forces.laws import Law
+from skfem_ancf.actions.forces.springs import Law
 
 E, B, H, G = 2e8, 0.01, 0.01, 9.81
 MESH = MeshBeam.init_line(np.linspace(0, 1, 9), height=H)

@@ -194,7 +194,7 @@ NAMED = [
      "across = lagrange(self.eta, eta.ravel())",
      "across = lagrange(self.eta, np.tile(eta[0], len(eta)))",
      "test_a_density_at_points_that_differ_from_section_to_section"),
-    ("taper: children of whole length", "mesh/taper.py",
+    ("taper: children of whole length", "mesh/mapping.py",
      "a + 0.5 * PLACES",
      "a + PLACES",
      "test_heights_of_halved_elements"),

@@ -15,7 +15,7 @@ from ..core.errors import InputError, SupportError, require_finite_scalar, requi
 from ..core.types import Place
 from ..mesh.places import is_point, node_of
 from .item import Item
-from .joints.hinge import Hinge
+from .joints.weld import Hinge
 from .joints.guides import PlaneSection
 from .joints.prescribed import PrescribedDisplacement
 

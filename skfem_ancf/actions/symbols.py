@@ -21,7 +21,7 @@ from .eigenstrain import EigenStrain
 from .forces import Control, Drag, Foundation, PointMass, Spring, TorsionalSpring
 from .forces.springs import end_of
 from .joints import Hinge, Weld
-from .joints.glue import Glue
+from .joints.weld import Glue
 from .joints.guides import OnCircle, OnLine, PlaneSection
 from .joints.nodes import COMPONENTS, Nodes
 from .joints.prescribed import (PrescribedAngle, PrescribedDisplacement, PrescribedPosition,

@@ -20,9 +20,8 @@ from ..core.types import Array, Place, StrPath
 from ..equations.system import System
 from ..io.tables import to_xarray
 from ..recovery.resultants import Resultants, over_time
-from ..results.points import MaterialPoints
 from ..results.acting import SpringForces
-from ..results.state import Reaction, State
+from ..results.state import MaterialPoints, Reaction, State
 from ..visuals.animation import animate
 from ..visuals.pyvista import Series
 from .base import Motion, Scheme

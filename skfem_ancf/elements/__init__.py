@@ -1,10 +1,10 @@
 """Beam elements. A new element is one file and one line here."""
 
-from .ancf import ElementBeamANCF, ElementBeamPatelShabana
+from .ancf import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                   ElementBeamPatelShabana)
 from .base import ElementBeam
 from .cable import ElementBeamCable
 from .choose import ORDER_OF_FIELD, choose_element
-from .hermite import ElementBeamANCFCubic, ElementBeamANCFHermite
 
 #: Elements by name.
 ELEMENTS = {

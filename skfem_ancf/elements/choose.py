@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from ..core.errors import InputError, require_like, require_names, require_positive
 from ..core.types import Isotropic
 from ..mesh.mesh_beam import MeshBeam
-from .ancf import ElementBeamANCF
+from .ancf import ElementBeamANCF, ElementBeamANCFCubic
 from .base import ElementBeam
 from .cable import ElementBeamCable
-from .hermite import ElementBeamANCFCubic
 
 #: Least order for a field of the section; 0 is the cable.
 ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_xy": 3, "S_yy": 5,

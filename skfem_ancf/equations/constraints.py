@@ -18,8 +18,7 @@ from ..core.caching import cached_property
 from ..core.errors import InputError, ModelWarning, SupportError, shown
 from ..core.immutable import ours
 from ..core.types import Array
-from .mobility import advice, first_of, free_rigid_motions, who
-from .redundancy import repeated, shared
+from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
 from .signature import DENSE, FREE, first_dependent
 
 #: Largest number of multipliers with dense Jacobians.

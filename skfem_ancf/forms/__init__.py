@@ -28,10 +28,9 @@ The strain is the Green-Lagrange strain ``(F^T F - 1) / 2`` in the beam's frame 
 ``F = grad r``, and S is the second Piola-Kirchhoff stress.
 """
 
-from .of_beam import BeamForms, Position, of, position
-from .weak import (BeamBilinearForm, BeamLinearForm, EnergyForm, ModuliForm, StrainEnergy,
-                   StressForm, deformation_gradient, energy, gravity, green_lagrange,
-                   internal_force, mass, moduli_of, piola, pressure, strain_energy,
+from .weak import (BeamBilinearForm, BeamForms, BeamLinearForm, EnergyForm, ModuliForm, Position,
+                   StrainEnergy, StressForm, deformation_gradient, energy, gravity, green_lagrange,
+                   internal_force, mass, moduli_of, of, piola, position, pressure, strain_energy,
                    strain_variation, tangent, textbook, textbook_energy, textbook_internal_force,
                    textbook_tangent, traction)
 

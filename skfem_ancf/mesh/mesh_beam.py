@@ -24,12 +24,11 @@ from ..core.types import Array, StrPath
 from . import files
 from .curve import Curve, axis_of, check_curvature, derivative_of
 from .location import Finder
-from .mapping import MappingBeam
+from .mapping import MappingBeam, heights_of, scaled
 from .numbering import NumberedMesh, default_tags
 from .places import as_point, is_point, points_of_rows
 from .reference_cell import SECTIONS, ElementBeamP1
 from .refinement import halved
-from .taper import heights_of, scaled
 
 EPS = float(np.finfo(float).eps)
 

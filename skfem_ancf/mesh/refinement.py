@@ -9,7 +9,7 @@ import numpy as np
 from skfem.generic_utils import OrientedBoundary
 
 from ..core.types import Array
-from .taper import halved as halved_heights, heights_of
+from .mapping import halved as halved_heights, heights_of
 
 
 def halved(mesh: Any, ix: Array) -> Any:

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import spsolve
 
 from ..core.errors import InputError, require_finite_scalar, require_index
 from ..core.near_misses import NearMisses
-from ..equations.linearised import linear_external_force, linear_force
+from ..equations.matrices import linear_external_force, linear_force
 from ..equations.stability import position_weights
 from .state import State
 

@@ -12,8 +12,7 @@ from ..core.errors import require_index
 from ..core.types import Array
 from ..equations.system import System
 from ..visuals.matplotlib import plot_path
-from .points import MaterialPoints
-from .state import State
+from .state import MaterialPoints, State
 
 
 @dataclass(repr=False)

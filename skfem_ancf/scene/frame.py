@@ -29,7 +29,7 @@ from ..materials.damping import KelvinVoigt
 from ..mesh.frame_files import graph_from_meshio
 from ..mesh.frame_graph import FrameGraph, mapping_of
 from ..mesh.places import as_point, is_point
-from ..results.arguments import displacement
+from .solve import displacement
 from ..results.state import State
 from ..sections import Section
 from .model import Entry

@@ -20,7 +20,7 @@ from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
 from ..dynamics.sensors import Recorder, Sensor
 from ..equations.system import System
-from ..results.arguments import displacement
+from .solve import displacement
 from ..results.state import State
 from ..solvers.newton import Steps as Rules
 from ..solvers.outcome import StaticResult, StepFailed

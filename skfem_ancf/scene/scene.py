@@ -29,7 +29,6 @@ from ..dynamics.integrate import follow, integrate
 from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import SceneMatrices, matrices_of
 from ..equations.system import System
-from ..results.arguments import configuration, displacement
 from ..results.checks import warn_of_points
 from ..results.modes import Buckling, Modes
 from ..results.path import CriticalPoint, Path
@@ -43,7 +42,8 @@ from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
 from .model import Model
 from .plan import Plan, make_plan
 from .quasistatic import StepHistory, Steps, run
-from .solve import critical_of, solve_linear, solve_static, system_of, velocity_of, warn_about
+from .solve import (configuration, critical_of, displacement, solve_linear, solve_static, system_of,
+                    velocity_of, warn_about)
 
 if TYPE_CHECKING:
     from typing_extensions import Self

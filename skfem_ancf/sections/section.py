@@ -20,8 +20,7 @@ from ..elements.base import ElementBeam
 from ..materials import Material
 from ..materials.plane_sections import PlaneSections
 from ..mesh.mesh_beam import MeshBeam
-from .measure import MORE, WHOLE, Piece, Uniform, Weighted
-from .moving import Moving
+from .measure import MORE, WHOLE, Moving, Piece, Uniform, Weighted
 
 
 @dataclass(frozen=True)

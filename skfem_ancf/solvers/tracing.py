@@ -11,8 +11,7 @@ from ..core.types import Array
 from ..equations.evaluation import invert
 from ..equations.stability import position_weights
 from ..equations.system import System
-from ..results.points import MaterialPoints
-from ..results.state import State
+from ..results.state import MaterialPoints, State
 from .increment import rules_of
 from .iteration import CLOSED
 

@@ -6,12 +6,10 @@ from typing import Any
 
 from ...core.errors import require_option
 from .base import Joint, bind_joint
-from .glue import Glue
 from .guides import OnCircle, OnLine, PlaneSection
-from .hinge import Hinge
 from .prescribed import Motor, PrescribedAngle, PrescribedPosition, PrescribedTurn
 from .sliders import Sleeve, Slot
-from .weld import Weld
+from .weld import Glue, Hinge, Weld
 
 #: The joints by name.
 JOINTS = {
