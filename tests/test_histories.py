@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
+from skfem_ancf import (Beam, Circle, ConvergenceError, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, Frame, InputError, KelvinVoigt, MeshBeam, Prony, Scene,
                         Section, StVenantKirchhoff, Voce)
 from skfem_ancf.materials import HistoryMaterial
@@ -554,6 +554,30 @@ def test_a_law_of_ones_own_in_one_class(element):
     found = run.state(-1).field(lambda v: v.output("largest"), (0.5, 0.0))
     assert found == pytest.approx(worst[-1], rel=1e-4)
     assert np.all(run.iterations_at[1:] < 18)
+
+
+class Limited(HistoryMaterial):
+    """Its lateral stress is at most 5e-3 E: from 0.3 eps_xx = 5e-3 on no lateral strain fits."""
+
+    variables = {"largest": 1}  # noqa: RUF012
+
+    def stress(self, strain, history, dt):
+        S = self.E * np.array([strain[0], 0.3 * strain[0] + 5e-3 * np.tanh(200.0 * strain[1]),
+                               0.4 * strain[2]])
+        return S, np.maximum(history, np.abs(strain[:1].real))
+
+
+def test_a_fibre_without_a_lateral_strain_is_said():
+    """Increments are cut up to there; the error names the law."""
+    beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], height=H), ElementBeamCable(3),
+                Limited(E, 0.0, 7800.0), width=B)
+    scene = Scene(beam).clamp("left").fix("right", "r^1", displacement=lambda t: 0.03 * t)
+    with pytest.raises(ConvergenceError, match=r"lateral strain of a fibre of .*Limited") as error:
+        scene.run(1.0, increments=4)
+    assert error.value.state.displacement("right")[-1, 0] == pytest.approx(5e-3 / 0.3, rel=0.02)
+    free = Scene(beam).clamp("left").point_force((1.0, 0.0), at="right")
+    with pytest.raises(ConvergenceError, match="lateral strain of a fibre"):
+        free.point_force((0.1 * E * B * H, 0.0), at="right").integrate(1.0, 1e-3)
 
 
 # what it refuses

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..actions.tables import constraint, joint_directions
 from ..core.callbacks import handle_of
-from ..core.errors import InputError, SupportError, require_positive, shown
+from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
 from ..core.linalg import halves
 from ..core.types import Array
 from ..equations.condensation import Condensed, CondensedMass
@@ -321,7 +321,7 @@ class Integrator:
             fresh = not self.ready or dt != self.dt
             try:
                 new = self.scheme.step(self, y, dt)
-            except (StepFailed, np.linalg.LinAlgError) as failure:
+            except (StepFailed, ConvergenceError, np.linalg.LinAlgError) as failure:
                 self.forget()
                 if fresh or not again:
                     raise StepFailed(str(failure)) from None

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, require_integer, require_positive, require_slope
+from ..core.errors import (ConvergenceError, InputError, require_integer, require_positive,
+                           require_slope)
 from ..core.immutable import rebuilt
 from ..core.types import Array, HasShear, Law
 from .base import LinearLaw, Material, hooke
@@ -170,7 +171,7 @@ class HistoryMaterial(Material):
         """Stress S_xx (...), its derivative, and history of fibres with S_yy = S_xy = 0.
 
         ``strain`` (...) is that along the fibre. By default the lateral strain is found by Newton's
-        method.
+        method; ConvergenceError if it is not found, upon which solvers cut their step.
         """
         E = np.zeros((3, *np.shape(strain)))
         E[0], E[1] = strain, -self.lateral_ratio * strain
@@ -178,12 +179,30 @@ class HistoryMaterial(Material):
             S, D, after = self.evaluate(E, history, dt)
             if np.max(np.abs(S[1:])) <= CLOSE * (np.max(np.abs(S)) + CLOSE * self.E):
                 break
-            change = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
-                                     np.moveaxis(S[1:], 0, -1)[..., None])[..., 0]
-            E[1:] -= np.moveaxis(change, -1, 0)
-        side = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
-                               np.moveaxis(D[1:, 0], 0, -1)[..., None])[..., 0]
-        return S[0], D[0, 0] - np.sum(np.moveaxis(D[0, 1:], 0, -1) * side, axis=-1), after
+            E[1:] -= self._by_lateral(D, S[1:], S, strain)
+        else:
+            raise self._lost(S, strain)
+        side = self._by_lateral(D, D[1:, 0], S, strain)
+        return S[0], D[0, 0] - np.sum(D[0, 1:] * side, axis=0), after
+
+    def _by_lateral(self, D, x, S, strain):
+        """Lateral moduli^-1 x, (2, ...)."""
+        try:
+            found = np.linalg.solve(np.moveaxis(D[1:, 1:], (0, 1), (-2, -1)),
+                                    np.moveaxis(x, 0, -1)[..., None])
+        except np.linalg.LinAlgError:
+            raise self._lost(S, strain) from None
+        return np.moveaxis(found[..., 0], -1, 0)
+
+    def _lost(self, S, strain):
+        """The ConvergenceError about the fibre with the largest lateral stress."""
+        left = np.abs(S[1:]).max(axis=0)
+        worst = np.argmax(np.where(np.isfinite(left), left, np.inf))
+        return ConvergenceError(
+            f"the lateral strain of a fibre of {self!r} was not found in {LATERAL} corrections: at "
+            f"the strain {np.ravel(strain)[worst]:.3g} a lateral stress of "
+            f"{np.ravel(left)[worst]:.3g} is left. Its stress may jump there, or its moduli may "
+            "be wrong; smaller increments may help, or an axial(strain, history, dt) of its own")
 
     def axial_energy(self, strain: Array, history: Array) -> Array:
         """As :meth:`energy` for fibres with S_yy = S_xy = 0."""

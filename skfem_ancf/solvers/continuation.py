@@ -105,7 +105,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                     point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
                 found = find_critical(tracer, start, point, locate) if (
                     locate is not None and straight) else []
-            except Failed as failure:
+            except (Failed, ConvergenceError) as failure:  # that of a law
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
                 if step < SHORTEST * ds:

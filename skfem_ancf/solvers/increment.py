@@ -203,9 +203,12 @@ class Increment:
                          FIRST if wary else WATCHED if options.watched and not solver else 0)
         by = solver or system.solver
         target, start, factors = self._target(backend.tables, u, multipliers, by)
-        with np.errstate(all="ignore"):  # overflow shows in the residual
-            x = find_equilibrium(backend, target, rules, by, start, factors,
-                                 backend.tables.at(self.time))
+        try:
+            with np.errstate(all="ignore"):  # overflow shows in the residual
+                x = find_equilibrium(backend, target, rules, by, start, factors,
+                                     backend.tables.at(self.time))
+        except (ConvergenceError, np.linalg.LinAlgError) as failure:  # of a law
+            raise StepFailed(str(failure)) from None
         n = len(x.works)
         self.record.iterations += n
         self.record.force_residuals += x.residuals
