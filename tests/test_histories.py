@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, Circle, ConvergenceError, ElasticPlastic, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, Frame, InputError, KelvinVoigt, MeshBeam, Prony, Scene,
-                        Section, StVenantKirchhoff, Voce)
+from skfem_ancf import (Beam, Circle, ConvergenceError, ElasticPlastic, ElementBeamANCF,
+                        ElementBeamANCFCubic, ElementBeamCable, Frame, InputError, KelvinVoigt,
+                        MeshBeam, Prony, Scene, Section, StVenantKirchhoff, Voce)
 from skfem_ancf.materials import HistoryMaterial
 
 E, NU, YIELD, H, B, L = 2e11, 0.3, 2.5e8, 0.01, 0.01, 0.1
@@ -447,6 +447,28 @@ def test_a_bar_hit_hard_stays_bent(scheme):
     elastic = thrown(StVenantKirchhoff(E, NU, 7800.0)).integrate(3e-3, 2e-5, scheme=scheme)
     v = elastic.displacement((0.2, 0.0))[:, 1]
     assert w[-50:].min() > 0.5 * w.max() and v[-50:].min() < 0.1 * v.max()
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)], ids=name)
+def test_an_iteration_evaluates_the_law_once(element):
+    """The mixed iteration linearises where the last tangent was."""
+    calls = []
+
+    class Counted(ElasticPlastic):
+        def evaluate(self, strain, history, dt):
+            calls.append(strain.shape)
+            return super().evaluate(strain, history, dt)
+
+        def axial(self, strain, history, dt):
+            calls.append(strain.shape)
+            return super().axial(strain, history, dt)
+
+    law = Counted(E, NU, YIELD, 1e-2 * E)
+    scene, _ = bent(element, law, [0.0, 1e-3 * KAPPA * L], increments=1)
+    calls.clear()
+    run = scene.run(1.0, increments=4)
+    # and at the start of the first increment, at both ends of each, and for the verdict
+    assert len(calls) <= run.iterations + 7 * len(run)
 
 
 def test_an_elastic_law_with_a_history_is_that_law():

@@ -13,13 +13,15 @@ from ..core.types import Array
 from .history import ACROSS, HistoryMaterial
 
 #: Newton corrections of a return to the yield surface, and the relative gap at the end.
-CORRECTIONS, CLOSED = 100, 1e-13
+CORRECTIONS, FEW, CLOSED = 100, 10, 1e-13
 #: Relative excess of the yield stress that is round-off.
 EXCESS = 1e-12
 #: (xx, yy, 2 xy) in the basis in which the plane stress moduli are diagonal (a symmetric matrix),
 #: and the factors of f^2 there, with f = sqrt(2/3) times the von Mises stress.
 BASIS = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, np.sqrt(2.0)]]) / np.sqrt(2.0)
 FACTORS = np.array([1.0 / 3.0, 1.0, 2.0])
+#: Moduli from those in that basis, (9, 9), and a sum over components.
+MODULI, ONES = np.kron(BASIS, BASIS), np.ones(3)
 #: f of the yield stress 1.
 ROOT = np.sqrt(2.0 / 3.0)
 
@@ -168,13 +170,16 @@ class ElasticPlastic(HistoryMaterial):
     def _returned(self, gap, start, most):
         """Zeros (n,) of decreasing functions ``gap(g) -> value, slope`` with gap(0) > 0.
 
-        Newton's method between bounds; ``most`` (n,) is an upper bound.
+        Newton's method, after :data:`FEW` corrections within bounds; ``most`` (n,) is one.
         """
-        low, high, g = 0.0 * most, most, start
-        for _ in range(CORRECTIONS):
+        low, high, g, closed = 0.0 * most, most, start, CLOSED * self.yield_stress
+        for k in range(CORRECTIONS):
             value, slope = gap(g)
-            if np.max(np.abs(value)) <= CLOSED * self.yield_stress:
+            if np.abs(value).max() <= closed:
                 break
+            if k < FEW:
+                g = np.maximum(g - value / slope, 0.0)
+                continue
             low, high = np.where(value > 0.0, g, low), np.where(value < 0.0, g, high)
             g = g - value / slope
             g = np.where((g > low) & (g < high), g, 0.5 * (low + high))
@@ -206,12 +211,11 @@ class ElasticPlastic(HistoryMaterial):
         x = C * (BASIS @ (E - history[:3])) - back
         S, D = x + back, np.empty((3, 3, E.shape[1]))
         D[:] = self.elastic[..., None]
-        at, = np.nonzero(np.sum(P * x * x, axis=0) > (
+        at, = np.nonzero(ONES @ (P * x * x) > (
             ROOT * (1.0 + EXCESS) * self._yield(history[6])[0]) ** 2)
         if len(at):
-            z, g, T = self._onto_ellipse(x[:, at], history[6, at], C, P, H)
-            D[:, :, at] = (np.kron(BASIS, BASIS) @ T.reshape(9, -1)).reshape(T.shape)
-            f = np.sqrt(np.sum(P * z * z, axis=0))
+            z, g, f, T = self._onto_ellipse(x[:, at], history[6, at], C, P, H)
+            D.reshape(9, -1)[:, at] = MODULI @ T.reshape(9, -1)
             after[:3, at] += BASIS @ (g * P * z)
             after[3:6, at] += BASIS @ (g * H * z)
             after[6, at] += ROOT * g * f
@@ -219,29 +223,33 @@ class ElasticPlastic(HistoryMaterial):
         return BASIS @ S, D, after
 
     def _onto_ellipse(self, x, p, C, P, H):
-        """Stress less back stress, plastic multiplier and moduli on the yield surface."""
+        """Stress less back stress, plastic multiplier, f and moduli on the yield surface."""
         A, squares = C * P + H, P * x * x
 
-        def gap(g):
-            d = 1.0 + A * g
-            f = np.sqrt(np.sum(squares / (d * d), axis=0))
-            df = -np.sum(squares * A / d**3, axis=0) / f
+        def gap(g):  # the ratio of yield stress and stress is nearly linear
+            d = 1.0 / (1.0 + A * g)
+            parts = squares * d
+            parts *= d
+            f = np.sqrt(ONES @ parts)
+            parts *= d
+            grows = -(A[:, 0] @ parts) / (f * f)  # the slope of log f
             y, K = self._yield(p + ROOT * g * f)
-            return f - ROOT * y, df - 2.0 / 3.0 * K * (f + g * df)
+            y = ROOT * y / f
+            return size * (1.0 - y), size * (y * grows - 2.0 / 3.0 * K * (1.0 + g * grows))
 
-        f = np.sqrt(squares.sum(axis=0)) / ROOT
-        most, start = f / self.yield_stress / A.min(), (f / self._yield(p)[0] - 1.0) / A.max()
+        size = np.sqrt(ONES @ squares) / ROOT
+        most, start = size / self.yield_stress / A.min(), (size / self._yield(p)[0] - 1.0) / A.max()
         g = self._returned(gap, start, most)
         z = x / (1.0 + A * g)
-        f = np.sqrt(np.sum(P * z * z, axis=0))
+        f = np.sqrt(ONES @ (P * z * z))
         K = self._yield(p + ROOT * g * f)[1]
         t1, t2 = 1.0 + H * g, 1.0 - 2.0 / 3.0 * K * g
         X = 1.0 / (1.0 / C + g / t1 * P)
         n = X * P * z
         b = 2.0 / 3.0 * t1 / t2 * (K * t1 + 1.5 * H * t2) * f * f
-        T = -n[:, None] * n / (np.sum(P * z * n, axis=0) + b)
-        T[[0, 1, 2], [0, 1, 2]] += X
-        return z, g, T
+        T = -n[:, None] * n / (ONES @ (P * z * n) + b)
+        T.reshape(9, -1)[::4] += X
+        return z, g, f, T
 
     def _deviators(self, E, history):
         """Mean strain times 3, and stress deviators less back stress, xx, yy, xy and zz."""

@@ -16,8 +16,9 @@ from .base import LinearLaw, Material, hooke
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
 #: is right to 1 %; 20 points give 0.4 %, 10 points 1.5 %.
 ACROSS = 14
-#: Newton corrections of the lateral strain of a fibre, and their relative size at the end.
-LATERAL, CLOSE = 50, 1e-13
+#: Newton corrections of the lateral strain of a fibre; lateral stress over the largest that is
+#: left, and that which may be if it does not decrease.
+LATERAL, CLOSE, ROUGH = 50, 1e-13, 1e-8
 #: Step of derivatives, strain and time at which those of a user-defined law are tested.
 TINY, SMALL, SOON = 1e-30, 1e-3, 1.0
 
@@ -175,9 +176,12 @@ class HistoryMaterial(Material):
         """
         E = np.zeros((3, *np.shape(strain)))
         E[0], E[1] = strain, -self.lateral_ratio * strain
+        left = np.inf
         for _ in range(LATERAL):
             S, D, after = self.evaluate(E, history, dt)
-            if np.max(np.abs(S[1:])) <= CLOSE * (np.max(np.abs(S)) + CLOSE * self.E):
+            before, left = left, float(np.max(np.abs(S[1:])))
+            size = float(np.max(np.abs(S))) + CLOSE * self.E
+            if left <= CLOSE * size or 0.5 * before < left <= ROUGH * size:  # round-off
                 break
             E[1:] -= self._by_lateral(D, S[1:], S, strain)
         else:
