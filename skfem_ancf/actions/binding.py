@@ -30,10 +30,6 @@ def bind_item(item: Item, layout: Layout) -> list[Any]:
         return [bind_joint(item, layout)]
     if isinstance(item, ForceElement):
         return [bind_force(item, layout)]
-    return _bind_custom(item, layout)
-
-
-def _bind_custom(item, layout):
     hint = ("its energy(u, t), force(u, v, t) and constraint(u, t) take displacements and "
             f"velocities of all degrees of freedom, shape ({layout.N},)")
     with explained("{!r} fails in the reference configuration", hint, InputError, item):

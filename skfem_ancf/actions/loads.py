@@ -445,7 +445,19 @@ class Pressure(Load):
                 "of freedom across the section. Use an element with sections, as "
                 "ElementBeamANCF(2), or for a force of constant direction scene.traction or "
                 "scene.point_force")
-        rows = _follower(beam, facets, self.p)
+        # sparse matrix from the position to the force of a pressure
+        row, column, value = [], [], []
+        for one in surfaces_of(beam, facets, beam.element.facet_points):
+            functions, grad = beam.element.functions(
+                beam.mesh.mapping(), one.X, one.elements)
+            slopes = grad[:, 0] * one.along[0] + grad[:, 1] * one.along[1]
+            both = self.p * np.einsum("iep,jep,ep->eij", functions, slopes, one.weights)
+            i, j = entries_of(element_dofs(beam, one.elements)[:, ::2])
+            row += [i, i + 1]
+            column += [j + 1, j]
+            value += [-both.ravel(), both.ravel()]
+        rows = sparse.coo_array((np.concatenate(value), (np.concatenate(row), np.concatenate(
+            column))), shape=(beam.N, beam.N)).tocsr()
         return self._with(beam=beam, _rows=rows, matrix=rows.tocoo(),
                           _distribution=on_facets(beam.mesh, facets, pressure=self.p))
 
@@ -457,21 +469,6 @@ class Pressure(Load):
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         return self.matrix.row, self.matrix.col, self.matrix.data
-
-
-def _follower(beam, facets, p):
-    """Sparse matrix from the position to the force of a pressure."""
-    mesh, row, column, value = beam.mesh, [], [], []
-    for one in surfaces_of(beam, facets, beam.element.facet_points):
-        functions, grad = beam.element.functions(mesh.mapping(), one.X, one.elements)
-        slopes = grad[:, 0] * one.along[0] + grad[:, 1] * one.along[1]
-        both = p * np.einsum("iep,jep,ep->eij", functions, slopes, one.weights)
-        i, j = entries_of(element_dofs(beam, one.elements)[:, ::2])
-        row += [i, i + 1]
-        column += [j + 1, j]
-        value += [-both.ravel(), both.ravel()]
-    row, column, value = map(np.concatenate, (row, column, value))
-    return sparse.coo_array((value, (row, column)), shape=(beam.N, beam.N)).tocsr()
 
 
 class EndMoment(Load):

@@ -109,7 +109,11 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
         beam, place = _section_of_frame(layout, beam, place)
     member = layout.beam(beam)
     if isinstance(member, Domain):
-        return _boundary(layout, member, place)
+        # position and direction of a straight boundary of a domain
+        centre, along, mean, line = member.moments(place)
+        used, = np.nonzero((mean != 0.0) | (line != 0.0))
+        dofs = layout.offset(member) + 2 * used + np.array([[0], [1]])
+        return Vector(centre, dofs, mean[used]), Vector(along, dofs, line[used])
     if isinstance(member, RigidBody):
         dofs, weights = member.direction()
         return (point(layout, member, place),
@@ -144,14 +148,6 @@ def _section_of_frame(layout, beam, at):
                          f"np.array([{node}])")
     k, node, _ = (rigid or ends)[0]
     return k, np.array([node])
-
-
-def _boundary(layout, domain, boundary):
-    """Position and direction of a straight boundary of a domain."""
-    centre, along, mean, line = domain.moments(boundary)
-    used, = np.nonzero((mean != 0.0) | (line != 0.0))
-    dofs = layout.offset(domain) + 2 * used + np.array([[0], [1]])
-    return Vector(centre, dofs, mean[used]), Vector(along, dofs, line[used])
 
 
 def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:

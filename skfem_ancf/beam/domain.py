@@ -105,7 +105,17 @@ class Domain(Immutable):
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass
         self.name = require_label("name", name)
         self.N: int = basis.N
-        self._order = _narrow(basis)
+        # a numbering of the DOFs with a small bandwidth: reverse Cuthill-McKee, or along
+        # x or y
+        pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
+        k = len(pairs)
+        i, j = np.repeat(pairs, k, axis=0).ravel(), np.tile(pairs, (k, 1)).ravel()
+        graph = sparse.csr_matrix((np.ones(len(i)), (i, j)), shape=(n, n))
+        x, y = basis.doflocs[:, ::2]
+        orders = [reverse_cuthill_mckee(graph, symmetric_mode=True), np.lexsort((y, x)),
+                  np.lexsort((x, y))]
+        order = min(orders, key=lambda order: np.max(np.ptp(np.argsort(order)[pairs], axis=0)))
+        self._order = (2 * order[:, None] + np.arange(2)).ravel()
         self._rank = np.argsort(self._order)
         self._require_derivatives()
 
@@ -489,19 +499,6 @@ def _require_plane(basis):
     if len(np.unique(basis.element_dofs)) < basis.N:
         raise InputError("the basis of a Domain must cover its whole mesh: for a part of it use "
                          "mesh.restrict(elements)")
-
-
-def _narrow(basis):
-    """A numbering of the DOFs with a small bandwidth: reverse Cuthill-McKee, or along x or y."""
-    pairs, n = basis.element_dofs[::2] // 2, basis.N // 2
-    k = len(pairs)
-    i, j = np.repeat(pairs, k, axis=0).ravel(), np.tile(pairs, (k, 1)).ravel()
-    graph = sparse.csr_matrix((np.ones(len(i)), (i, j)), shape=(n, n))
-    x, y = basis.doflocs[:, ::2]
-    orders = [reverse_cuthill_mckee(graph, symmetric_mode=True), np.lexsort((y, x)),
-              np.lexsort((x, y))]
-    order = min(orders, key=lambda order: np.max(np.ptp(np.argsort(order)[pairs], axis=0)))
-    return (2 * order[:, None] + np.arange(2)).ravel()
 
 
 def _local(mapping, point, cells):

@@ -151,7 +151,9 @@ def strain_at(beam: Any, u: Array, e: Array, X: Array, term: Term | None = None,
     the formulation. ``across``, points and weights, gives the mean over sections.
     """
     if not beam.has_sections:
-        return _strain_of_cable(beam, u, e, X)
+        longer, ratio = fibres(beam, e, X, *cable_axis(beam, u, e, X[0])[1:])
+        xx = longer + 0.5 * longer * longer
+        return np.array([xx, ratio * xx, 0.0 * xx])
     rows = (0, 1, 2) if term is None else getattr(term.law, "rows", (0, 1, 2))
     samples = (term or beam.terms[0]).samples
     gradients, out = Gradients(beam, u, e), np.zeros((3, len(e)), np.result_type(u, float))
@@ -269,12 +271,6 @@ def fibres(beam: Any, e: Array, X: Array, extension: Array, bending: Array, kapp
     if len(ratios) > 1:
         ratios = ratios[beam.across.which(X[:, :, None], e)[:, 0]]
     return (extension - Y * bending) / (1.0 - Y * kappa0), -ratios
-
-
-def _strain_of_cable(beam, u, e, X):
-    longer, ratio = fibres(beam, e, X, *cable_axis(beam, u, e, X[0])[1:])
-    xx = longer + 0.5 * longer * longer
-    return np.array([xx, ratio * xx, 0.0 * xx])
 
 
 def _stress_of_cable(layer, strain, X, tind):

@@ -248,15 +248,7 @@ class BandMatrix:
             return 0
         size = np.abs(self.diagonal())
         size[size == 0.0] = np.max(size)  # zero at a critical point
-        return self._block_negative(1.0 / np.sqrt(size))
-
-    def shifted(self, shift: float) -> BandMatrix:
-        """The matrix plus ``shift`` times the absolute diagonal."""
-        out = BandMatrix(self.n, self.bandwidth, self.symmetric).combine(1.0, self, 0.0, self)
-        out._flat[self._diagonal::self._ld] += shift * np.abs(self.diagonal())
-        return out
-
-    def _block_negative(self, scale):
+        scale = 1.0 / np.sqrt(size)
         negative, n, width = 0, self.n, max(self.bandwidth, 1)
         first, last = 0, min(width, n)
         P = self._dense(first, last, first, last, scale)
@@ -277,6 +269,12 @@ class BandMatrix:
                 # earlier rows are eliminated: they are in P and do not couple to later ones
                 P = np.block([[P, E], [E.T, A]])
                 last = after
+
+    def shifted(self, shift: float) -> BandMatrix:
+        """The matrix plus ``shift`` times the absolute diagonal."""
+        out = BandMatrix(self.n, self.bandwidth, self.symmetric).combine(1.0, self, 0.0, self)
+        out._flat[self._diagonal::self._ld] += shift * np.abs(self.diagonal())
+        return out
 
     def _dense(self, i0, i1, j0, j1, scale):
         """Rows i0 to i1 and columns j0 to j1, scaled on both sides."""

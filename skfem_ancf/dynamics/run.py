@@ -72,7 +72,17 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
         raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
     dt = None if auto else require_positive("dt", dt)
     step = 1e-4 * span if auto else min(dt, span)
-    _require_step(t_start, t_end, step)
+    # raise InputError if round-off cannot resolve the steps, or if there are too many
+    if step < 1e-100 or t_end > 1e100:  # their squares must not overflow
+        raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
+                         f"{t_end!r}")
+    if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
+        raise InputError(f"dt = {step!r} is below the round-off of the times {t_start!r} to "
+                         f"{t_end!r}")
+    steps = (t_end - t_start) / step
+    if steps > MAX_STEPS:
+        raise InputError(f"dt = {step!r} needs {steps:.3g} steps to t_end = {t_end!r}: the limit "
+                         f"is {MAX_STEPS:.0e}")
     if not auto and dt > 10.0 * span:
         warn(f"dt = {dt:g} is longer than the motion, from t = {t_start:g} to {t_end:g}, which "
              "becomes one step: the first argument is t_end, the second is dt", ModelWarning)
@@ -89,20 +99,6 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
         breaks = np.unique(require_finite("breakpoints", breakpoints, (None,)))
         inside = breaks[(breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)].tolist()
     return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(inside))
-
-
-def _require_step(t_start, t_end, step):
-    """Raise InputError if round-off cannot resolve the steps, or if there are too many."""
-    if step < 1e-100 or t_end > 1e100:  # their squares must not overflow
-        raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
-                         f"{t_end!r}")
-    if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
-        raise InputError(f"dt = {step!r} is below the round-off of the times {t_start!r} to "
-                         f"{t_end!r}")
-    steps = (t_end - t_start) / step
-    if steps > MAX_STEPS:
-        raise InputError(f"dt = {step!r} needs {steps:.3g} steps to t_end = {t_end!r}: the limit "
-                         f"is {MAX_STEPS:.0e}")
 
 
 def integrator_of(system: System, scheme: Scheme, tol: float | None = None) -> Integrator:

@@ -232,10 +232,8 @@ class Constraints:
         """True if Phi is quadratic and given by :attr:`slopes`, :attr:`seconds` and offsets."""
         if all(map(ours, self.joints)):
             return all(joint.tabled for joint in self.joints)
-        return self._quadratic_at((0.0, 0.37))
-
-    def _quadratic_at(self, times: Iterable[float]) -> bool:
-        """Test user-defined joints against the tables at a random displacement."""
+        # test user-defined joints against the tables at a random displacement
+        times = (0.0, 0.37)
         sizes = self.coordinate_sizes
         of_equations, rng = self.equation_sizes(*self.slopes), np.random.default_rng(0)
         k, i, j, v = self.seconds

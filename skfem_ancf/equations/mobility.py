@@ -189,7 +189,24 @@ def _motions(c, joints):
     translations and a rotation in units of its size. Small matrices are dense.
     """
     if c.frame is not None:
-        return _motions_of_frame(c, joints)
+        frame, origin = c.frame, c.members[0].origin
+        parts = frame.parts()
+        of_part, values, first = np.zeros(c.N, dtype=int), [], 0
+        for beam, s in zip(c.members, c.slices):
+            ends = chain_ends(beam)
+            of = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
+            of_part[s], first = np.repeat(of, beam.nd), first + len(ends)
+            motions, shift = beam.rigid_motions().copy(), beam.origin - origin
+            motions[:, 2] += shift[0] * motions[:, 1] - shift[1] * motions[:, 0]
+            values.append(motions / (1.0, 1.0, c.size))
+        motions, number = np.concatenate(values), int(parts.max()) + 1
+        if number > 1:
+            motions = _sparse(motions, of_part)
+        held = frame.fixed_motions(parts, origin, c.size, number)
+        if joints.shape[0] > len(frame.equations):
+            others = joints[len(frame.equations):] @ motions
+            held = sparse.vstack([held, others]) if number > 1 else np.concatenate([held, others])
+        return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
     values = [member.rigid_motions() / (1.0, 1.0, member.size) for member in c.members]
     if len(values) == 1:
         out = values[0]
@@ -200,27 +217,6 @@ def _motions(c, joints):
             np.arange(len(values)), [member.N for member in c.members]))
     return out, joints @ out, lambda: [(who(c.members, k), b.origin, b.size)
                                        for k, b in enumerate(c.members)]
-
-
-def _motions_of_frame(c, joints):
-    frame, origin = c.frame, c.members[0].origin
-    parts = frame.parts()
-    of_part, values, first = np.zeros(c.N, dtype=int), [], 0
-    for beam, s in zip(c.members, c.slices):
-        ends = chain_ends(beam)
-        of = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
-        of_part[s], first = np.repeat(of, beam.nd), first + len(ends)
-        motions, shift = beam.rigid_motions().copy(), beam.origin - origin
-        motions[:, 2] += shift[0] * motions[:, 1] - shift[1] * motions[:, 0]
-        values.append(motions / (1.0, 1.0, c.size))
-    motions, number = np.concatenate(values), int(parts.max()) + 1
-    if number > 1:
-        motions = _sparse(motions, of_part)
-    held = frame.fixed_motions(parts, origin, c.size, number)
-    if joints.shape[0] > len(frame.equations):
-        others = joints[len(frame.equations):] @ motions
-        held = sparse.vstack([held, others]) if number > 1 else np.concatenate([held, others])
-    return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
 
 
 def _sparse(values, of_body):

@@ -277,20 +277,6 @@ class Inverse:
                 "the tangent of this state is singular: joints are dependent, or a rigid motion "
                 "is unconstrained") from None
 
-    def _use_strains(self):
-        """Factorise with the stresses ``C B x`` as unknowns, in units of stiffness."""
-        if self._nodes is not None:
-            self._scaled()
-        B, CB = self._tangent.B, self._tangent.CB
-        size, strain = (abs(A).max(axis=1).toarray().ravel() for A in (CB, B))
-        empty = (size == 0.0) | (strain == 0.0)  # strains of fixed DOFs only
-        size = np.sqrt(np.where(empty, 1.0, size) / np.where(empty, 1.0, strain))
-        W, number = sparse.diags(1.0 / size), len(size)
-        self._by_strains, self._small = True, 1e-6
-        self._lu = self._factors(
-            self._rest / self._small,
-            [W @ CB, B.T @ sparse.diags(size), -self._small * sparse.eye(number)])
-
     def _once(self, b, c):
         if self._nodes is not None and not self._by_strains:
             return self._nodes.solve(b, c)
@@ -321,7 +307,18 @@ class Inverse:
         x, l, good = self._refined(b, c, accepted)
         if not good and not self._by_strains:
             logger.info("the assembled stiffness is too inaccurate: stresses become unknowns")
-            self._use_strains()
+            # factorise with the stresses C B x as unknowns, in units of stiffness
+            if self._nodes is not None:
+                self._scaled()
+            B, CB = self._tangent.B, self._tangent.CB
+            size, strain = (abs(A).max(axis=1).toarray().ravel() for A in (CB, B))
+            empty = (size == 0.0) | (strain == 0.0)  # strains of fixed DOFs only
+            size = np.sqrt(np.where(empty, 1.0, size) / np.where(empty, 1.0, strain))
+            W, number = sparse.diags(1.0 / size), len(size)
+            self._by_strains, self._small = True, 1e-6
+            self._lu = self._factors(
+                self._rest / self._small,
+                [W @ CB, B.T @ sparse.diags(size), -self._small * sparse.eye(number)])
             x, l, good = self._refined(b, c, accepted)
         if not good:
             raise ConvergenceError(

@@ -24,6 +24,7 @@ from .mapping import heights_of
 
 # the mesh of the lines of a frame: several chains of elements
 
+
 def chain_of(s: Array) -> Array:
     """Chain number of parameters (n,), which run from 2 k to 2 k + 1 on chain k."""
     return np.floor(0.5 * s).astype(int)
@@ -239,11 +240,8 @@ class FrameGraph:
                 raise MeshError(f"lines {i} and {j} are the same: both join the points "
                                 f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
                                 "them a curve")
-        self._warn_of_passing()
-
-    def _warn_of_passing(self):
-        """Warn of nodes on a straight line between its ends: lines are joined at their ends only.
-        """
+        # warn of nodes on a straight line between its ends: lines are joined at their
+        # ends only
         some = np.setdiff1d(self.distinct, list(self.curves))
         a, b = (self.points[:, ends].T for ends in self.lines[:, some])
         half = 0.5 * np.hypot(*(b - a).T)
@@ -282,7 +280,15 @@ class FrameGraph:
         self.same = first[label]
         self.points, self.lines = places[:, self.same], self.same[self.given]
         self.distinct = np.flatnonzero(self.lines[0] != self.lines[1])
-        self._curves_to_nodes(places)
+        # move the ends of curves to merged nodes
+        for k, curve in self.curves.items():
+            if k not in self.distinct:
+                raise MeshError(f"the ends of line {k}, which has a curve, are not farther apart "
+                                f"than tol = {self.tol:.3g}, within which points are one node: "
+                                "give a smaller tol=")
+            shift = (self.points - places)[:, self.given[:, k]]
+            if np.any(shift):
+                self.curves[k] = partial(_moved, curve, shift)
         if not len(self.distinct):
             raise MeshError(f"all lines are shorter than tol = {self.tol:.3g}, within which points "
                             "are one node")
@@ -299,17 +305,6 @@ class FrameGraph:
         pairs = tree.query_pairs(distance, output_type="ndarray").reshape(-1, 2)
         pairs = pairs[np.lexsort(pairs.T[::-1])]
         return pairs, np.hypot(*(self.points[:, pairs[:, 0]] - self.points[:, pairs[:, 1]]))
-
-    def _curves_to_nodes(self, places):
-        """Move the ends of curves to merged nodes."""
-        for k, curve in self.curves.items():
-            if k not in self.distinct:
-                raise MeshError(f"the ends of line {k}, which has a curve, are not farther apart "
-                                f"than tol = {self.tol:.3g}, within which points are one node: "
-                                "give a smaller tol=")
-            shift = (self.points - places)[:, self.given[:, k]]
-            if np.any(shift):
-                self.curves[k] = partial(_moved, curve, shift)
 
     @property
     def size(self) -> float:

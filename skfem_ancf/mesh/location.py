@@ -216,7 +216,14 @@ class Finder:
 
     def _find(self, x, noise):
         if self._line is not None:
-            return self._on_line(x, noise)
+            # as :meth:`_find` on a single straight line
+            d, start = self._line
+            # a point of the section between two elements is one of the left
+            e = (start + noise * self.mesh.lengths)[1:].searchsorted(d @ x)
+            X = self.inverse(x[:, :, None], e)[..., 0]
+            outside = self._outside(X, noise)
+            outside[outside > 1.0] = np.inf
+            return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
         e, X, outside = self._nearest(x, noise)
         left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
         if len(left):
@@ -266,16 +273,6 @@ class Finder:
         mesh, d = self.mesh, self.mesh.p_X[:, 0]
         one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
         return (d, d @ mesh.p[:, :-1]) if one else None
-
-    def _on_line(self, x, noise):
-        """As :meth:`_find` on a single straight line."""
-        d, start = self._line
-        # a point of the section between two elements is one of the left
-        e = (start + noise * self.mesh.lengths)[1:].searchsorted(d @ x)
-        X = self.inverse(x[:, :, None], e)[..., 0]
-        outside = self._outside(X, noise)
-        outside[outside > 1.0] = np.inf
-        return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
 
     def _nearest(self, x, noise):
         """The nearest element, or its neighbour where the point is beyond the common node."""

@@ -161,9 +161,29 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
         if not (beam.has_sections or remembers(beam)):
             values.update(_strains_of_cable(beam, eigen, e, xi, values["N"], values["M"]))
     elif beam.has_sections:
-        values = _of_elements(beam, u, eigen, e, xi)
+        # integrate the stress of the elements across the section
+        X, area = _across(beam, e, xi)
+        S = on_grid(stress_at, beam, u, X, e) - sum(
+            load.stress_at(u, X, e, factor) for factor, load in eigen)
+        H, frame = kinematics.gradients(beam, u, X, e)
+        P = (H + frame)[:, 0] * S[0] + (H + frame)[:, 1] * S[2]
+
+        def position(points):
+            return beam.mesh.mapping().F(points, e) + kinematics.displacements(beam, u, points, e)
+
+        arm = position(X) - position(_on_axis(xi))
+        values = _result(np.sum(P * area, axis=-1), np.sum(cross(arm, P) * area, axis=-1),
+                         *_axis_of_element(beam, u, e, xi))
     else:
-        values = _of_cable_elements(beam, u, eigen, e, xi)
+        # resultants of a cable from EA and EI; the shear force is the slope of the moment
+        N, M, strains = _forces_of_cable(beam, u, eigen, e, xi)
+        near = np.clip([xi - NEAR, xi + NEAR], 0.0, 1.0)
+        a, b = (_forces_of_cable(beam, u, eigen, e, x)[1] for x in near)
+        J = beam.mesh.mapping().DF(_on_axis(0.5 * np.sum(near, axis=0)), e)[:, 0, :, 0]
+        angle, stretch = strains[:2]
+        Q = (a - b) / (np.hypot(*J) * stretch * (near[1] - near[0]))
+        t = np.array([np.cos(angle), np.sin(angle)])
+        values = dict(_result(N * t + Q * np.array([-t[1], t[0]]), M, *strains), N=N, Q=Q)
     x = beam.mesh.mapping().F(_on_axis(xi), e)[..., 0]
     arc = ArcLength(beam) if recovery is None else recovery.arc
     return Resultants(arc.at(e, xi), x, recovered=recovery is not None, **{
@@ -228,22 +248,6 @@ def _axis(segment):
     return segment.spline(np.array([phi, segment.at_axis(stretch), shear, curvature]).T)
 
 
-def _of_elements(beam, u, eigen, e, xi):
-    """Integrate the stress of the elements across the section."""
-    X, area = _across(beam, e, xi)
-    S = on_grid(stress_at, beam, u, X, e) - sum(
-        load.stress_at(u, X, e, factor) for factor, load in eigen)
-    H, frame = kinematics.gradients(beam, u, X, e)
-    P = (H + frame)[:, 0] * S[0] + (H + frame)[:, 1] * S[2]
-
-    def position(points):
-        return beam.mesh.mapping().F(points, e) + kinematics.displacements(beam, u, points, e)
-
-    arm = position(X) - position(_on_axis(xi))
-    return _result(np.sum(P * area, axis=-1), np.sum(cross(arm, P) * area, axis=-1),
-                   *_axis_of_element(beam, u, e, xi))
-
-
 def _across(beam, e, xi):
     """Points across sections, shape (2, n, m), and their areas."""
     eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
@@ -252,18 +256,6 @@ def _across(beam, e, xi):
         for layer in beam.across.layers)))
     X = np.array([xi[:, None] + 0.0 * eta, eta])
     return X, breadth * beam.mesh.mapping().height(X[0], e)[0]
-
-
-def _of_cable_elements(beam, u, eigen, e, xi):
-    """Resultants of a cable from EA and EI; the shear force is the slope of the moment."""
-    N, M, strains = _forces_of_cable(beam, u, eigen, e, xi)
-    near = np.clip([xi - NEAR, xi + NEAR], 0.0, 1.0)
-    a, b = (_forces_of_cable(beam, u, eigen, e, x)[1] for x in near)
-    J = beam.mesh.mapping().DF(_on_axis(0.5 * np.sum(near, axis=0)), e)[:, 0, :, 0]
-    angle, stretch = strains[:2]
-    Q = (a - b) / (np.hypot(*J) * stretch * (near[1] - near[0]))
-    t = np.array([np.cos(angle), np.sin(angle)])
-    return dict(_result(N * t + Q * np.array([-t[1], t[0]]), M, *strains), N=N, Q=Q)
 
 
 def _forces_of_cable(beam, u, eigen, e, xi):

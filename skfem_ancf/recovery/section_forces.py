@@ -140,7 +140,16 @@ class SectionForces:
         self._balance(u)
         inside = self._unknown.astype(int)
         for e in inside:
-            self._pass_on(e, inside)
+            # take the end forces of an element with an unknown point load from its
+            # neighbours
+            t = self.beam.mesh.t
+            for end, other in ((0, e - 1), (1, e + 1)):
+                if e + end in self._acted or other in inside or np.sum(inside == e) > 1:
+                    raise NotRecovered("a load or joint at a point inside an element is next to "
+                                       "another one, or to a support: put a node at the point")
+                near = 0 <= other < t.shape[1] and t[end, e] == t[1 - end, other]
+                self.R[end][e] = self.R[1 - end][other] if near else 0.0
+                self.M[end][e] = self.M[1 - end][other] if near else 0.0
         self._check()
 
     # densities of force
@@ -311,17 +320,6 @@ class SectionForces:
         #: Stations of unknown forces inside elements.
         self._unknown = np.unique(self._acted[(self._acted % 1.0 != 0)
                                               & ~np.isin(self._acted, known)])
-
-    def _pass_on(self, e, inside):
-        """Take the end forces of an element with an unknown point load from its neighbours."""
-        t = self.beam.mesh.t
-        for end, other in ((0, e - 1), (1, e + 1)):
-            if e + end in self._acted or other in inside or np.sum(inside == e) > 1:
-                raise NotRecovered("a load or joint at a point inside an element is next to "
-                                   "another one, or to a support: put a node at the point")
-            near = 0 <= other < t.shape[1] and t[end, e] == t[1 - end, other]
-            self.R[end][e] = self.R[1 - end][other] if near else 0.0
-            self.M[end][e] = self.M[1 - end][other] if near else 0.0
 
     def _check(self):
         """Raise NotRecovered unless section forces are continuous at unloaded nodes."""

@@ -20,6 +20,7 @@ from .section_forces import NotFound, Sections
 
 # derivatives, integrals and smoothing along sections of one segment, factorised once
 
+
 class SectionsAlong:
     """Operators on values at n >= 3 sections of arc lengths s (n,), for values (..., n, m).
 
@@ -318,22 +319,6 @@ class Segment:
 
     # step 3
 
-    def _equilibrium(self):
-        """Set S_xy and S_yy from div P + b = 0 and the loads of the faces."""
-        rate, viscous, phi = self.rate[..., None], self._viscous_stress(), self.phi[..., None]
-        P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
-        dP = (self.along.d_ds(P) + rate * np.array([-P[1], P[0]])
-              + self.width * _turned(self.body, phi))
-        bottom, top = [_turned(f[..., None], phi) for f in self.faces]
-        dP = dP + self.swell * P  # with the flux through oblique faces
-        left = top + bottom + self.across(dP)[..., None]
-        P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
-        P2 = P2 / (self.g * self.width)
-        det = cross(self.rX, self.rY)
-        self.S = np.array([self.S[0], cross(self.rX, P2) / det,
-                           cross(P2, self.rY) / det - viscous[1]])
-        self._shear()
-
     def _viscous_stress(self):
         """Viscous S_xx, linear in Y, and S_xy."""
         if self.forces.viscous is None:
@@ -369,7 +354,20 @@ class Segment:
             before = self.stretch
             self._balance(BALANCE)
             self._turn()
-            self._equilibrium()
+            # set S_xy and S_yy from div P + b = 0 and the loads of the faces
+            rate, viscous, phi = self.rate[..., None], self._viscous_stress(), self.phi[..., None]
+            P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
+            dP = (self.along.d_ds(P) + rate * np.array([-P[1], P[0]])
+                  + self.width * _turned(self.body, phi))
+            bottom, top = [_turned(f[..., None], phi) for f in self.faces]
+            dP = dP + self.swell * P  # with the flux through oblique faces
+            left = top + bottom + self.across(dP)[..., None]
+            P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
+            P2 = P2 / (self.g * self.width)
+            det = cross(self.rX, self.rY)
+            self.S = np.array([self.S[0], cross(self.rX, P2) / det,
+                               cross(P2, self.rY) / det - viscous[1]])
+            self._shear()
             self.change = largest(self.stretch - before, EACH)
             if np.all(self.change <= largest(self.stretch - 1.0, EACH) * (
                     SETTLED if k < ROUNDS - 1 else SLOWLY)):

@@ -45,30 +45,26 @@ def modes(system: System, state: State, k: int) -> Modes:
     with friction, also those that slip.
     """
     with system.histories.lent(state.memory), system.forces.contacts.stuck():
-        return _modes(system, state, k)
-
-
-def _modes(system, state, k):
-    tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
-    if tangent.size[0] <= DENSE:
-        tangent.require_independent()
-    M = _free_mass(system, tangent)
-    n, m = tangent.size
-    k = _count(k, n - m)
-    shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
-    tangent.balance(M, shift)
-    if tangent.symmetric and not small:
-        values, X = _sparse(tangent, state, M, k, shift)
-    elif tangent.symmetric:
-        values, X = _dense(tangent, M, k, shift)
-    else:
-        values, X = _unsymmetric(tangent, M, k, shift, small)
-    shapes = np.zeros((k, system.N), dtype=X.dtype)
-    shapes[:, tangent.free] = X.T
-    frequencies = np.sqrt(values) if np.any(values.imag) else (
-        np.sign(values.real) * np.sqrt(np.abs(values.real)))
-    _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * system.scales.bending_eigenvalue)
-    return Modes(frequencies, shapes, state, values.astype(complex))
+        tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
+        if tangent.size[0] <= DENSE:
+            tangent.require_independent()
+        M = _free_mass(system, tangent)
+        n, m = tangent.size
+        k = _count(k, n - m)
+        shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
+        tangent.balance(M, shift)
+        if tangent.symmetric and not small:
+            values, X = _sparse(tangent, state, M, k, shift)
+        elif tangent.symmetric:
+            values, X = _dense(tangent, M, k, shift)
+        else:
+            values, X = _unsymmetric(tangent, M, k, shift, small)
+        shapes = np.zeros((k, system.N), dtype=X.dtype)
+        shapes[:, tangent.free] = X.T
+        frequencies = np.sqrt(values) if np.any(values.imag) else (
+            np.sign(values.real) * np.sqrt(np.abs(values.real)))
+        _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * system.scales.bending_eigenvalue)
+        return Modes(frequencies, shapes, state, values.astype(complex))
 
 
 def rest_modes(system: System, k: int) -> tuple[Array, Array]:

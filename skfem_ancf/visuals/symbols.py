@@ -85,7 +85,8 @@ class Sketch:
         d = np.array(s.direction)
         for k, turn in enumerate(s.turn):
             now, start = (x @ [1, 1j] for x in (turn(self.u), turn.start))
-            d[k] = _pair(d[k] @ [1, 1j] * now / start * abs(start / now))
+            z = d[k] @ [1, 1j] * now / start * abs(start / now)
+            d[k] = np.array([z.real, z.imag])
         length = np.sign(s.value) * self.size * (
             SPREAD if len(at) > 1 else ARROW * (0.5 + 0.5 * abs(s.value) / largest))
         tips, tails = at, at - length * d
@@ -265,7 +266,3 @@ class Sketch:
 def _ends(s):
     """Of two supports the one with a known outward direction."""
     return tuple(s.direction[0]) != (0.0, -1.0)
-
-
-def _pair(z):
-    return np.array([z.real, z.imag])

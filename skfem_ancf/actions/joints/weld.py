@@ -19,11 +19,12 @@ from ...core.errors import InputError, MeshError, require_flag, require_label, s
 from ...core.types import Array
 from ...mesh.places import facets_of, is_point
 from ..item import Item
-from ..places import Vector, each, is_ground, point, section, several
+from ..places import each, is_ground, point, section, several
 from .base import Aligned, Joint, angle_to, equations_of, gradients, rotation
 
 
 # hinge between two or more beams
+
 
 class Hinge(Joint):
     """r_a = r_b for a material point of two beams, and of further ones; rotations are free.
@@ -206,22 +207,19 @@ class Weld(Joint):
             section(layout, beam, at) for beam, at in zip(self.beams, self.at))
         self.pairs = []
         for b, e in others:
-            self._require_together(layout, b)
+            gap = b.start - self.a.start
+            beams = [layout.beam(beam) for beam in self.beams if not is_ground(beam)]
+            if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
+                centre = next((f": of {beam!r} alone it is the centre of mass that is meant, name "
+                               "the point, as (body, (x, y)); or" for beam, at in
+                               zip(self.beams, self.at) if at is None), ":")
+                raise InputError(
+                    f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
+                    f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
+                    f"({b.start[0]:.6g}, {b.start[1]:.6g}){centre} name sections that meet, move a "
+                    f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
+                    "apart=True to draw them together")
             self.pairs.append((b, Aligned(d, e, rotation(angle_to(d.start, e.start)))))
-
-    def _require_together(self, layout: Layout, b: Vector) -> None:
-        gap = b.start - self.a.start
-        beams = [layout.beam(beam) for beam in self.beams if not is_ground(beam)]
-        if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
-            centre = next((f": of {beam!r} alone it is the centre of mass that is meant, name "
-                           "the point, as (body, (x, y)); or" for beam, at in
-                           zip(self.beams, self.at) if at is None), ":")
-            raise InputError(
-                f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
-                f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
-                f"({b.start[0]:.6g}, {b.start[1]:.6g}){centre} name sections that meet, move a "
-                f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
-                "apart=True to draw them together")
 
     def value(self, u: Array, t: float) -> Array:
         a, out = self.a(u), []
