@@ -625,8 +625,10 @@ def test_messages_of_joints_and_supports():
     assert repr(scene.joint("plane", at="right", name="end")) == "<PlaneSection end at 'right'>"
     with pytest.raises(AncfError, match="name of an end, as 'right', got 'rigth'"):
         clamped().point_force((0, -1), at="rigth")
-    twice = clamped().clamp("left", thickness="free").gravity((0, -1))
-    with pytest.warns(ModelWarning, match="repeat others.*PlaneSection of a clamp at 'left'"):
+    clamped().clamp("left", thickness="free").gravity((0, -1)).solve_static()  # the same again
+    twice = clamped().gravity((0, -1))
+    twice.joint("plane", at="left")
+    with pytest.warns(ModelWarning, match="repeat others.*PlaneSection at 'left'"):
         twice.solve_static()
 
 

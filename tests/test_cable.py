@@ -305,3 +305,18 @@ def test_a_moment_that_a_cable_does_not_take_from_a_traction_is_said(place, t, m
 def test_tractions_that_a_cable_takes_whole(place, t, section):
     mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.1)
     Traction(place, t).bind(Beam(mesh, ElementBeamCable(5), HARD, **section))
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 2, np.pi, 0.3])
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)])
+def test_a_clamp_with_a_free_thickness_at_any_angle(element, angle):
+    """Along an axis it fixes degrees of freedom, else it is a joint: force and moment balance."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.1, angle=angle)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    P = 20.0 * np.array([-along[1], along[0]])
+    scene = Scene(Beam(mesh, element, HARD, 0.02)).clamp("left", thickness="free")
+    state = scene.point_force(P, at=tuple(along)).solve_static()
+    assert len(scene.joints) == (angle == 0.3)
+    found, x = state.reactions("left"), along + state.displacement(tuple(along))
+    np.testing.assert_allclose(found.force, -P, atol=1e-8)
+    assert found.moment == pytest.approx(-(x[0] * P[1] - x[1] * P[0]), rel=1e-8)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.domain import Domain
+from ..beam.kinematics import plane
 from ..beam.layout import Layout, WhichBeam
 from ..beam.rigid import on_body
 from ..core.errors import InputError, SupportError, require_finite_scalar, require_option, shown
@@ -132,8 +133,14 @@ class Clamp(Item):
             return (Support(self.boundary, beam=k),)
         if member.has_sections and self.thickness == "fixed":
             return (Support(self.boundary, member.element.welded, beam=k),)
-        return (Support(self.boundary, "r", beam=k),
-                PlaneSection(self.boundary, k, "of a clamp"))
+        t = member.mesh.p_X[:, node_of(member.mesh, self.boundary)]
+        direction, slopes = plane(member, t)
+        along, *others = [c for c in (0, 1) if abs(direction[c]) >= 1e-14]
+        if others:
+            return (Support(self.boundary, "r", beam=k),
+                    PlaneSection(self.boundary, k, "of a clamp"))
+        names = [f"{member.element.dofnames[s]}^{along + 1}" for s in slopes]
+        return (Support(self.boundary, ["r", *names], beam=k),)
 
     def __repr__(self) -> str:
         return f"<Clamp at {shown(self.boundary)}>"
