@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ class Masses(NamedTuple):
     def weights(self, g: Array) -> Array:
         """Nodal forces of an acceleration g (2,), shape (nelements, nb, 2)."""
         out = np.add.reduce(self.functions * self.mass, axis=2).T[:, :, None] * g
-        if self.slopes is not None:
+        if self.slopes is not None and self.moments[0].any():
             out = out + np.einsum("iep,ep->ei", self.slopes, self.moments[0])[:, :, None] * (
                 g @ TURN)
         return out
@@ -84,17 +85,26 @@ def masses_of(beam: Any) -> Masses:
     return Masses(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 
+@lru_cache(64)
+def _at_gauss(element, n):
+    """Functions and slopes of an element of unit length at n Gauss points, (2, nb, 1, n)."""
+    xi, _ = gauss(n)
+    return np.array(element.local(np.array([xi, 0.5 + 0.0 * xi]), 1.0)[:2])[:, :, None]
+
+
 def _of_cable(beam):
     """The Masses of a cable, with rotary inertia."""
     across, mapping = beam.across, beam.mesh.mapping()
-    xi, w = gauss(points_along(beam))
+    n = points_along(beam)
+    xi, w = gauss(n)
     tind = np.array([0]) if across.uniform else None
+    mass, first, second = across.moments(xi, tind, "mass") * w
+    if beam.mesh.is_straight and beam.element.by_reference:
+        length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
+        N, d_xi = _at_gauss(beam.element, n) * beam.element.powers(1.0, length).T[:, :, None]
+        return Masses(N, mass * length, d_xi / length, np.array([first, second]) * length)
     X = np.array([xi, 0.5 + 0.0 * xi])
     N, d_xi, _ = beam.element.of_mesh(mapping, X, tind)
-    mass, first, second = across.moments(xi, tind, "mass") * w
-    if beam.mesh.is_straight:
-        length = beam.mesh.lengths[slice(None) if tind is None else tind, None]
-        return Masses(N, mass * length, d_xi / length, np.array([first, second]) * length)
     # arc length, since the interpolated tangent is shorter than one
     speed = np.hypot(*mapping.DF(X, tind)[:, 0])
     mass, first, second = mass * speed, first * speed, second * speed
