@@ -75,14 +75,26 @@ def masses_of(beam: Any) -> Masses:
     """The Masses of a beam."""
     if not beam.has_sections:
         return _of_cable(beam)
-    across, axis = beam.across, gauss(points_along(beam))
-    tind = np.array([0]) if across.uniform else None
-    parts = []
-    for layer, rule in across.rules(beam.element.order + 1, inertia=True):
-        X, W = product_rule(axis, rule)
-        parts.append((beam.element.of_mesh(beam.mesh.mapping(), X, tind)[0],
-                      across.volume(layer, X, W, tind, times="density", full=True)))
+    across, element, mesh, n = beam.across, beam.element, beam.mesh, points_along(beam)
+    tind, parts = np.array([0]) if across.uniform else None, []
+    similar = mesh.is_straight and mesh.heights is None and element.by_reference
+    for layer in across.layers:
+        measure = layer.measure if layer.inertia is None else layer.inertia
+        X, W, N = _unit(element, n, measure)
+        if similar:
+            length = mesh.lengths[slice(None) if tind is None else tind, None]
+            N = N * element.powers(mesh.height, length).T[:, :, None]
+        else:
+            N = element.of_mesh(mesh.mapping(), X, tind)[0]
+        parts.append((N, across.volume(layer, X, W, tind, times="density", full=True)))
     return Masses(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
+
+
+@lru_cache(64)
+def _unit(element, n, measure):
+    """Points and weights, and functions (nb, 1, points) of an element of unit length and height."""
+    X, W = product_rule(gauss(n), measure.gauss(element.order + 1))
+    return X, W, element.local(X, 1.0)[0][:, None]
 
 
 @lru_cache(64)
