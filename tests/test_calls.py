@@ -10,7 +10,7 @@ calls = pytest.importorskip("calls")
 
 #: Calls around the kernels, measured; a tenth more may be due to versions of NumPy and SciPy.
 AROUND = {
-    "whole, ANCF(3)": 1780, "whole, cable(5)": 1860, "solve again": 373,
+    "whole, ANCF(3)": 1760, "whole, cable(5)": 1640, "solve again": 373,
     "displacement again": 132, "replace E, solve": 1365, "strain, first": 4950,
     "strain, again": 264, "100 steps": 1175, "run, 10 steps": 2540, "frame 14 x 14": 8720,
 }
