@@ -11,7 +11,7 @@ from scipy import sparse
 from ..beam.layout import Layout
 from ..core.errors import InputError, explained, require_finite, shown
 from ..core.types import Array
-from .forces.base import ForceElement, Part, Unscaled, bind_force, derivative, try_force
+from .forces.base import ForceElement, KernelElement, Unscaled, bind_force, derivative, try_force
 from .item import Item, beside, require_entries
 from .joints.base import Joint, bind_joint, require_derivatives
 from .loads import Load, bind_load
@@ -108,7 +108,7 @@ class _Force(ForceElement):
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
         return self._mass
 
-    def parts(self) -> list[Part] | None:
+    def parts(self) -> list[KernelElement] | None:
         return None if self._forced else []
 
     def __repr__(self) -> str:

@@ -15,7 +15,7 @@ from .loads import Load
 VARIABLES = np.array([[0, 2, 3], [1, 4, 5]])
 
 
-class Points(NamedTuple):
+class DensityPoints(NamedTuple):
     """Quadrature points of n elements or facets.
 
     ``dofs`` (n, 2 nb), material points ``X`` (2, n, np), ``weights`` (n, np), values and both
@@ -29,10 +29,11 @@ class Points(NamedTuple):
     of: Any = None
 
 
-def points_of(dofs: Array, X: Array, weights: Array, N: Array, grad: Array, of: Any) -> Points:
-    """Points from local functions N, (nb, n, np), and their gradients, (nb, 2, n, np)."""
+def points_of(dofs: Array, X: Array, weights: Array, N: Array, grad: Array, of: Any
+              ) -> DensityPoints:
+    """DensityPoints from local functions N, (nb, n, np), and their gradients, (nb, 2, n, np)."""
     both = np.stack(np.broadcast_arrays(N, grad[:, 0], grad[:, 1]), axis=-1)
-    return Points(dofs, X, weights, np.ascontiguousarray(both.swapaxes(0, 1)), of)
+    return DensityPoints(dofs, X, weights, np.ascontiguousarray(both.swapaxes(0, 1)), of)
 
 
 class Density(Load):
@@ -46,7 +47,7 @@ class Density(Load):
 
     constant = False
     # of a bound one
-    _parts: Sequence[Points]
+    _parts: Sequence[DensityPoints]
     _time = 0.0
 
     @property

@@ -21,7 +21,7 @@ from ..beam.surfaces import add_nodal, divided, surfaces_of
 from ..core.errors import (AncfError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_finite_scalar, require_function,
                            require_slope, shown, warn)
-from ..core.immutable import ours, read_only
+from ..core.immutable import is_builtin, read_only
 from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
 from .item import Item, beside, require_entries
@@ -129,7 +129,7 @@ class Load(Item):
     @property
     def first_order(self) -> bool:
         """True if linear theory includes its stiffness: user-defined loads, as springs."""
-        return not ours(self)
+        return not is_builtin(self)
 
     def __init__(self, beam: WhichMember = None, amplitude: TimeFunction = None) -> None:
         self.beam = beam
@@ -193,14 +193,14 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
         raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
                          "takes scene.gravity, point_force, follower_force, moment, springs and "
                          "joints")
-    if isinstance(beam, Domain) and ours(load) and not load.for_domains:
+    if isinstance(beam, Domain) and is_builtin(load) and not load.for_domains:
         raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a domain takes "
                          "scene.gravity, point_force, springs, joints, and scene.load(form, "
                          "boundary) with any LinearForm")
     bound = load.bind(cast("Beam", beam))
     if not isinstance(bound, Load) or bound.beam is not beam:
         raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {shown(bound)}")
-    if ours(bound):
+    if is_builtin(bound):
         bound._freeze()
         return bound
     zero = np.zeros(beam.N)

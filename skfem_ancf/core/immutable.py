@@ -62,7 +62,7 @@ def unpacked(value: Any) -> Any:
 
 # whether a class or function belongs to the package
 
-def ours(thing: Any) -> bool:
+def is_builtin(thing: Any) -> bool:
     """True if a function, or the class of an object, is defined in this package.
 
     Examples

@@ -116,8 +116,8 @@ class Scheme:
         """Advance the motion by one step.
 
         Schemes that override this method take single steps; others are integrated in blocks. Data
-        for the next step belong in the ``memory`` of the result. If the method raises StepFailed,
-        two steps of half the size are tried.
+        for the next step belong in the ``memory`` of the result. If the method raises
+        TimeStepFailed, two steps of half the size are tried.
 
         Parameters
         ----------

@@ -10,7 +10,7 @@ from ..actions.forces.kernels import add_resisting_force
 from ..core.source import F2, indices, source
 
 
-class Rows(NamedTuple):
+class LowRankRows(NamedTuple):
     """A matrix ``A + P^T S P`` with few rows P besides the band A."""
 
     P: F2  # (k, N)

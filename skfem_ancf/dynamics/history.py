@@ -447,7 +447,7 @@ class History(MaterialPoints, SpringForces):
     def save(self, filename: StrPath, progress: bool | None = None, *,
              subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
              undeformed: bool = False, recover: bool = True, fields: Any = None,
-             precision: str = "double", encoding: str | None = None) -> Path:
+             precision: str = "double") -> Path:
         """Write a time series for ParaView; returns its path.
 
         Parameters
@@ -456,14 +456,13 @@ class History(MaterialPoints, SpringForces):
             Ends with .pvd: a list, with a .vtu file per instant.
         progress
             Show a progress bar: True, False, or None for long runs only.
-        subdivide, lagrange, undeformed, recover, fields, precision, encoding
+        subdivide, lagrange, undeformed, recover, fields, precision
             As for :func:`skfem_ancf.io.save_vtu`.
         """
         from ..io.vtu import PvdWriter
         from ..core.progress import progress_bar
 
-        writer = PvdWriter(filename, subdivide, lagrange, undeformed, recover, fields, precision,
-                           encoding)
+        writer = PvdWriter(filename, subdivide, lagrange, undeformed, recover, fields, precision)
         with writer, progress_bar(progress, total=len(self), desc="files") as bar:
             for state in self:
                 writer.add(state, state.t)

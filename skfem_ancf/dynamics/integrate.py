@@ -19,7 +19,7 @@ from ..results.state import State
 from .base import Scheme, in_steps, same_scheme
 from .checkpoint import Checkpoint
 from .history import History
-from .run import MAX_STEPS, Run, StepFailed, task_of
+from .run import MAX_STEPS, Run, TimeStepFailed, task_of
 from .sensors import Sensor
 
 #: Interval in steps between checks for inverted elements.
@@ -188,7 +188,7 @@ def _go(run, file, progress):
                         inverted = run.y.t
                 if file is not None:
                     file.update()
-    except StepFailed as failure:
+    except TimeStepFailed as failure:
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
                                f"{failure}; try a smaller dt{_of_samples(run)}",
                                run.history()) from None

@@ -19,8 +19,8 @@ from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import Motion, Scheme, in_steps, interpolate
 from .convergence import FAILURES, new_state
-from .course import SAMPLES, Course, Given, rates
-from .dampers import Dampers, Rows, solve_rows
+from .time_functions import SAMPLES, TimeFunctions, TimeValues, rates
+from .dampers import Dampers, LowRankRows, solve_rows
 from .energy_momentum import EnergyMomentum
 from .records import (JointMotion, JointMotions, Matrices, Rule, StepData, acceleration_of_joints,
                       drive_rate, mass_factor, new_work)
@@ -30,7 +30,7 @@ from .tangent import factors
 
 # joint constraints at one instant: gap, Jacobian and rates
 
-class Joined:
+class JointRates:
     """The joints at a displacement and a time."""
 
     def __init__(self, system: System, motion: JointMotion, u: Array,
@@ -86,7 +86,7 @@ OF_STEP = 3
 BLOCK, STORED = 256, 2_000_000
 
 
-class StepFailed(Exception):
+class TimeStepFailed(Exception):
     """The iteration of a step did not converge."""
 
 
@@ -174,7 +174,7 @@ class Integrator:
         Rates of functions of time are those in a step dt after t, or before t unless ``ahead``.
         """
         s, M, (free, m) = self.system, self.system.mass, (self.system.constraints.free, self.m)
-        instant = Course(s, np.array([0.0 if ahead else 1.0]), SAMPLES)
+        instant = TimeFunctions(s, np.array([0.0 if ahead else 1.0]), SAMPLES)
         given = instant.of(t if ahead else t - dt, dt, (0, 1), self.limit)
         u_fixed, v_fixed, a_fixed = given.supports[0, 0]
         y = Motion(t, np.where(free, u, u_fixed), np.where(free, v, v_fixed), a_fixed.copy(),
@@ -184,7 +184,7 @@ class Integrator:
         if m:
             joints = JointMotion(given.c[0, 0], np.vstack([given.g[0, 0, :1], given.g[0, 0]]),
                                  int(s.backend.tables.motion_varies))
-            joined = Joined(s, joints, y.u, (t, dt, ahead, self.limit))
+            joined = JointRates(s, joints, y.u, (t, dt, ahead, self.limit))
             gap = np.abs(joined.gap())
             if np.any(gap > 1e-8 * s.backend.tables.plain.joints.sizes):
                 raise SupportError("the joints are not closed at the start: the largest gap is "
@@ -234,7 +234,8 @@ class Integrator:
     @cached_property
     def _course(self):
         """Sampling where the equation of motion holds, and at the end of a step."""
-        return Course(self.system, np.array([0.5 if self.scheme.conserving else 1.0, 1.0]), SAMPLES)
+        middle = 0.5 if self.scheme.conserving else 1.0
+        return TimeFunctions(self.system, np.array([middle, 1.0]), SAMPLES)
 
     @cached_property
     def _work(self):
@@ -307,39 +308,39 @@ class Integrator:
         return self.system.backend
 
     def take(self, y: Motion, dt: float) -> Motion:
-        """One step of size dt from the Motion ``y``; raises StepFailed."""
+        """One step of size dt from the Motion ``y``; raises TimeStepFailed."""
         taken = self.run(y, dt, 1)
         if self.stopped:
             raise KeyboardInterrupt
         if not taken:
-            raise StepFailed(self.failure)
+            raise TimeStepFailed(self.failure)
         return taken[0]
 
     def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
-        """One step of the scheme, repeated with new factors if it fails; raises StepFailed."""
+        """One step of the scheme, repeated with new factors if it fails; raises TimeStepFailed."""
         while True:
             fresh = not self.ready or dt != self.dt
             try:
                 new = self.scheme.step(self, y, dt)
-            except (StepFailed, ConvergenceError, np.linalg.LinAlgError) as failure:
+            except (TimeStepFailed, ConvergenceError, np.linalg.LinAlgError) as failure:
                 self.forget()
                 if fresh or not again:
-                    raise StepFailed(str(failure)) from None
+                    raise TimeStepFailed(str(failure)) from None
                 continue
             if new.history is None:  # a custom scheme may not copy it
                 new.history = y.history
             return new
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:
-        """One step, halved recursively if it does not converge; raises StepFailed."""
+        """One step, halved recursively if it does not converge; raises TimeStepFailed."""
         try:
             return self.attempt(y, dt, depth == 0)
-        except StepFailed as failure:
+        except TimeStepFailed as failure:
             if depth == DEPTH:
                 past = self.leap(y, dt)
                 if past is not None:
                     return interpolate(y, past, y.t + dt)
-                raise StepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
+                raise TimeStepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
             logger.info("step of %.3g at t = %.6g halved: %s", dt, y.t, failure)
         self.substeps += 1 if depth else 2
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
@@ -361,7 +362,7 @@ class Integrator:
             begin = other.start(y.u, y.v, y.t, dt)
             begin.dissipated = y.dissipated
         for factor in LEAPS:
-            with suppress(StepFailed):
+            with suppress(TimeStepFailed):
                 return other.attempt(begin, factor * dt)
         return None
 
@@ -426,7 +427,7 @@ class Integrator:
                 "carried": work.stresses[3], "rates": work.stresses[5], **beside}
 
 
-def _step_data(given: Given, dt: float, system: System) -> StepData:
+def _step_data(given: TimeValues, dt: float, system: System) -> StepData:
     """Functions of time as :mod:`~skfem_ancf.dynamics.steps` takes them."""
     g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
     joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
@@ -441,9 +442,9 @@ def _damping(system):
     rows = np.concatenate([modes, system.forces.far_rows()])
     k = len(rows)
     D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))
-    return (Rows(rows, np.zeros((k, k)), np.zeros(rows.shape), np.zeros((k, k))),
+    return (LowRankRows(rows, np.zeros((k, k)), np.zeros(rows.shape), np.zeros((k, k))),
             Dampers(int(system.damped), int(system.viscous), int(system.forces.resists),
                     system.damping.mass, D, modes))
 
 
-__all__ = ["Integrator", "StepFailed"]
+__all__ = ["Integrator", "TimeStepFailed"]

@@ -10,7 +10,7 @@ from ..actions.tables import add_products, add_triples
 from ..core.band import Band
 from ..core.callbacks import custom_joints
 from ..core.source import F1, F2, F3, indices, source
-from .dampers import Dampers, Rows
+from .dampers import Dampers, LowRankRows
 
 # rates of joints that depend on time, by differences within one step
 
@@ -105,7 +105,7 @@ class Matrices(NamedTuple):
     mass: Band  # factors of M
     A: Band  # iteration matrix and its factors
     U: Band  # unsymmetric one of conserving mixed steps, or empty
-    rows: Rows  # of the iteration matrix
+    rows: LowRankRows  # of the iteration matrix
     dampers: Dampers
 
 

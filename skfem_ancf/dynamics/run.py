@@ -20,7 +20,7 @@ from ..equations.system import System
 from ..results.state import State
 from .base import Motion, Scheme, in_blocks, interpolate
 from .history import COLUMNS, History, state_of
-from .integrator import DEPTH, Integrator, StepFailed
+from .integrator import DEPTH, Integrator, TimeStepFailed
 from .sensors import Recorder, Sensor
 from .stage_integrator import StageIntegrator
 from .stepsize import StepSize
@@ -222,7 +222,7 @@ class Run:
     # steps
 
     def advance(self) -> None:
-        """Take a step, or a block of steps; raises StepFailed."""
+        """Take a step, or a block of steps; raises TimeStepFailed."""
         if self._sizes is not None:
             self._automatic()
             return
@@ -277,7 +277,7 @@ class Run:
             new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
             error = self._sizes.error(self.integrator, y, new, h)
             self._size, kept = self._sizes.next(error, h, self._size)
-        except StepFailed:
+        except TimeStepFailed:
             if h < SHORTEST * self.task.span:
                 raise
             self._size, kept, self._stuck = 0.5 * h, False, self._stuck + 2
@@ -432,4 +432,4 @@ class Run:
             raise CheckpointError(f"the time {y.t} does not belong to the step {self._n}")
 
 
-__all__ = ["Run", "StepFailed", "Task", "integrator_of", "task_of"]
+__all__ = ["Run", "Task", "TimeStepFailed", "integrator_of", "task_of"]

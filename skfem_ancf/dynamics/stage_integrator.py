@@ -13,7 +13,7 @@ from ..core.band import factorize, fix, solve
 from ..core.types import Array
 from .base import Motion
 from .collocation import Collocation
-from .course import Course
+from .time_functions import TimeFunctions
 from .integrator import Integrator
 from .records import JointMotions
 from .stage_tangent import Interval, new_points, solve_for
@@ -35,7 +35,7 @@ class StageIntegrator(Integrator):
 
     @cached_property
     def _course(self):
-        return Course(self.system, np.append(self.scheme.points, 1.0), SAMPLES)
+        return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), SAMPLES)
 
     @cached_property
     def _work(self):

@@ -45,7 +45,7 @@ class Interval(NamedTuple):
     joints: JointMotions
 
 
-class Points(NamedTuple):
+class StageWork(NamedTuple):
     """Iterates, one row for each point, stored factors and work arrays; b low-rank rows."""
 
     y: F2  # u, v, acceleration at the start of the step, then at its end, (3, N)
@@ -83,11 +83,11 @@ class Points(NamedTuple):
 
 
 def new_points(method: Method, N: int, m: int, rows: int, stresses: int, gradients: int,
-                    D: Band) -> Points:
-    """The Points of a method, with zeros."""
+                    D: Band) -> StageWork:
+    """The StageWork of a method, with zeros."""
     n, k, ld, b = method.points.size, method.values.shape[1], D.width + 1 + SPARE, m + rows
     real = Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0)
-    return Points._make([
+    return StageWork._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * b),
         np.zeros((2 * b, 2 * b)), np.zeros((k, 2 * b, 2 * b)), np.zeros(N), np.zeros(gradients),

@@ -10,7 +10,7 @@ from ..core.errors import InputError
 from ..core.types import Array
 from ..equations.system import System
 from .base import Motion, Scheme
-from .course import Lookahead
+from .time_functions import Lookahead
 from .integrator import Integrator
 
 #: Largest error of a point over the root mean square: the tip of a cantilever moves twice as far as

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ..core.errors import require_integer, require_option
-from ..core.immutable import ours, read_only
+from ..core.immutable import is_builtin, read_only
 from ..core.quadrature import gauss_lobatto
 from ..core.types import Array
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
@@ -78,7 +78,7 @@ class ElementBeamANCF(ElementBeam):
         super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
 
     def plane(self) -> ElementBeam | None:
-        return ElementBeamANCF(1) if ours(self) else None
+        return ElementBeamANCF(1) if is_builtin(self) else None
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         return ([f"r_Y{k}" for k in range(len(self.section_points))],
@@ -110,7 +110,7 @@ class ElementBeamPatelShabana(ElementBeam):
                          ["r_Y", "r_YY"], [(0.0, 0, 1), (0.0, 0, 2)], ["r_Y", "r_YY"])
 
     def plane(self) -> ElementBeam | None:
-        return ElementBeamANCF(1) if ours(self) else None
+        return ElementBeamANCF(1) if is_builtin(self) else None
 
 
 # ANCF beam elements of any odd degree along the axis
@@ -153,12 +153,12 @@ class ElementBeamANCFHermite(ElementBeamANCF):
 
     def raised(self) -> ElementBeamANCFHermite | None:
         # ElementBeamANCFCubic belongs to this family; user-defined subclasses do not
-        if not ours(self) or self.axis_degree == DEGREES[-1]:
+        if not is_builtin(self) or self.axis_degree == DEGREES[-1]:
             return None
         return ElementBeamANCFHermite(self.order, self.axis_degree + 2, self._points)
 
     def plane(self) -> ElementBeam | None:
-        return ElementBeamANCFHermite(1, self.axis_degree) if ours(self) else None
+        return ElementBeamANCFHermite(1, self.axis_degree) if is_builtin(self) else None
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         names, functionals = super()._coordinates()

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..actions.joints.base import Joint, Part, UnitDirector
+from ..actions.joints.base import Joint, IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam.beam import Beam
 from ..beam.rigid import RigidBody
 from ..core.caching import cached_property
 from ..core.errors import InputError, ModelWarning, SupportError, shown
-from ..core.immutable import ours
+from ..core.immutable import is_builtin
 from ..core.types import Array
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
 from .signature import DENSE, FREE, first_dependent
@@ -140,7 +140,7 @@ class Constraints:
             unasked.append((joint, out, size))
             said.append(f"{joint!r} ({', '.join(joint.equations[k] for k in out)})")
             if len(out) < m:
-                parts.append(Part(joint, np.setdiff1d(np.arange(m), out)))
+                parts.append(IndependentPart(joint, np.setdiff1d(np.arange(m), out)))
         more = f" and {len(said) - 4} more" if len(said) > 4 else ""
         warnings.warn(
             f"{len(found)} of {self.m} equations of joints are redundant, they repeat others or "
@@ -230,7 +230,7 @@ class Constraints:
     @cached_property
     def tabled(self) -> bool:
         """True if Phi is quadratic and given by :attr:`slopes`, :attr:`seconds` and offsets."""
-        if all(map(ours, self.joints)):
+        if all(map(is_builtin, self.joints)):
             return all(joint.tabled for joint in self.joints)
         # test user-defined joints against the tables at a random displacement
         times = (0.0, 0.37)

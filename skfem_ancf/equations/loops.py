@@ -15,7 +15,7 @@ from ..beam.strain_energy import FlatBody
 from ..core.band import ADDRESSES
 from ..core.code_cache import NotCompiled
 from ..core.jit import MADE, address, caller, compiled, reader
-from ..core.immutable import ours
+from ..core.immutable import is_builtin
 from ..core.loops import BANDS, STATIC
 from ..core.source import F1, F2, F3
 from ..core.words import Words
@@ -170,7 +170,7 @@ def part(name: str) -> int:
 def law(function: Any) -> int:
     """The address of a material law; laws outside of the package are not cached on disk."""
     return address(_of_points(compiled(function)), _LAW,
-                   f"_{function.__module__}_{function.__qualname__}", ours(function))
+                   f"_{function.__module__}_{function.__qualname__}", is_builtin(function))
 
 
 def _of_points(point):

@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.obstacles.outlines import around, obstacles_of, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
-                           require_option, require_path, require_text, warn)
+                           require_option, require_path, require_text)
 from ..core.types import StrPath
 from ..recovery.fields import find_fields, unit_of, units_of
 from ..recovery.grids import COMPONENTS, body_of, facts_of, grids, in_space
@@ -82,7 +82,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              lagrange: bool = False, undeformed: bool = False, recover: bool = True,
-             fields: Any = None, precision: str = "double", encoding: Any = None) -> Path:
+             fields: Any = None, precision: str = "double") -> Path:
     """Write the deformed body of a state for ParaView.
 
     All beams go into one file, which replaces an older one once it is complete. Neighbouring
@@ -128,8 +128,6 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         by default.
     precision
         "double", or "single" for files of half the size.
-    encoding
-        Deprecated: files are compressed base64, as meshio writes them.
 
     Returns
     -------
@@ -149,8 +147,6 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     """
     path = require_path("filename", filename, SUFFIXES)
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
-    if encoding is not None:
-        warn("encoding= is no longer used: leave it out", DeprecationWarning)
     body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
     scale = units_of(state)
     units = {field.name: unit_of(field, scale) for field in find_fields(fields) if scale}
@@ -215,7 +211,7 @@ class PvdWriter:
     filename
         Path that ends with .pvd. Missing folders are created; the first frame replaces an older
         file.
-    subdivide, lagrange, undeformed, recover, fields, precision, encoding
+    subdivide, lagrange, undeformed, recover, fields, precision
         As for :func:`~skfem_ancf.io.vtu.save_vtu`.
 
     Examples
@@ -236,13 +232,12 @@ class PvdWriter:
 
     def __init__(self, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
                  lagrange: bool = False, undeformed: bool = False, recover: bool = True,
-                 fields: Any = None, precision: str = "double",
-                 encoding: str | None = None) -> None:
+                 fields: Any = None, precision: str = "double") -> None:
         self.path = require_path("filename", filename, (".pvd",))
         require_text("filename", self.path.name)  # names of frames are written in Unicode
         self.options: dict[str, Any] = dict(
             subdivide=subdivide, lagrange=lagrange, undeformed=undeformed, recover=recover,
-            fields=fields, precision=precision, encoding=encoding)
+            fields=fields, precision=precision)
         find_fields(fields)
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
                            require_positive, require_slope, shown)
-from ..core.immutable import Immutable, ours, rebuilt
+from ..core.immutable import Immutable, is_builtin, rebuilt
 from ..core.quadrature import gauss
 from ..core.types import Array, HasShear, Law
 
@@ -141,7 +141,7 @@ class Material(Immutable):
             raise InputError(f"{type(self).__name__} overrides energy and not stress, with which "
                              "beams are solved: define stress(strain), its derivative, too")
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
-        if not ours(self):
+        if not is_builtin(self):
             _require_derivatives(law, self)
         return law if k_s == 1.0 else ShearCorrected(law, k_s)
 

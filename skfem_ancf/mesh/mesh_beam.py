@@ -19,7 +19,7 @@ from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_finite_scalar, require_function, require_integer,
                            require_moderate, require_option, require_options, require_path,
                            require_positive, require_unmasked, shown)
-from ..core.immutable import ours, packed
+from ..core.immutable import is_builtin, packed
 from ..core.types import Array, StrPath
 from . import files
 from .curve import Curve, axis_of, check_curvature, derivative_of
@@ -668,7 +668,7 @@ class MeshBeam(NumberedMesh):
         FileError, MeshError
             If the file cannot be read, or contains no beam.
         """
-        kinds = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if ours(of)}
+        kinds = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if is_builtin(of)}
         return files.load_npz(cls, require_path("filename", filename), kinds | {cls.kind: cls})
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,

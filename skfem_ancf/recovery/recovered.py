@@ -110,8 +110,8 @@ class Interval(NamedTuple):
                                                   self.weights(s))
 
 
-class Points(NamedTuple):
-    """Points across sections: arrays (n, m), or (m,) if all sections are equal.
+class AcrossPoints(NamedTuple):
+    """AcrossPoints across sections: arrays (n, m), or (m,) if all sections are equal.
 
     ``eta`` are the points, ``stretch`` the relative length of their interval; ``drift`` and
     ``swell`` the derivatives of eta and log(stretch) by the height. ``axis`` and ``till_axis`` are
@@ -127,7 +127,7 @@ class Points(NamedTuple):
 
 
 class Intervals:
-    """Points ``eta`` (m,) across a section of layers, with weights of integrals and values.
+    """AcrossPoints ``eta`` (m,) across a section of layers, with weights of integrals and values.
 
     In some tapered sections the relative intervals vary along the axis; ``eta`` then belongs to the
     highest section, and :meth:`points` gives others. ``layers`` are the columns of each layer,
@@ -181,11 +181,11 @@ class Intervals:
         ends = [m.ends(h) for m in self._measures]
         return (np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]))
 
-    def points(self, h: Array) -> Points:
+    def points(self, h: Array) -> AcrossPoints:
         """The points of sections of heights h (n,)."""
         middle = np.array([0.5])
         if not self.moves:
-            return Points(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
+            return AcrossPoints(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
                           self._integrals(middle)[0])
         of = np.repeat(np.arange(len(self._low)), [len(i.nodes) for i in self._intervals])
         size = (self._high - self._low)[of]
@@ -195,7 +195,7 @@ class Intervals:
         # ends are a + b / h: their derivative is 2 (end(2 h) - end(h)) / h
         low_rate, high_rate = (2.0 * (b - a) / h[:, None] for a, b in ((low, low2), (high, high2)))
         at = self.place(0.5 + 0.0 * h, h)
-        return Points(low + (high - low) * z, (high - low) / size,
+        return AcrossPoints(low + (high - low) * z, (high - low) / size,
                       low_rate + (high_rate - low_rate) * z, (high_rate - low_rate) / (high - low),
                       self.weights(at), self._integrals(at))
 
@@ -336,8 +336,8 @@ class Recovery:
     def _heights(self, e, xi):
         return (self.beam.mesh.mapping().height(xi[:, None], e)[0] + 0.0 * xi[:, None])[:, 0]
 
-    def points(self, e: Array, xi: Array) -> Points:
-        """The :class:`.Points` across sections at xi of elements e, shapes (n,)."""
+    def points(self, e: Array, xi: Array) -> AcrossPoints:
+        """The :class:`.AcrossPoints` across sections at xi of elements e, shapes (n,)."""
         return self.intervals.points(self._heights(e, xi))
 
     def modulus(self, strain: Array) -> Array:

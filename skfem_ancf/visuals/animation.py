@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.archive import output_file
 from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
-                           require_like, require_path, require_positive, require_text, shown, warn)
+                           require_like, require_path, require_positive, require_text, shown)
 from ..core.types import StrPath
 from .matplotlib import colormap, colour_bar, figure_class, paint, plain
 from .scenery import INK, MUTED, Scenery
@@ -25,7 +25,7 @@ FRAMES, DPI = 100, 100
 
 
 def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
-            frames: int | None = None, fps: float | None = None, backend: Any = None,
+            frames: int | None = None, fps: float | None = None,
             thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,
             limits: Any = None, unit: str | None = None, subdivide: tuple[int, int] = (8, 4),
             recover: bool = True, size: tuple[int, int] = (800, 600)) -> Path:
@@ -44,8 +44,6 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
         Number of instants, evenly chosen; all by default, up to 100.
     fps
         Frames per second; by default in real time, between 5 and 50.
-    backend
-        Deprecated and ignored.
     field, thickness, undeformed, cmap, limits, unit, subdivide, recover
         As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     size
@@ -54,8 +52,6 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
     require_like("history", history, "History", "states", "t")
     path, undeformed = _file(filename), require_flag("undeformed", undeformed)
     chosen = _chosen(history, frames)
-    if backend is not None:
-        warn("backend= is no longer used: leave it out", DeprecationWarning)
     figure_class()
     cmap, unit = colormap(cmap), require_text("unit", unit)
     fps, size = _fps(history, chosen, fps), pixels("size", size)

@@ -14,7 +14,7 @@ from ...beam.distribution import Facets
 from ...beam.layout import Layout
 from ...core.errors import (InputError, explained, require_finite, require_slope, shown,
                             warnings_as_errors)
-from ...core.immutable import ours
+from ...core.immutable import is_builtin
 from ...core.types import Array
 from ..item import Item, beside
 from ..places import Vector
@@ -28,7 +28,7 @@ TINY = 1e-300
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
-class Part(NamedTuple):
+class KernelElement(NamedTuple):
     """An element of a kind that kernels know: its kind, two vectors and five numbers."""
 
     kind: int
@@ -192,7 +192,7 @@ class ForceElement(Item):
         """Rows, columns and values (k,) added to the mass matrix; None for none."""
         return None
 
-    def parts(self) -> list[Part] | None:
+    def parts(self) -> list[KernelElement] | None:
         """Its parts of kinds that kernels know, once bound; None for a user-defined element."""
         return None
 
@@ -351,7 +351,7 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
     y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
     K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))
-    if not ours(getattr(bound, "item", bound)):
+    if not is_builtin(getattr(bound, "item", bound)):
         beside(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
     if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "

@@ -16,7 +16,7 @@ from ...core.quadrature import gauss
 from ...core.types import Place
 from ..item import Item
 from ..places import Vector
-from .base import ForceElement, Part
+from .base import ForceElement, KernelElement
 from .kernels import DRAG, FOUNDATION
 
 
@@ -61,9 +61,10 @@ class Foundation(ForceElement):
                                      normal))
         return [place for place, _, _ in self._at]
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[KernelElement]:
         none, one = Vector(np.zeros(2)), float(self.one_sided)
-        return [Part(FOUNDATION, place, none, (self.k * area, self.damping * area, n[0], n[1], one))
+        return [KernelElement(FOUNDATION, place, none,
+                              (self.k * area, self.damping * area, n[0], n[1], one))
                 for place, area, n in self._at]
 
     def __repr__(self) -> str:
@@ -124,10 +125,11 @@ class Drag(ForceElement):
                 self._at.append((place, slope, float(w[k] * length[e, k])))
         return [place for place, _, _ in self._at]
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[KernelElement]:
         q = 0.5 * self.density
-        return [Part(DRAG, place, slope, (q * self.normal * ds, q * self.tangential * ds, 0.0, 0.0,
-                                          0.0)) for place, slope, ds in self._at]
+        return [KernelElement(DRAG, place, slope,
+                              (q * self.normal * ds, q * self.tangential * ds, 0.0, 0.0, 0.0))
+                for place, slope, ds in self._at]
 
     def __repr__(self) -> str:
         return f"<Drag {self.normal:g}, {self.tangential:g}>"

@@ -9,7 +9,7 @@ from ...beam.layout import Layout, WhichBeam
 from ...core.errors import InputError, require_finite, require_not_negative, shown
 from ...core.types import Array
 from ..places import Vector, point, section
-from .base import ForceElement, Part
+from .base import ForceElement, KernelElement
 
 
 class PointMass(ForceElement):
@@ -44,7 +44,7 @@ class PointMass(ForceElement):
             self._masses.append((self.inertia, section(layout, self.beam, self.at)[1]))
         return [place for _, place in self._masses]
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[KernelElement]:
         return []
 
     def mass_entries(self) -> tuple[Array, Array, Array]:

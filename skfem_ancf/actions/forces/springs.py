@@ -18,7 +18,7 @@ from ...core.types import Array, Place
 from ...mesh.places import points_of_rows
 from ..loads import EndMoment
 from ..places import GROUND, Vector, both_of, named_place, point, section
-from .base import ForceElement, Part
+from .base import ForceElement, KernelElement
 from .kernels import SPRING, TINY, TORSION, turned, turning
 
 # user-defined laws of springs and dashpots: force of elongation, angle or rate
@@ -224,10 +224,10 @@ class Spring(ForceElement):
         self._length = distance if self.length is None else self.length
         return [self._link]
 
-    def parts(self) -> list[Part] | None:
+    def parts(self) -> list[KernelElement] | None:
         if isinstance(self.k, Law) or isinstance(self.damping, Law):
             return None
-        return [Part(SPRING, self._link, Vector(np.zeros(2)),
+        return [KernelElement(SPRING, self._link, Vector(np.zeros(2)),
                      (self.k, self._length, self.damping, 0.0, 0.0))]
 
     def _along(self, x):
@@ -319,10 +319,10 @@ class TorsionalSpring(ForceElement):
         self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle
         return [self._d, self._e]
 
-    def parts(self) -> list[Part] | None:
+    def parts(self) -> list[KernelElement] | None:
         if isinstance(self.k, Law) or isinstance(self.damping, Law):
             return None
-        return [Part(TORSION, self._d, self._e, (self.k, self.damping, *self.numbers[2:]))]
+        return [KernelElement(TORSION, self._d, self._e, (self.k, self.damping, *self.numbers[2:]))]
 
     @property
     def key(self) -> Array:

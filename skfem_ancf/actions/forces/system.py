@@ -14,7 +14,7 @@ from ...core.types import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
-from .base import ForceElement, Part, Remembering, recalled
+from .base import ForceElement, KernelElement, Remembering, recalled
 from .control import Control
 from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
                       potential, run_kinds, vectors_of)
@@ -69,7 +69,7 @@ class Forces:
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
         self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
-        parts: list[Part] = []
+        parts: list[KernelElement] = []
         self.custom = []
         for element in self.elements:
             found = element.parts()

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...beam.layout import Layout
 from ...beam.rigid import RigidBody
 from ...core.errors import InputError, explained, require_finite, require_slope, shown
-from ...core.immutable import ours
+from ...core.immutable import is_builtin
 from ...core.types import Array
 from ...mesh.places import is_point
 from ..item import Item, beside, require_entries
@@ -219,11 +219,11 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
     bound = joint._thawed()
     hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
             "multipliers) unless that is constant")
-    with nullcontext() if ours(joint) else explained(
+    with nullcontext() if is_builtin(joint) else explained(
             "{!r} fails in the reference configuration", hint, InputError, joint):
         bound.bind(layout)
         bound._freeze()
-        if not ours(joint):
+        if not is_builtin(joint):
             _try(bound, layout.N)
             beside(partial(require_derivatives, bound, layout.sizes), layout.sizes)
     return bound
@@ -322,14 +322,14 @@ class UnitDirector(Joint):
 
 # independent equations of a joint
 
-class Part(Joint):
+class IndependentPart(Joint):
     """The independent equations of a bound joint, by increasing numbers."""
 
     def __init__(self, joint: Joint, kept: Array) -> None:
         self.joint, self.kept = joint, kept
         self.equations = tuple(joint.equations[k] for k in kept)
         self.constant, self.moving, self.name = joint.constant, joint.moving, joint.name
-        self.tabled = joint.tabled and ours(joint)
+        self.tabled = joint.tabled and is_builtin(joint)
         self._number = np.full(len(joint.equations), -1)
         self._number[kept] = np.arange(len(kept))
         self._freeze()

@@ -123,7 +123,7 @@ def _mean(pair: Any) -> Array:
     return 0.5 * (pair[0] + pair[1])
 
 
-class Family(NamedTuple):
+class AffineVector(NamedTuple):
     """A vector, affine in the DOFs, at both parameters, and its divided difference.
 
     ``rows`` are derivatives by the DOFs at both parameters, (2, 2, n), ``values`` those at
@@ -136,19 +136,20 @@ class Family(NamedTuple):
     quotient: Array
     slopes: Array
 
-    def turned(self, Q: Array) -> Family:
+    def turned(self, Q: Array) -> AffineVector:
         """The family of Q times the vector, Q of shape (2, 2)."""
-        return Family(Q @ self.rows, self.values @ Q.T, Q @ self.quotient, self.slopes @ Q.T)
+        return AffineVector(Q @ self.rows, self.values @ Q.T, Q @ self.quotient, self.slopes @ Q.T)
 
-    def minus(self, other: Family) -> Family:
+    def minus(self, other: AffineVector) -> AffineVector:
         """The difference of two families."""
-        return Family(*(a - b for a, b in zip(self, other)))
+        return AffineVector(*(a - b for a, b in zip(self, other)))
 
 
-class Product:
+class VectorProduct:
     """A product of two families between two displacements; ``times`` is that of two vectors."""
 
-    def __init__(self, times: Callable[[Array, Array], Array], x: Family, y: Family) -> None:
+    def __init__(self, times: Callable[[Array, Array], Array], x: AffineVector, y: AffineVector
+                 ) -> None:
         self._times, self._x, self._y = times, x, y
         self._passing = [_mean(f.values) for f in (x, y)]  # means over s, at each displacement
         (a, b), d, e = self._passing, x.slopes, y.slopes
@@ -181,15 +182,15 @@ class Span(NamedTuple):
     """The equations of a sleeve between two displacements.
 
     ``columns`` are numbers of DOFs, ``change`` is ``u_1 - u_0`` of these, (n,), ``way`` is
-    ``s_1 - s_0`` in elements, ``place`` the Product G, zero at both ends, ``equations`` the other
+    ``s_1 - s_0`` in elements, ``place`` the product G, zero at both ends, ``equations`` the other
     products, and ``shares`` ``f_s / G_s`` of each at both ends, (m, 2).
     """
 
     columns: Array
     change: Array
     way: float
-    place: Product
-    equations: list[Product]
+    place: VectorProduct
+    equations: list[VectorProduct]
     shares: Array
 
     def rows(self) -> Array:
@@ -395,25 +396,26 @@ class Sleeve(Joint):
         dofs, weights, quotients = self.axis.between(*s)
         columns, rows = _placed(self.p.dofs, self.d.dofs, dofs)
 
-        def held(part: int, vector: Vector) -> Family:
+        def held(part: int, vector: Vector) -> AffineVector:
             at = np.array([vector(u) for u in ends])
             matrix = rows(part, vector.weights)
-            return Family(np.array([matrix, matrix]), np.array([at, at]), 0.0 * matrix, 0.0 * at)
+            return AffineVector(np.array([matrix, matrix]), np.array([at, at]), 0.0 * matrix,
+                                0.0 * at)
 
-        def along(order: int) -> Family:
+        def along(order: int) -> AffineVector:
             places, w, q = [self.axis.places(u, dofs).T for u in ends], weights, quotients[order]
-            return Family(rows(2, w[:, order, None]),
+            return AffineVector(rows(2, w[:, order, None]),
                           np.array([[w[k, order] @ x for x in places] for k in range(2)]),
                           rows(2, q[None]), np.array([q @ x for x in places]))
 
         c = along(1)
         gap = held(0, self.p).minus(along(0))
-        equations = [Product(cross, c, gap)]
+        equations = [VectorProduct(cross, c, gap)]
         if self.angle:
-            equations.append(Product(cross, held(1, self.d), c.turned(self.Q)))
+            equations.append(VectorProduct(cross, held(1, self.d), c.turned(self.Q)))
         shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
                   for slopes in (self._slopes(u) for u in ends)]
-        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], Product(dot, c, gap),
+        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], VectorProduct(dot, c, gap),
                     equations, np.array(shares).T)
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:

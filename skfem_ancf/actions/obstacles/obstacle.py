@@ -14,7 +14,7 @@ from ...core.quadrature import gauss_lobatto
 from ...core.types import Array
 from ..contact.contacts import FIRMER, Group
 from ..contact.poses import carried, taken_back
-from ..forces.base import ForceElement, Part
+from ..forces.base import ForceElement, KernelElement
 from ..places import Vector
 from .shapes import Shape
 
@@ -85,8 +85,6 @@ class Obstacle(ForceElement):
         of the height.
     tolerance
         Penetration tolerated by "augmented", a length; by default 1e-5 of the height.
-    slip_speed
-        Deprecated, without effect.
 
     References
     ----------
@@ -101,11 +99,7 @@ class Obstacle(ForceElement):
     def __init__(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
                  beam: WhichBeam = None, method: str = "penalty", position: Any = None,
                  angle: Any = None, damping: float = 0.0, points: int | None = None,
-                 width: float | None = None, tolerance: float | None = None,
-                 slip_speed: float | None = None) -> None:
-        if slip_speed is not None:
-            warn("slip_speed= has no effect any more, leave it out: in a motion points stick as "
-                 "they do in statics", DeprecationWarning)
+                 width: float | None = None, tolerance: float | None = None) -> None:
         if not isinstance(shape, Shape):
             raise InputError("an obstacle is a Circle, Line, Polygon or SignedDistance of "
                              f"skfem_ancf.actions.obstacles, got {shown(shape)}")
@@ -182,7 +176,7 @@ class Obstacle(ForceElement):
         self.groups = tuple(groups)
         return [Vector(np.zeros(2))]
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[KernelElement]:
         return []
 
     # points of the surface

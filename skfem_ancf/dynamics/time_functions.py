@@ -25,7 +25,7 @@ AHEAD = 4096
 HIDDEN = 0.1
 
 
-class Given(NamedTuple):
+class TimeValues(NamedTuple):
     """Prescribed functions at p instants of n steps; axes of constants have length 1."""
 
     times: Array  # (n, p)
@@ -34,9 +34,9 @@ class Given(NamedTuple):
     c: Array  # joint terms that depend on time, and their two rates, (n, p, 3, m)
     g: Array  # the same of the joints' derivatives, (n, p, 3, k)
 
-    def rows(self, part: slice) -> Given:
+    def rows(self, part: slice) -> TimeValues:
         """Select some of the steps."""
-        return Given(*(x if len(x) == 1 else x[part] for x in self))
+        return TimeValues(*(x if len(x) == 1 else x[part] for x in self))
 
 
 def rate_weights(at: Array, samples: Array) -> Array:
@@ -57,7 +57,7 @@ def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
     return np.array([first / dt @ values, second / dt**2 @ values])
 
 
-class Course:
+class TimeFunctions:
     """Samples the functions of time of a system in steps of one size.
 
     ``at`` (p,) are the instants for values and rates, as fractions of a step; ``samples`` (k,) are
@@ -66,14 +66,14 @@ class Course:
 
     def __init__(self, system: System, at: Array, samples: Array) -> None:
         self._system, self._at, self._samples = system, np.array(at), np.array(samples)
-        self._block: tuple[tuple[float, ...], Given] | None = None
+        self._block: tuple[tuple[float, ...], TimeValues] | None = None
 
     @cached_property
     def _rates(self):
         return rate_weights(self._at, self._samples)
 
     def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
-           block: tuple[int, int] | None = None) -> Given:
+           block: tuple[int, int] | None = None) -> TimeValues:
         """Values and rates in the steps ``range(*steps)``; step 0 begins at ``start``.
 
         A whole ``block`` of steps is sampled in one call, so that the result does not depend on
@@ -115,7 +115,7 @@ class Course:
                 g = found[..., s.constraints.m:]
         factors = tables.factors(times.ravel())
         factors = factors.reshape(n, len(self._at), -1) if len(factors) > 1 else factors[None]
-        return Given(times, factors, supports, c, g)
+        return TimeValues(times, factors, supports, c, g)
 
 
 class Lookahead:
