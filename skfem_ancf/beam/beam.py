@@ -231,7 +231,7 @@ class Beam(Immutable):
     @cached_property
     def origin(self) -> Array:
         """A point near the beam, origin of the local coordinates."""
-        return read_only(np.add.reduce(self.mesh.p, axis=1) / self.mesh.p.shape[1])
+        return read_only(self.mesh.p.sum(axis=1) / self.mesh.p.shape[1])
 
     @cached_property
     def q0_local(self) -> Array:
@@ -293,7 +293,7 @@ class Beam(Immutable):
     @cached_property
     def sizes(self) -> Array:
         """Typical changes of the DOFs when the beam moves by its size, shape (N,)."""
-        length, h = float(np.add.reduce(self.mesh.lengths)) / self.mesh.nelements, self.mesh.height
+        length, h = float(self.mesh.lengths.sum()) / self.mesh.nelements, self.mesh.height
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
         out = np.empty((self.N // self.nd, len(node), 2))

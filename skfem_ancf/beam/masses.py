@@ -52,7 +52,7 @@ class Masses(NamedTuple):
 
     def weights(self, g: Array) -> Array:
         """Nodal forces of an acceleration g (2,), shape (nelements, nb, 2)."""
-        out = np.add.reduce(self.functions * self.mass, axis=2).T[:, :, None] * g
+        out = (self.functions * self.mass).sum(axis=2).T[:, :, None] * g
         if self.slopes is not None and self.moments[0].any():
             out = out + np.einsum("iep,ep->ei", self.slopes, self.moments[0])[:, :, None] * (
                 g @ TURN)

@@ -27,8 +27,8 @@ def is_many(points: Any) -> bool:
     """True for a two-dimensional array, or a list or tuple of points."""
     if isinstance(points, np.ndarray):
         return points.ndim == 2
-    return isinstance(points, (list, tuple)) and len(points) > 0 and False not in [
-        isinstance(p, (list, tuple, np.ndarray)) for p in points]
+    return isinstance(points, (list, tuple)) and len(points) > 0 and all(
+        isinstance(p, (list, tuple, np.ndarray)) for p in points)
 
 
 def as_points(points: Any) -> Array:
@@ -102,7 +102,7 @@ class BeamPoints:
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum (..., 2, n) of weighted DOFs (..., N) at each point."""
         if u.ndim == 1:
-            return np.asarray(np.add.reduce(weights[:, None] * u[self.dofs]))
+            return np.asarray((weights[:, None] * u[self.dofs]).sum(axis=0))
         out: Any = 0.0  # without an array of all summands
         for w, d in zip(weights, self.dofs):
             out = out + w * u[..., d]

@@ -274,14 +274,14 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     given = array
     if not (type(array) is np.ndarray and array.dtype is _FLOAT):
         array = _real_array(name, array)
-    if shape is not None and array.shape != shape and (array.ndim != len(shape) or True in [
-            wanted not in (None, n) for wanted, n in zip(shape, array.shape)]):
+    if shape is not None and array.shape != shape and (array.ndim != len(shape) or any(
+            wanted not in (None, n) for wanted, n in zip(shape, array.shape))):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         example = example or "(0, 1)" * (tuple(shape) == (2,))
         raise InputError(f"{name} must have shape {wanted}{example and f', as {example}'}, got "
                          f"{array.shape}: {shown(given)}")
     finite = np.isfinite(array)
-    if not np.logical_and.reduce(finite, axis=None):
+    if not finite.all():
         raise InputError(f"{name} has a value that is NaN or infinite: {array[~finite][0]}")
     return array
 
@@ -317,10 +317,10 @@ def require_increasing(name: str, values: Any) -> Array:
 
 def require_point(point: Any) -> Array:
     """A material point as an array (2,); else MeshError."""
-    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and False not in [
+    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and all(
             type(x) in (float, int, np.float64) or not (
                 isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x))
-            for x in point]:
+            for x in point):
         return require_finite("a material point", point, (2,))
     raise MeshError("a material point has two coordinates (x, y) in the reference configuration, "
                     f"or is the name of an end, as 'right', got {shown(point)}")
@@ -434,7 +434,7 @@ def require_flag(name: str, value: object) -> bool:
 
 def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
     """An instance with these attributes; ``kind`` is its name in the message."""
-    if isinstance(value, type) or False in [hasattr(value, a) for a in attributes]:
+    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
         raise InputError(f"{name} must be a {kind}, got {shown(value)}")
     return value
 

@@ -302,6 +302,8 @@ class Constraints:
     @cached_property
     def _at_rest(self):
         """The matrix of :attr:`slopes`, dense if it is small."""
+        if not self.m:
+            return np.zeros((0, self.N))
         return (self.to_dense if self.few and self.N <= DENSE else self._to_sparse)(*self.slopes)
 
     def _entries(self, u, t):

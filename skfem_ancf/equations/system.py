@@ -81,7 +81,7 @@ class Scales:
         if not s.beams and not s.domains:
             return self.strain_noise
         total = sum(b.kernel.scale / float(b.mesh.lengths.sum())
-                    * float(np.add.reduce(1.0 / b.mesh.lengths)) for b in s.beams)
+                    * float((1.0 / b.mesh.lengths).sum()) for b in s.beams)
         total += sum(float(abs(d.matrix().diagonal()).sum()) for d in s.domains)
         return EPS * s.size * sqrt(total)
 

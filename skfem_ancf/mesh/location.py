@@ -138,7 +138,7 @@ class Finder:
         true where there are several. ``chain`` restricts the search to the chain of this number.
         """
         noise = 1e-9 + 8 * EPS * (
-            self.size + np.maximum.reduce(np.abs(x), axis=None, initial=0.0)) / self.mesh.height
+            self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
         tied = np.zeros(x.shape[1], dtype=bool)
         with np.errstate(all="ignore"):
             if chain is not None:

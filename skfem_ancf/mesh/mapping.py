@@ -363,8 +363,8 @@ class MappingBeam(Mapping):
                                 "before it gets thin there")
         m = self.mesh
         least = m.lengths * m.height if m.is_straight and m.heights is None else (
-            np.minimum.reduce(self.detDF(_FACES), axis=1))
-        if not np.minimum.reduce(least) > 0.0:
+            self.detDF(_FACES).min(axis=1))
+        if not least.min() > 0.0:
             bad = np.nonzero(~(least > 0.0))[0]
             at = self.mesh.p[:, self.mesh.t[0, bad[0]]]
             raise MeshError(

@@ -402,11 +402,10 @@ class MeshBeam(NumberedMesh):
         """True if every element is straight with sections normal to it."""
         p, d = self.doflocs, self.p_X
         chord = (p[:, self.t[1]] - p[:, self.t[0]]) / self.lengths
-        tol = 1e-12 + 8 * EPS * np.maximum.reduce(np.abs(p), axis=None) / np.minimum.reduce(
-            self.lengths)
+        tol = 1e-12 + 8 * EPS * np.abs(p).max() / self.lengths.min()
         off = np.concatenate([(d[:, self.t] - chord[:, None]).reshape(2, -1),
                               self.p_Y - np.array([-d[1], d[0]])], axis=1)
-        return bool(np.maximum.reduce(np.abs(off), axis=None) <= tol)
+        return bool(np.abs(off).max() <= tol)
 
     @cached_property
     def is_uniform(self) -> bool:
@@ -418,11 +417,11 @@ class MeshBeam(NumberedMesh):
 
     def _are_equal(self):
         # the round-off of the nodes' positions is no difference in length
-        noise = 8 * EPS * np.maximum.reduce(np.abs(self.doflocs), axis=None)
+        noise = 8 * EPS * np.abs(self.doflocs).max()
         least, most = _ends(self.lengths)
-        turn = np.maximum.reduce(self.p_X, axis=1) - np.minimum.reduce(self.p_X, axis=1)
+        turn = np.ptp(self.p_X, axis=1)
         if not (most - least <= 1e-13 * most + noise
-                and np.maximum.reduce(turn) <= 1e-12 + noise / least):
+                and turn.max() <= 1e-12 + noise / least):
             return False
         least, most = (0.0, 0.0) if self.is_chain else _ends(self.chain_lengths)
         return bool(most - least <= 1e-12 * most)
@@ -716,7 +715,7 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     >>> reach([MeshBeam.init_line([0, 3], 0.1), MeshBeam.init_line([0, 4], 0.1, (3, 0), np.pi / 2)])
     5.0
     """
-    total = float(sum([np.add.reduce(mesh.lengths) for mesh in meshes]))
+    total = float(sum(mesh.lengths.sum() for mesh in meshes))
     if len(meshes) == 1 and meshes[0].is_chain:
         return total
     longest = max([float(mesh.chain_lengths.max()) for mesh in meshes])
@@ -726,7 +725,7 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
 
 
 def _ends(values):
-    return np.minimum.reduce(values), np.maximum.reduce(values)
+    return values.min(), values.max()
 
 
 def _chain(n):

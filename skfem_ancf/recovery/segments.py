@@ -216,12 +216,12 @@ class Segment:
 
     def from_axis(self, values: Array) -> Array:
         """Integral from the axis to each point of values (..., n, m)."""
-        return self.from_bottom(values) - np.add.reduce(
-            self.span * values * self.points.till_axis, axis=-1)[..., None]
+        till_axis = (self.span * values * self.points.till_axis).sum(axis=-1)
+        return self.from_bottom(values) - till_axis[..., None]
 
     def at_axis(self, values: Array) -> Array:
         """Values (..., n, m) on the axis, (..., n)."""
-        return np.add.reduce(values * self.points.axis, axis=-1)
+        return (values * self.points.axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it.

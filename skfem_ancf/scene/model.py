@@ -144,7 +144,8 @@ class Model(NearMisses):
             raise InputError(f"the item must be an Item, as a Spring, a Load or a Joint, got "
                              f"{shown(item)}: derive yours from skfem_ancf.Item")
         bound = [part for one in item.expand(self.layout) for part in bind_item(one, self.layout)]
-        numbers = {name: number for name, value in vars(item).items() if name[0] != "_"
+        numbers = {name: number for name, value in vars(item).items()
+                   if isinstance(value, (Beam, tuple, list)) and name[0] != "_"
                    and (number := self._numbered(value)) is not value}
         if numbers:
             item = item._with(**numbers)

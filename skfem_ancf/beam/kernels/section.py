@@ -107,7 +107,7 @@ class SectionKernel(ElementKernel):
 
     def inverted(self, u: Array) -> bool:
         for x, y in self._gradients(u, 2):
-            if not np.logical_and.reduce(x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0], axis=None):
+            if not (x[:, 0] * y[:, 1] > x[:, 1] * y[:, 0]).all():
                 return True
         return False
 
