@@ -103,7 +103,7 @@ def _read_steps(sensor, at, steps):
     return found + at.start if sensor.what == "position" else found
 
 
-def _read(sensor, at, state):
+def read(sensor, at, state):
     """The value of a sensor at one State."""
     what: Any = sensor.what
     if callable(what):
@@ -184,7 +184,7 @@ class Recorder:
             return
         others = [(sensor, at) for (_, sensor), at in zip(self.sensors, self._located)
                   if not sensor.moving]
-        rows = [[_read(sensor, at, state) for sensor, at in others]
+        rows = [[read(sensor, at, state) for sensor, at in others]
                 for state in map(self._state_of, steps)] if others else []
         columns = iter(zip(*rows))
         found = [_read_steps(sensor, at, steps) if sensor.moving else _stacked(name, next(columns))

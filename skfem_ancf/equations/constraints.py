@@ -411,6 +411,20 @@ class Constraints:
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
+    def driven(self, joint: Joint, change: Array) -> tuple[Array, Array]:
+        """Changes of J u (m,) and of fixed displacements (N,) for a change of Phi of a joint."""
+        rows, fixed, at = np.zeros(self.m), np.zeros(self.N), 0
+        for known in self.joints:
+            if known.same(joint):
+                rows[at:at + len(change)] = -change
+                return rows, fixed
+            at += len(known.equations)
+        for known, first, factors in self._fixing:
+            if known.same(joint):
+                fixed[self.fixed[first:first + len(factors)]] = -change / factors
+                return rows, fixed
+        raise SupportError(f"{shown(joint)} is not a joint of this scene")
+
     def force_on(self, selected: Array, multipliers: Array, rest: Array) -> tuple[Array, Array]:
         """Support-like forces: of constant joints that involve only selected DOFs (N,).
 

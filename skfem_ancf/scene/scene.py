@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from skfem.assembly import Basis
 
 from ..actions.item import Item
+from ..actions.joints import Joint
 from ..actions.loads import Load
 from ..actions.point_force import PointForce
 from ..beam.beam import Beam
@@ -32,6 +33,7 @@ from ..equations.system import System
 from ..results.checks import warn_of_points
 from ..results.modes import Buckling, Modes
 from ..results.path import CriticalPoint, Path
+from ..results.response import FrequencyResponse
 from ..results.state import State
 from ..solvers import continuation, eigen, newton
 from ..solvers.tracing import Point
@@ -39,6 +41,7 @@ from ..visuals.explore import Explorer, explorer
 from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
 from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
+from .linear_model import LinearModel
 from .model import Model
 from .plan import Plan, make_plan
 from .quasistatic import StepHistory, Steps, run
@@ -504,6 +507,72 @@ class Scene(Model):
             except (ConvergenceError, Interrupted) as error:
                 raise type(error)(str(error), Path(system, *error.state)) from None
 
+    def linearize(self, state: State | None, inputs: Sequence[Any],
+                  outputs: Sequence[str | Sensor] | None = None) -> LinearModel:
+        """A linear model about a state, for control, transfer functions and frequency responses.
+
+        Parameters
+        ----------
+        state
+            A State at rest, prestress and contact included; None for the reference configuration.
+        inputs
+            What acts beside the loads of the scene: Loads, as ``PointForce((0, 1), at=(1, 0))``,
+            ``Temperature(1.0)`` or ``Motor("left", torque=1.0)``, each a unit input; or joints of
+            the scene that prescribe a motion, as returned by :meth:`joint`, whose position or
+            angle is the input. A list, or a dict with their names.
+        outputs
+            Names of sensors of the scene, see :meth:`sensor`; all of them by default.
+
+        Raises
+        ------
+        InputError
+            If an input or output cannot be linearised, or the state moves.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, PointForce,
+        ...                         Scene, StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
+        >>> scene = Scene(beam).clamp("left").sensor("tip", "displacement", at=(1, 0))
+        >>> model = scene.linearize(None, [PointForce((0, 1), at=(1, 0))])
+        >>> A, B, C, D, T = model.state_space(modes=3)
+        >>> poles = np.sort_complex(np.linalg.eigvals(A))
+        >>> bool(np.all(poles.real < 0)), A.shape, C.shape
+        (True, (6, 6), (2, 6))
+        """
+        with self._lock:
+            about = self.state(load=0.0) if state is None else state
+            return LinearModel(self.system, configuration(self.system, about),
+                               list(self._inputs(inputs)), self._located(outputs))
+
+    def frequency_response(self, frequencies: ArrayLike, inputs: Sequence[Any],
+                           outputs: Sequence[str | Sensor] | None = None,
+                           about: State | None = None) -> FrequencyResponse:
+        """The response to harmonic inputs, with the damping of the scene.
+
+        Parameters
+        ----------
+        frequencies
+            Angular frequencies in rad/s, shape (n,).
+        inputs, outputs, about
+            As for :meth:`linearize`; ``about`` is the state.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, PointForce,
+        ...                         Scene, StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
+        >>> scene = Scene(beam).clamp("left").sensor("tip", "displacement", at=(1, 0))
+        >>> response = scene.frequency_response([0.0, 3.0], [PointForce((0, 1), at=(1, 0))])
+        >>> float(response.of("tip 1")[0].real.round(4))                    # 4 L^3 / (E b h^3)
+        2.0
+        """
+        return self.linearize(about, inputs, outputs).frequency_response(frequencies)
+
     def initial_velocity(self, v: ArrayLike | Callable[[Array], Array],
                          beam: WhichMember = None) -> Self:
         """The velocity at the start of :meth:`integrate`.
@@ -710,10 +779,29 @@ class Scene(Model):
             self._sensors = {**self._sensors, name: sensor}
         return self
 
-    def _located(self):
-        for sensor in self._sensors.values():
+    def _located(self, names=None):
+        """Names and sensors, all or some of the scene or given as such."""
+        found = dict[str, Sensor]()
+        for one in self._sensors if names is None else names:
+            if not isinstance(one, Sensor) and one not in self._sensors:
+                raise NameUnknown("sensor", one, self._sensors)
+            found[repr(one)[1:-1] if isinstance(one, Sensor) else one] = (
+                one if isinstance(one, Sensor) else self._sensors[one])
+        for sensor in found.values():
             locate(sensor, self.system)
-        return list(self._sensors.items())
+        return list(found.items())
+
+    def _inputs(self, inputs):
+        """Names and bound Loads, or joints of the scene that prescribe a motion."""
+        named = inputs.items() if isinstance(inputs, dict) else [(None, one) for one in inputs]
+        for name, item in named:
+            if not (isinstance(item, Joint) and item.driver and item in self.joints):
+                bound = self._bound(item).bound if isinstance(item, Item) else ()
+                if len(bound) != 1 or not isinstance(bound[0], Load):
+                    raise InputError(
+                        "an input is a Load, as PointForce((0, 1), at=(1, 0)), or a joint of the "
+                        f"scene that prescribes a motion, got {shown(item)}")
+            yield name or repr(item)[1:-1], (bound[0] if not isinstance(item, Joint) else item)
 
     def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
                progress: bool | None = None) -> History:

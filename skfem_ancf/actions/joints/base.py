@@ -60,6 +60,9 @@ class Joint(Item):
         if :meth:`mean_entries` and :meth:`mean_turning` are exact.
     moving : bool
         Phi depends on t.
+    driver : str
+        Name of the attribute that is the function of time, if its values may be an input of a
+        linear model; else empty.
     tabled : bool
         Phi is at most quadratic in u, with constant second derivatives; for joints of the package.
 
@@ -84,6 +87,7 @@ class Joint(Item):
     constant = True
     moving = False
     tabled = True
+    driver = ""
 
     def bind(self, layout: Layout) -> None:
         """Find the points and sections; called on a copy."""

@@ -38,6 +38,7 @@ class PrescribedPosition(Joint):
 
     equations = ("force along x", "force along y")
     moving = True
+    driver = "motion"
 
     def __init__(self, at: Any = None, r: Callable[[float], ArrayLike] | None = None,
                  beam: WhichMember = None, name: str | None = None) -> None:
@@ -72,6 +73,7 @@ class PrescribedDisplacement(Joint):
     """
 
     moving = True
+    driver = "displacement"
 
     def __init__(self, boundary: Any, names: Any, displacement: Callable[[float], float],
                  beam: WhichMember = None, name: str | None = None) -> None:
@@ -116,6 +118,7 @@ class PrescribedAngle(Joint):
     equations = ("moment",)
     constant = False
     moving = True
+    driver = "angle"
 
     def __init__(self, at: Any = None, angle: Callable[[float], float] | None = None,
                  beam: WhichMember = None, name: str | None = None) -> None:
@@ -176,6 +179,7 @@ class PrescribedTurn(Joint):
     equations = ("moment",)
     constant = tabled = False
     moving = True
+    driver = "angle"
 
     def __init__(self, at: Any, other: Any, angle: Callable[[float], float],
                  name: str | None = None) -> None:

@@ -1,0 +1,118 @@
+"""Frequency responses: amplitudes, phases, and the response to random loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.errors import InputError, NameUnknown, require_finite, require_index
+from ..core.near_misses import NearMisses
+from ..core.types import Array, StrPath
+from ..visuals.bode import plot_bode, plot_nyquist
+
+
+@dataclass(repr=False)
+class FrequencyResponse(NearMisses):
+    """Complex amplitudes of outputs for inputs of amplitude 1.
+
+    Attributes
+    ----------
+    frequencies
+        Angular frequencies omega in rad/s, shape (n,).
+    values
+        ``y / s`` of ``y exp(i omega t)`` and ``s exp(i omega t)``, complex, (n, outputs, inputs).
+    inputs, outputs
+        Their names.
+    """
+
+    frequencies: np.ndarray
+    values: np.ndarray
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def __repr__(self):
+        low, high = self.frequencies.min(), self.frequencies.max()
+        return (f"<FrequencyResponse at {len(self.frequencies)} frequencies, {low:.4g} to "
+                f"{high:.4g} rad/s, of {list(self.outputs)} to {list(self.inputs)}>")
+
+    def of(self, output: int | str = 0, input: int | str = 0) -> Array:
+        """Complex amplitudes of one output for one input, by name or number, shape (n,)."""
+        return self.values[:, _number("output", output, self.outputs),
+                           _number("input", input, self.inputs)]
+
+    @property
+    def amplitude(self) -> Array:
+        """Moduli, (n, outputs, inputs)."""
+        return np.abs(self.values)
+
+    @property
+    def phase(self) -> Array:
+        """Phases in radians, continuous in the frequency, (n, outputs, inputs)."""
+        return np.unwrap(np.angle(self.values), axis=0)
+
+    def rms(self, density: ArrayLike) -> Array:
+        """Root mean squares of the outputs under random inputs, shape (outputs,).
+
+        The variance is the integral of ``H S H^*`` over the frequencies, by the trapezoidal rule:
+        these have to resolve the resonances.
+
+        Parameters
+        ----------
+        density
+            One-sided spectral densities S per rad/s, of the square of the input: a number or an
+            array (n,) for one input; (n, inputs) for independent ones, or cross-spectral matrices
+            (n, inputs, inputs).
+        """
+        n, k = self.values.shape[0], len(self.inputs)
+        S: Any = np.asarray(density)
+        if S.ndim < 2:
+            S = np.broadcast_to(S, (n,))[:, None] if S.shape in ((), (n,)) and k == 1 else S
+        if S.shape == (n, k):
+            S = S[:, :, None] * np.eye(k)
+        if S.shape != (n, k, k):
+            raise InputError(f"density must have the shape ({n}, {k}) or ({n}, {k}, {k}) of "
+                             f"{n} frequencies and {k} input(s), got {np.shape(density)}")
+        found = np.einsum("nri,nij,nrj->nr", self.values, S, self.values.conj()).real
+        return np.sqrt(np.trapezoid(found, self.frequencies, axis=0) if hasattr(np, "trapezoid")
+                       else np.trapz(found, self.frequencies, axis=0))
+
+    def plot(self, output: int | str = 0, input: int | str = 0, axes: Any = None, *,
+             label: str | None = None, title: str | None = None,
+             filename: StrPath | None = None, dpi: float = 150) -> Any:
+        """Draw amplitude and phase over the frequency (Bode); returns two Axes.
+
+        Parameters
+        ----------
+        output, input
+            Names or numbers.
+        axes, label, title, filename, dpi
+            As for :func:`skfem_ancf.visuals.bode.plot_bode`.
+        """
+        return plot_bode(self.frequencies, self.of(output, input), axes, label=label, title=title,
+                         filename=filename, dpi=dpi)
+
+    def plot_nyquist(self, output: int | str = 0, input: int | str = 0, ax: Any = None, *,
+                     label: str | None = None, title: str | None = None,
+                     filename: StrPath | None = None, dpi: float = 150) -> Any:
+        """Draw the imaginary over the real part (Nyquist); returns the Axes.
+
+        Parameters
+        ----------
+        output, input
+            Names or numbers.
+        ax, label, title, filename, dpi
+            As for :func:`skfem_ancf.visuals.bode.plot_nyquist`.
+        """
+        return plot_nyquist(self.of(output, input), ax, label=label, title=title,
+                            filename=filename, dpi=dpi)
+
+
+def _number(kind, which, names):
+    if isinstance(which, str):
+        if which not in names:
+            raise NameUnknown(kind, which, names)
+        return names.index(which)
+    return require_index(kind, which, len(names))

@@ -1,0 +1,266 @@
+"""Linear models of a scene about a state: state space, transfer functions, frequency response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from ..actions.loads import Load
+from ..core.errors import InputError, SupportError, require_finite, require_integer
+from ..core.types import Array
+from ..dynamics.sensors import Sensor, locate, read
+from ..equations.matrices import matrices_of
+from ..results.modes import Modes
+from ..results.response import FrequencyResponse
+from ..results.state import State
+from ..solvers import eigen
+
+#: Shift of the stiffness for a static correction, relative to the highest kept eigenvalue.
+SHIFT = 1e-6
+#: Change of a prescribed motion for derivatives of joints, in radians.
+TURN = 1e-5
+
+
+class Readings(NamedTuple):
+    """Derivatives of readings by u (r, N), u', u'', and the multipliers (r, m)."""
+
+    u: Array
+    v: Array
+    a: Array
+    multipliers: Array
+
+
+class StateSpace(NamedTuple):
+    """``x' = A x + B s``, ``y = C x + D s`` for changes s of the inputs and y of the outputs.
+
+    x are 2 n numbers: n coordinates q with ``u = T q``, and their rates. scipy.signal and
+    python-control take ``model.state_space()[:4]``.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    T: Array
+
+
+class LinearModel:
+    """The linearised equations of a scene about a state, with inputs and outputs.
+
+    ``M u'' + D u' + K u + J^T l = B s``, ``J u = G s``, ``y = C u + ...`` for small changes of the
+    displacement u, of sizes s of loads and prescribed motions, and of readings y of sensors.
+    :meth:`Scene.linearize <skfem_ancf.Scene.linearize>` makes one.
+
+    Attributes
+    ----------
+    matrices
+        :class:`~skfem_ancf.SceneMatrices` about the state.
+    inputs, outputs
+        Their names: lists of k and r texts.
+    B
+        Forces of unit inputs, (N, k).
+    G
+        Right-hand sides of the joints for unit inputs, (m, k).
+    prescribed
+        Displacements of fixed degrees of freedom for unit inputs, (N, k).
+    readings
+        Derivatives of the outputs by displacement, velocity and acceleration, (r, N) each, and by
+        the multipliers, (r, m).
+    """
+
+    def __init__(self, system: Any, state: State, inputs: Sequence[tuple[str, Any]],
+                 sensors: Sequence[tuple[str, Sensor]]) -> None:
+        self.state, self._system = state, system
+        self.matrices = matrices_of(system, state)
+        self._free = system.constraints.free
+        if np.any(state.v):
+            raise InputError("a linear model is about a state at rest, and this one moves: use "
+                             "the equilibrium, of a steady rotation that in a rotating frame, see "
+                             "skfem_ancf.RotatingFrame")
+        columns = [(name, _columns(system, state, item)) for name, item in inputs]
+        self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
+        self.B, self.G, self.prescribed = (
+            np.column_stack(parts) for parts in zip(*(c for _, some in columns for c in some)))
+        rows = [(name, _rows(system, state, sensor)) for name, sensor in sensors]
+        self.outputs = [label for name, row in rows for label in _labels(name, len(row.u))]
+        self.readings = Readings(*(np.concatenate(parts) for parts in zip(*(r for _, r in rows))))
+
+    def __repr__(self) -> str:
+        return (f"<LinearModel of {self._free.sum()} unknowns, inputs {self.inputs}, outputs "
+                f"{self.outputs}>")
+
+    # state space
+
+    def state_space(self, modes: int | None = None) -> StateSpace:
+        """Matrices of the state space, joints and supports eliminated.
+
+        Parameters
+        ----------
+        modes
+            Reduce to this number of lowest modes, with the static response of all others in D; by
+            default all coordinates. With modes the numbers of slender beams are more accurate, as
+            the assembled stiffness has the round-off of (L / h)^2.
+
+        Raises
+        ------
+        InputError
+            If an input is a prescribed motion, whose accelerations are not inputs, a material has
+            no density, or an output is the force of a joint.
+        """
+        if np.any(self.G) or np.any(self.prescribed):
+            raise InputError("a state space has forces as inputs, and an input is a prescribed "
+                             "motion: use frequency_response(), or an acceleration a of the whole "
+                             "base as the input Weight((-1, 0)), or (0, -1), with displacements "
+                             "relative to the base")
+        if np.any(self.readings.multipliers):
+            raise InputError("joints are eliminated from a state space, and an output is the force "
+                             "of a joint: use frequency_response(), or the force of a stiff spring")
+        M, D, K, T = self._reduced() if modes is None else self._modal(modes)
+        n = len(M)
+        inertia = scipy.linalg.cho_factor(M)
+        B = scipy.linalg.cho_solve(inertia, T.T @ self.B)
+        lower = -scipy.linalg.cho_solve(inertia, np.hstack([K, D]))
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [lower]])
+        u, v, a, _ = self.readings
+        C = np.hstack([u @ T, v @ T]) + a @ T @ lower
+        through = a @ T @ B if modes is None else a @ T @ B + u @ self._rest(T, K)
+        return StateSpace(A, np.vstack([np.zeros_like(B), B]), C, through, T)
+
+    def _mass(self):
+        if self.matrices.M is None:
+            raise InputError("a material has no density: give density= of the material")
+        return self.matrices.M
+
+    def _reduced(self):
+        """Mass, damping, stiffness and the basis (N, n) of all motions that joints allow."""
+        free, sizes = self._free, self._system.constraints.coordinate_sizes
+        T = np.diag(sizes)[:, free]
+        if self.matrices.J.shape[0]:
+            T = T @ scipy.linalg.null_space(self.matrices.J @ T)
+        return *(T.T @ (A @ T) for A in (self._mass(), *self.matrices[1:3])), T
+
+    def _modal(self, k):
+        """The same of the lowest modes."""
+        found: Modes = eigen.modes(self._system, self.state, require_integer("modes", k, 1))
+        T = found.shapes.T
+        if np.iscomplexobj(T):
+            raise InputError("the loads have no potential, and modes are complex: use "
+                             "state_space() without modes")
+        K = np.diag(found.eigenvalues.real) if self._system.symmetric else (
+            T.T @ (self.matrices.K @ T))
+        return np.eye(k), T.T @ (self.matrices.D @ T), K, T
+
+    def _rest(self, T, K):
+        """Displacements (N, k) of unit inputs without those of modes, static."""
+        shift = SHIFT * max(np.abs(np.diag(K)).max(), np.finfo(float).tiny)
+        A = self.matrices.K + shift * self._mass()
+        out = self._solved(A, self.B, self.G)[0]
+        return out - T @ np.linalg.solve(K + shift * np.eye(len(K)), T.T @ self.B)
+
+    # frequencies
+
+    def frequency_response(self, frequencies: ArrayLike) -> FrequencyResponse:
+        """The harmonic response: amplitudes of ``y exp(i omega t)`` for inputs ``exp(i omega t)``.
+
+        One sparse factorisation for each frequency, with the damping matrix as it is.
+
+        Parameters
+        ----------
+        frequencies
+            Angular frequencies omega in rad/s, shape (n,); 0 for the static response.
+        """
+        omega = np.atleast_1d(require_finite("frequencies", frequencies))
+        if omega.ndim != 1:
+            raise InputError(f"frequencies must be an array (n,), got the shape {omega.shape}")
+        M, D, K = self._mass(), *self.matrices[1:3]
+        out = np.empty((len(omega), len(self.outputs), len(self.inputs)), complex)
+        for k, w in enumerate(omega):
+            u, multipliers = self._solved(K + 1j * w * D - w * w * M, self.B, self.G)
+            r = self.readings
+            out[k] = (r.u + 1j * w * r.v - w * w * r.a) @ u + r.multipliers @ multipliers
+        return FrequencyResponse(omega, out, tuple(self.inputs), tuple(self.outputs))
+
+    def _solved(self, A, B, G):
+        """Displacements (N, k) and multipliers (m, k) for the dynamic stiffness A."""
+        free, s = self._free, self._system.constraints.coordinate_sizes
+        u = np.array(self.prescribed, dtype=A.dtype)
+        S = sparse.diags_array(s[free])
+        A_free, J = S @ A[free][:, free] @ S, self.matrices.J[:, free] @ S
+        scale = np.abs(A_free.diagonal()).max()
+        m = J.shape[0]
+        if m:
+            A_free = sparse.block_array([[A_free, scale * J.T], [scale * J, None]])
+        right = np.concatenate([s[free, None] * (B - A @ u)[free],
+                                scale * (G - self.matrices.J @ u)]).astype(A.dtype)
+        try:
+            x = splu(A_free.tocsc()).solve(right)
+        except RuntimeError:
+            raise SupportError("the dynamic stiffness is singular: a motion without supports has "
+                               "no static response, and an undamped mode none at its frequency"
+                               ) from None
+        u[free] = s[free, None] * x[:len(x) - m]
+        return u, scale * x[len(x) - m:]
+
+
+def _labels(name, n):
+    return [name] if n == 1 else [f"{name} {k}" for k in range(n)]
+
+
+def _columns(system, state, item):
+    """Columns of B (N,), G (m,) and prescribed displacements (N,) for each number of an input."""
+    if isinstance(item, Load):
+        B, s = np.zeros(system.N), system.of(item)
+        factor, acting = item.acting(state.t)
+        B[s] = factor * acting.force(np.array(state.u[s]))
+        return [(B, np.zeros(system.constraints.m), np.zeros(system.N))]
+    t, none = state.load if state.t is None else state.t, np.zeros(system.N)
+    return [(none, *system.constraints.driven(item, change)) for change in _driven(item, state, t)]
+
+
+def _driven(joint, state, t):
+    """Derivatives of the equations of a joint by what it prescribes, an array (m,) for each."""
+    function = getattr(joint, joint.driver)
+
+    def moved(by):
+        other = joint._thawed()
+        setattr(other, joint.driver, lambda time: np.asarray(function(time)) + by)
+        return other.value(np.array(state.u), t)
+
+    n = np.size(function(t))
+    steps = TURN * np.eye(n) if np.ndim(function(t)) else [TURN]
+    return [(moved(by) - moved(-by)) / (2.0 * TURN) for by in steps]
+
+
+def _rows(system, state, sensor):
+    """Derivatives of the readings of a sensor."""
+    at, N, m = locate(sensor, system), system.N, system.constraints.m
+    local = np.arange(N) if at is None or sensor.recover else np.unique(np.concatenate(
+        [np.ravel(part.dofs) for part in at.parts]))
+
+    def moved(u, multipliers=0.0):
+        return State(system, state.u + u, state.load, base=state, t=state.t, memory=state.memory,
+                     multipliers=state.multipliers + multipliers)
+
+    def by(n, numbers, change):
+        rest, units = np.ravel(read(sensor, at, moved(0.0))), np.eye(n)
+        out = np.zeros((len(rest), n))
+        for k in numbers:
+            out[:, k] = np.ravel(read(sensor, at, change(units[k]))) - rest
+        return out
+
+    if sensor.what in ("velocity", "acceleration"):
+        units = np.eye(N)[local]
+        row = np.zeros((len(np.ravel(at.start)), N))
+        row[:, local] = at.velocity(state.u + 0.0 * units, units).reshape(len(local), -1).T
+        zero = np.zeros_like(row)
+        parts = (zero, row, zero) if sensor.what == "velocity" else (zero, zero, row)
+        return Readings(*parts, np.zeros((len(row), m)))
+    row = by(N, local, moved)
+    pull = np.zeros((len(row), m)) if at is not None else by(m, range(m), lambda l: moved(0.0, l))
+    return Readings(row, 0.0 * row, 0.0 * row, pull)
