@@ -3,8 +3,8 @@
 from .actions.axial import FollowerForce, LineLoad
 from .actions.eigenstrain import EigenStrain, Temperature
 from .actions.energy import Energy, check_derivatives
-from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
-                             TorsionalSpring)
+from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, RotatingFrame,
+                             Spring, TorsionalSpring)
 from .actions.item import Item
 from .actions.joints import (Hinge, Joint, Motor, OnCircle, OnLine, PlaneSection, PrescribedAngle,
                              PrescribedPosition, PrescribedTurn, Sleeve, Slot, Weld)
@@ -36,9 +36,11 @@ from .mesh.mesh_beam import MeshBeam
 from .recovery.resultants import Resultants
 from .results.checks import Checks
 from .results.path import CriticalPoint, Path
+from .results.response import FrequencyResponse
 from .results.state import Reaction, State
 from .scene.frame import Frame
 from .scene.plan import Plan
+from .scene.linear_model import LinearModel, StateSpace
 from .scene.scene import Scene
 from .sections import Section
 from .results.modes import Buckling, Modes
@@ -84,6 +86,7 @@ __all__ = [
     "Formulation",
     "Foundation",
     "Frame",
+    "FrequencyResponse",
     "Gauss",
     "GeneralizedAlpha",
     "Hinge",
@@ -95,6 +98,7 @@ __all__ = [
     "Joint",
     "KelvinVoigt",
     "Line",
+    "LinearModel",
     "LineLoad",
     "Load",
     "Material",
@@ -130,6 +134,7 @@ __all__ = [
     "Readings",
     "Resultants",
     "RigidBody",
+    "RotatingFrame",
     "Scene",
     "SceneMatrices",
     "Scheme",
@@ -141,6 +146,7 @@ __all__ = [
     "StVenantKirchhoff",
     "StabilityWarning",
     "State",
+    "StateSpace",
     "StepHistory",
     "Steps",
     "Support",

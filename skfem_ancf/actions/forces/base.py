@@ -21,6 +21,8 @@ from ..places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.
 STEP = 1e-6
+#: Relative round-off of a potential.
+ROUND_OFF = 1e-14
 #: Relative perturbation of the reference configuration for checks of user-defined elements.
 ASIDE = 0.01
 #: The span of a mean at one time.
@@ -156,12 +158,6 @@ class ForceElement(Item):
         """Potential at a time, for time-dependent energies."""
         return self.potential(x)
 
-    def gain(self, x: Array, y: Array, t: float) -> float | None:
-        """Change of the potential from x to y; None if there is none."""
-        before = self.potential_at(x, t)
-        after = None if before is None else self.potential_at(y, t)
-        return None if before is None or after is None else after - before
-
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         """Mean force (n, 2) at zero velocity, whose work is minus the change of the potential.
 
@@ -171,11 +167,14 @@ class ForceElement(Item):
         """
         d = y - x
         force = np.asarray(self.force(0.5 * (x + y), 0.0 * x, t), dtype=float)
-        square = np.sum(d * d)
-        gain = self.gain(x, y, t) if square > 0.0 else None
-        if gain is None:
+        before = self.potential_at(x, t) if np.any(d) else None
+        after = None if before is None else self.potential_at(y, t)
+        if before is None or after is None:
             return force
-        return force - (gain + np.sum(force * d)) / square * d
+        excess = after - before + np.sum(force * d)
+        if abs(excess) <= ROUND_OFF * (abs(before) + abs(after)):
+            return force  # next to rest round-off, divided by |d|, would be a large force
+        return force - excess / np.sum(d * d) * d
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         """Derivative of the force by the positions, shape (n, 2, n, 2), the derivative's axes last.
@@ -322,7 +321,7 @@ def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
     with explained("{!r} fails in the reference configuration", hint, InputError,
                    element) if own else nullcontext():
         bound.links = _links(element, bound.bind(layout))
-        if bound.parts() is None:
+        if bound.parts() is None and bound.entries is None:
             try_force(bound)
     bound._freeze()
     return bound

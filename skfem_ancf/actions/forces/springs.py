@@ -65,14 +65,8 @@ class Law:
             return ask_number(f"the potential of {self.name} at {{:g}}", self.energy, float(s))
         return float(scipy.integrate.quad(self, 0.0, s, epsabs=0.0, epsrel=1e-12, limit=200)[0])
 
-    def work(self, a: float, b: float) -> float:
-        """Change of the potential from a to b."""
-        if self.energy is not None:
-            return self.potential(b) - self.potential(a)
-        return (b - a) * self.mean(a, b)
-
     def mean(self, a: float, b: float) -> float:
-        """Mean force from a to b: :meth:`work` over b - a."""
+        """Mean force from a to b, whose work is the change of the potential."""
         if a == b:
             return self(a)
         x, w = gauss(POINTS)
@@ -101,9 +95,6 @@ class Proportional(float):
 
     def potential(self, s: float) -> float:
         return 0.5 * self * s * s
-
-    def work(self, a: float, b: float) -> float:
-        return 0.5 * self * (b - a) * (b + a)
 
     def mean(self, a: float, b: float) -> float:
         return 0.5 * self * (a + b)
@@ -250,9 +241,6 @@ class Spring(ForceElement):
     def potential(self, x: Array) -> float:
         return self.k.potential(self._along(x)[0] - self._length)
 
-    def gain(self, x: Array, y: Array, t: float) -> float:
-        return self.k.work(*(self._along(z)[0] - self._length for z in (x, y)))
-
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         a, b = self._along(x)[0], self._along(y)[0]
         return -self.k.mean(a - self._length, b - self._length) / (a + b) * (x + y)
@@ -362,9 +350,6 @@ class TorsionalSpring(ForceElement):
 
     def potential(self, x: Array) -> float:
         return self.k.potential(self.angle_of(x))
-
-    def gain(self, x: Array, y: Array, t: float) -> float:
-        return self.k.work(self.angle_of(x), self.angle_of(y))
 
     def mean_force(self, x: Array, y: Array, t: float) -> Array:
         g = np.empty((4, 1))

@@ -1,0 +1,100 @@
+"""A frame of reference that rotates: centrifugal and Coriolis forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from ...beam.beam import Beam
+from ...beam.layout import Layout, WhichMember
+from ...core.errors import require_finite, require_finite_scalar
+from ...core.types import Array
+from ..item import Item
+from ..places import Vector
+from .base import ForceElement
+
+
+class RotatingFrame(ForceElement):
+    """Describe a scene in a frame that turns at a constant angular velocity.
+
+    All positions, displacements and supports are those in the frame. On each mass act the
+    centrifugal force ``dm Omega^2 (r - center)`` and the Coriolis force ``2 dm Omega (v_y, -v_x)``:
+    a static solution is a steady rotation, ``scene.linearize`` about it has both, ``scene.modes``
+    the first of them. Point masses do not feel them: use rigid bodies.
+
+    Parameters
+    ----------
+    speed
+        Angular velocity Omega of the frame, in radians per time, counterclockwise.
+    center
+        The point about which it turns, shape (2,).
+    beam
+        Beam, rigid body or domain, name or number; all of them by default.
+
+    Examples
+    --------
+    The blade of a rotor stretches by rho Omega^2 L^3 / (3 E) at its tip:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, RotatingFrame, Scene
+    >>> from skfem_ancf import StVenantKirchhoff
+    >>> blade = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamCable(5),
+    ...              StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(blade).clamp("left").add(RotatingFrame(3.0))
+    >>> tip = scene.solve_static().displacement((1, 0))
+    >>> bool(abs(tip[0] / (7800 * 3.0**2 / (3 * 2e8)) - 1) < 1e-3)
+    True
+    """
+
+    distributed = True
+    symmetric = False
+
+    def __init__(self, speed: float, center: ArrayLike = (0.0, 0.0),
+                 beam: WhichMember = None) -> None:
+        self.speed = require_finite_scalar("speed", speed)
+        self.center, self.beam = require_finite("center", center, (2,)), beam
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        if self.beam is not None:
+            return (self,)
+        return [self._with(beam=k) for k in range(len(layout.members))]
+
+    def bind(self, layout: Layout) -> list[Vector]:
+        member, first = layout.beam(self.beam), layout.offset(self.beam)
+        along_x, along_y, turn = member.rigid_motions().T
+        around = np.column_stack([along_x, along_y]) @ (member.origin - self.center)
+        #: positions and directions relative to the centre, (n, 2)
+        self._rest = around.reshape(-1, 2) + np.column_stack([turn[1::2], -turn[::2]])
+        if isinstance(member, Beam):
+            M = sparse.csr_array(member.mass())
+        else:
+            i, j, values = member.mass_entries()
+            M = sparse.csr_array((values, (i, j)), shape=(member.N, member.N))
+        self._mass = sparse.coo_array(M[::2][:, ::2])
+        i, j = self._mass.coords
+        # the derivatives by both components of both
+        c, d = np.divmod(np.arange(4), 2)
+        self.entries = ((2 * i[:, None] + c).ravel(), (2 * j[:, None] + d).ravel())
+        return [Vector(np.zeros(2), first + k + np.arange(2)[:, None], 1.0)
+                for k in range(0, member.N, 2)]
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        w = self.speed
+        return self._mass @ (w * w * (self._rest + x)
+                             + 2.0 * w * np.column_stack([v[:, 1], -v[:, 0]]))
+
+    def potential(self, x: Array) -> float:
+        r = self._rest + x
+        return -0.5 * self.speed**2 * float(np.sum(r * (self._mass @ r)))
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        return np.outer(self.speed**2 * self._mass.data, [1.0, 0.0, 0.0, 1.0]).ravel()
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        return np.outer(2.0 * self.speed * self._mass.data, [0.0, 1.0, -1.0, 0.0]).ravel()
+
+    def __repr__(self) -> str:
+        return f"<RotatingFrame {self.speed:g} rad per time>"
