@@ -42,6 +42,7 @@ from .scene.frame import Frame
 from .scene.plan import Plan
 from .scene.linear_model import LinearModel, StateSpace
 from .scene.scene import Scene
+from .scene.stepper import Stepper
 from .sections import Section
 from .results.modes import Buckling, Modes
 from .sweeps.parameter_sweep import Sweep, sweep
@@ -148,6 +149,7 @@ __all__ = [
     "State",
     "StateSpace",
     "StepHistory",
+    "Stepper",
     "Steps",
     "Support",
     "SupportError",

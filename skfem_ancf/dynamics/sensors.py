@@ -110,6 +110,10 @@ def read(sensor, at, state):
         return ask_array("the function of a sensor", None, what, state)
     if what == "joint_force":
         return state.joint_force(sensor.at)
+    if what == "acceleration":
+        return at.displacement(state.acceleration)
+    if what in MOVING:
+        return getattr(state, what)(at)
     if what in ("strain", "stress"):
         return getattr(state, what)(at, recover=sensor.recover)
     if what in SECTION:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ..actions.loads import Load
+from ..beam.points import BeamPoints
 from ..core.errors import InputError, SupportError, require_finite, require_integer
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
@@ -74,7 +76,7 @@ class LinearModel:
         the multipliers, (r, m).
     """
 
-    def __init__(self, system: Any, state: State, inputs: Sequence[tuple[str, Any]],
+    def __init__(self, system: Any, state: State, inputs: Sequence[tuple[str, Sequence[Load], Any]],
                  sensors: Sequence[tuple[str, Sensor]]) -> None:
         self.state, self._system = state, system
         self.matrices = matrices_of(system, state)
@@ -83,7 +85,7 @@ class LinearModel:
             raise InputError("a linear model is about a state at rest, and this one moves: use "
                              "the equilibrium, of a steady rotation that in a rotating frame, see "
                              "skfem_ancf.RotatingFrame")
-        columns = [(name, _columns(system, state, item)) for name, item in inputs]
+        columns = [(name, _columns(system, state, *item)) for name, *item in inputs]
         self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
         self.B, self.G, self.prescribed = (
             np.column_stack(parts) for parts in zip(*(c for _, some in columns for c in some)))
@@ -159,8 +161,7 @@ class LinearModel:
     def _rest(self, T, K):
         """Displacements (N, k) of unit inputs without those of modes, static."""
         shift = SHIFT * max(np.abs(np.diag(K)).max(), np.finfo(float).tiny)
-        A = self.matrices.K + shift * self._mass()
-        out = self._solved(A, self.B, self.G)[0]
+        out = self._dynamic.solve((1.0, 0.0, shift), self.B, self.G)[0].real
         return out - T @ np.linalg.solve(K + shift * np.eye(len(K)), T.T @ self.B)
 
     # frequencies
@@ -178,49 +179,89 @@ class LinearModel:
         omega = np.atleast_1d(require_finite("frequencies", frequencies))
         if omega.ndim != 1:
             raise InputError(f"frequencies must be an array (n,), got the shape {omega.shape}")
-        M, D, K = self._mass(), *self.matrices[1:3]
+        dynamic = self._dynamic
         out = np.empty((len(omega), len(self.outputs), len(self.inputs)), complex)
         for k, w in enumerate(omega):
-            u, multipliers = self._solved(K + 1j * w * D - w * w * M, self.B, self.G)
+            u, multipliers = dynamic.solve((1.0, 1j * w, -w * w), self.B, self.G)
             r = self.readings
             out[k] = (r.u + 1j * w * r.v - w * w * r.a) @ u + r.multipliers @ multipliers
         return FrequencyResponse(omega, out, tuple(self.inputs), tuple(self.outputs))
 
-    def _solved(self, A, B, G):
-        """Displacements (N, k) and multipliers (m, k) for the dynamic stiffness A."""
-        free, s = self._free, self._system.constraints.coordinate_sizes
-        u = np.array(self.prescribed, dtype=A.dtype)
-        S = sparse.diags_array(s[free])
-        A_free, J = S @ A[free][:, free] @ S, self.matrices.J[:, free] @ S
-        scale = np.abs(A_free.diagonal()).max()
-        m = J.shape[0]
-        if m:
-            A_free = sparse.block_array([[A_free, scale * J.T], [scale * J, None]])
-        right = np.concatenate([s[free, None] * (B - A @ u)[free],
-                                scale * (G - self.matrices.J @ u)]).astype(A.dtype)
+    @cached_property
+    def _dynamic(self):
+        M, D, K, _, J = self.matrices
+        return DynamicStiffness((K, D, self._mass()), J, self._system.constraints, self.prescribed)
+
+
+class DynamicStiffness:
+    """Solutions with sums of K, D and M, on one sparsity pattern, with joints and supports.
+
+    ``prescribed`` are displacements of fixed degrees of freedom, (N, k).
+    """
+
+    def __init__(self, matrices: Sequence[Any], J: Any, constraints: Any,
+                 prescribed: Array) -> None:
+        self._free, self._prescribed, self._J = constraints.free, prescribed, J
+        s = self._sizes = constraints.coordinate_sizes
+        S, free = sparse.diags_array(s[self._free]), self._free
+        parts = [sparse.csc_array(S @ A[free][:, free] @ S) for A in matrices]
+        # rows of joints by the size of the stiffness: pivots of one size
+        self._scale = float(np.abs(parts[0].diagonal()).max())
+        rows = self._scale * sparse.csc_array(J)[:, free] @ S
+        m, n = rows.shape
+        joints = sparse.block_array([[sparse.csc_array((n, n)), rows.T], [rows, None]],
+                                    format="csc") if m else sparse.csc_array((n, n))
+        for A in parts:
+            A.resize((n + m, n + m))
+        self._pattern = sparse.csc_array(sum((abs(A) for A in parts), abs(joints)), dtype=complex)
+        self._pattern.sort_indices()
+        places = _places(self._pattern)
+        self._values = np.zeros((4, self._pattern.nnz))
+        for row, A in zip(self._values, (*parts, joints)):
+            A.sum_duplicates()
+            row[np.searchsorted(places, _places(A))] = A.data
+        self._right = [A @ prescribed for A in matrices]
+
+    def solve(self, factors: Sequence[complex], B: Array, G: Array) -> tuple[Array, Array]:
+        """Displacements (N, k) and multipliers (m, k) for forces B and right-hand sides G."""
+        A, s, free = self._pattern.copy(), self._sizes[:, None], self._free
+        A.data = np.array([*factors, 1.0]) @ self._values + 0j
+        n = int(free.sum())
+        force = B - sum(c * x for c, x in zip(factors, self._right))
+        right = np.concatenate([(s * force)[free],
+                                self._scale * (G - self._J @ self._prescribed)]).astype(complex)
         try:
-            x = splu(A_free.tocsc()).solve(right)
+            x = splu(A).solve(right)
         except RuntimeError:
             raise SupportError("the dynamic stiffness is singular: a motion without supports has "
                                "no static response, and an undamped mode none at its frequency"
                                ) from None
-        u[free] = s[free, None] * x[:len(x) - m]
-        return u, scale * x[len(x) - m:]
+        u = self._prescribed.astype(complex)
+        u[free] = s[free] * x[:n]
+        return u, self._scale * x[n:]
+
+
+def _places(A):
+    """Positions of the entries of a CSC matrix in its columns one below the other."""
+    return np.repeat(np.arange(A.shape[1]), np.diff(A.indptr)) * A.shape[0] + A.indices
 
 
 def _labels(name, n):
     return [name] if n == 1 else [f"{name} {k}" for k in range(n)]
 
 
-def _columns(system, state, item):
+def _columns(system, state, loads, joint):
     """Columns of B (N,), G (m,) and prescribed displacements (N,) for each number of an input."""
-    if isinstance(item, Load):
-        B, s = np.zeros(system.N), system.of(item)
-        factor, acting = item.acting(state.t)
-        B[s] = factor * acting.force(np.array(state.u[s]))
-        return [(B, np.zeros(system.constraints.m), np.zeros(system.N))]
-    t, none = state.load if state.t is None else state.t, np.zeros(system.N)
-    return [(none, *system.constraints.driven(item, change)) for change in _driven(item, state, t)]
+    none = np.zeros(system.N)
+    if joint is None:
+        B = np.zeros(system.N)
+        for load in loads:
+            s, (factor, acting) = system.of(load), load.acting(state.t)
+            B[s] += factor * acting.force(np.array(state.u[s]))
+        return [(B, np.zeros(system.constraints.m), none)]
+    t = state.load if state.t is None else state.t
+    return [(none, *system.constraints.driven(joint, change))
+            for change in _driven(joint, state, t)]
 
 
 def _driven(joint, state, t):
@@ -228,8 +269,7 @@ def _driven(joint, state, t):
     function = getattr(joint, joint.driver)
 
     def moved(by):
-        other = joint._thawed()
-        setattr(other, joint.driver, lambda time: np.asarray(function(time)) + by)
+        other = joint._with(**{joint.driver: lambda time: np.asarray(function(time)) + by})
         return other.value(np.array(state.u), t)
 
     n = np.size(function(t))
@@ -241,7 +281,8 @@ def _rows(system, state, sensor):
     """Derivatives of the readings of a sensor."""
     at, N, m = locate(sensor, system), system.N, system.constraints.m
     local = np.arange(N) if at is None or sensor.recover else np.unique(np.concatenate(
-        [np.ravel(part.dofs) for part in at.parts]))
+        [np.ravel(part.dofs) if isinstance(part, BeamPoints) else np.arange(N)[part.slice]
+         for part in at.parts]))
 
     def moved(u, multipliers=0.0):
         return State(system, state.u + u, state.load, base=state, t=state.t, memory=state.memory,

@@ -13,7 +13,7 @@ from skfem.assembly import Basis
 
 from ..actions.item import Item
 from ..actions.joints import Joint
-from ..actions.loads import Load
+from ..actions.loads import Amplitude, Load
 from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
@@ -42,11 +42,12 @@ from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
 from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
 from .linear_model import LinearModel
-from .model import Model
+from .model import Entry, Model
 from .plan import Plan, make_plan
 from .quasistatic import StepHistory, Steps, run
 from .solve import (configuration, critical_of, displacement, solve_linear, solve_static, system_of,
                     velocity_of, warn_about)
+from .stepper import Held, Stepper
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -792,16 +793,73 @@ class Scene(Model):
         return list(found.items())
 
     def _inputs(self, inputs):
-        """Names and bound Loads, or joints of the scene that prescribe a motion."""
-        named = inputs.items() if isinstance(inputs, dict) else [(None, one) for one in inputs]
+        """For each input its name, the bound Loads, and the joint of the scene, if it is one."""
+        named = inputs.items() if isinstance(inputs, dict) else [
+            (f"{type(one).__name__} {k}", one) for k, one in enumerate(inputs)]
         for name, item in named:
-            if not (isinstance(item, Joint) and item.driver and item in self.joints):
-                bound = self._bound(item).bound if isinstance(item, Item) else ()
-                if len(bound) != 1 or not isinstance(bound[0], Load):
-                    raise InputError(
-                        "an input is a Load, as PointForce((0, 1), at=(1, 0)), or a joint of the "
-                        f"scene that prescribes a motion, got {shown(item)}")
-            yield name or repr(item)[1:-1], (bound[0] if not isinstance(item, Joint) else item)
+            joint = next((one for one in self.joints if isinstance(item, Joint) and item.driver
+                          and one.same(item)), None)
+            loads = self._bound(item).bound if joint is None and isinstance(item, Item) else ()
+            if joint is None and not (loads and all(isinstance(one, Load) for one in loads)):
+                raise InputError(
+                    "an input is a Load, as PointForce((0, 1), at=(1, 0)), or a joint of the scene "
+                    f"that prescribes a motion, got {shown(item)}")
+            yield name, loads, joint
+
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        """The sensors by name."""
+        return dict(self._sensors)
+
+    def stepper(self, dt: float, inputs: Any = (), scheme: str | Scheme | type[Scheme] =
+                "energy-momentum", start: State | None = None) -> Stepper:
+        """The motion one step at a time, with inputs that are given at each step.
+
+        Parameters
+        ----------
+        dt
+            Size of a step.
+        inputs
+            As for :meth:`linearize`: Loads beside those of the scene, whose sizes are constant in a
+            step, and joints that prescribe a motion, which goes straight to the value given.
+        scheme
+            As for :meth:`integrate`, not "auto".
+        start
+            A State to start from; by default the reference configuration with the
+            :meth:`initial_velocity`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, PointForce, Scene,
+        ...                         StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+        >>> scene = Scene(beam).clamp("left").sensor("tip", "velocity", at=(1, 0))
+        >>> stepper = scene.stepper(1e-2, {"force": PointForce((0, 1), at=(1, 0))})
+        >>> for _ in range(50):
+        ...     stepper = stepper.step([-0.5 * stepper.readings["tip"][1] + 0.1])
+        >>> round(stepper.t, 6), bool(stepper.state.displacement((1, 0))[1] > 0)
+        (0.5, True)
+        """
+        with self._lock:
+            scene, held = copy(self), dict[str, Held]()
+            entries, first = list(self._entries), 0.0 if start is None else start.t or 0.0
+            for name, loads, joint in self._inputs(inputs):
+                held[name] = one = Held(0.0 if joint is None else getattr(joint, joint.driver)(
+                    first), joint is not None)
+                if joint is None:
+                    entries.append(Entry(loads[0], tuple(
+                        load._with(amplitude=Amplitude(one)) for load in loads)))
+                else:
+                    moved = joint._with(**{joint.driver: one})
+                    entries = [Entry(e.given, tuple(moved if x is joint else x for x in e.bound))
+                               for e in entries]
+            scene._entries, scene._system = tuple(entries), None
+            velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
+                                       np.zeros(b.N) for k, b in enumerate(self.layout.members)])
+            return Stepper(scene, get_scheme(scheme), require_positive("dt", dt), held, start,
+                           velocity)
 
     def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
                progress: bool | None = None) -> History:
