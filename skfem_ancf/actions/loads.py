@@ -22,6 +22,7 @@ from ..core.errors import (AncfError, InputError, ModelWarning, ask_field,
                            ask_number, require_finite, require_finite_scalar, require_function,
                            require_slope, shown, warn)
 from ..core.immutable import is_builtin, read_only
+from ..core.sampling import sample
 from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
 from .item import Item, beside, require_entries
@@ -41,6 +42,10 @@ class Amplitude:
 
     def __call__(self, t):
         return self.function(t) if np.ndim(t) else ask_number("amplitude(t={:g})", self.function, t)
+
+    def sampled(self, times: Array) -> Array:
+        """Values at times (n,)."""
+        return sample(self, times, "amplitude")
 
 
 class Load(Item):

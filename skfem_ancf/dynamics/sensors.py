@@ -92,7 +92,7 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     return found
 
 
-def _read_steps(sensor, at, steps):
+def read_steps(sensor, at, steps):
     """Values of a sensor at many steps, shape (n, ...)."""
     u = np.array([y.u for y in steps])
     if sensor.what == "velocity":
@@ -191,7 +191,7 @@ class Recorder:
         rows = [[read(sensor, at, state) for sensor, at in others]
                 for state in map(self._state_of, steps)] if others else []
         columns = iter(zip(*rows))
-        found = [_read_steps(sensor, at, steps) if sensor.moving else _stacked(name, next(columns))
+        found = [read_steps(sensor, at, steps) if sensor.moving else _stacked(name, next(columns))
                  for (name, sensor), at in zip(self.sensors, self._located)]
         self._t.append(np.array([y.t for y in steps]))
         for (name, _), read, one in zip(self.sensors, self._read, found):

@@ -1,7 +1,6 @@
 """Tables of the equations of a scene, the arguments of kernels."""
 
 from copy import copy
-from functools import partial
 from typing import Annotated, Any, NamedTuple
 from weakref import ref
 
@@ -16,7 +15,6 @@ from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import linearised
 from ..core.callbacks import handle_of
-from ..core.sampling import sample
 from ..core.source import F1, I1
 from ..core.words import constant
 from ..actions.tables import JointTables, LoadTables
@@ -229,7 +227,7 @@ class Tables:
     def _amplitudes(self):
         """Numbers and functions of time-dependent factors, and the number of all factors."""
         columns = self._columns
-        return [(k, partial(sample, load.amplitude, name="amplitude"))
+        return [(k, load.amplitude.sampled)
                 for k, load in enumerate(columns)
                 if load is not None and load.amplitude is not None], len(columns)
 

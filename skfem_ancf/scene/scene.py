@@ -13,7 +13,7 @@ from skfem.assembly import Basis
 
 from ..actions.item import Item
 from ..actions.joints import Joint
-from ..actions.loads import Amplitude, Load
+from ..actions.loads import Load
 from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
@@ -850,7 +850,7 @@ class Scene(Model):
                     first), joint is not None)
                 if joint is None:
                     entries.append(Entry(loads[0], tuple(
-                        load._with(amplitude=Amplitude(one)) for load in loads)))
+                        load._with(amplitude=one) for load in loads)))
                 else:
                     moved = joint._with(**{joint.driver: one})
                     entries = [Entry(e.given, tuple(moved if x is joint else x for x in e.bound))

@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.forces.turns import Turns
+from ..actions.forces.springs import Turns
+from ..actions.loads import Amplitude
 from ..core.errors import ConvergenceError, InputError, require_finite
 from ..core.types import Array
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import state_of
 from ..dynamics.run import StepFailed, integrator_of
-from ..dynamics.sensors import locate, read
+from ..dynamics.sensors import locate, read, read_steps
 from ..results.state import State
 
 
-class Held:
+class Held(Amplitude):
     """A function of time whose value is set before each step.
 
     Sizes of loads are constant in a step, ``ramped`` motions go straight from one value to another.
@@ -32,7 +33,10 @@ class Held:
         """Set the values at both ends of the step from t to t + dt."""
         self._before, self._value, self._t, self._dt = before, value, t, dt
 
-    def __call__(self, t: float) -> Any:
+    def sampled(self, times: Array) -> Array:
+        return np.full(len(times), self._value)
+
+    def __call__(self, t: Any) -> Any:
         if not self.ramped:
             return float(self._value)
         part = min(max((t - self._t) / self._dt, 0.0), 1.0)
@@ -138,8 +142,10 @@ class Stepper:
     @property
     def readings(self) -> dict[str, Array]:
         """Values of the sensors of the scene by name."""
-        state = self.state
-        return {name: read(sensor, at, state) for name, sensor, at in self._sensors}
+        fields = [sensor for _, sensor, _ in self._sensors if not sensor.moving]
+        state = self.state if fields else None
+        return {name: read_steps(sensor, at, [self._y])[0] if sensor.moving else
+                read(sensor, at, state) for name, sensor, at in self._sensors}
 
     def step(self, inputs: ArrayLike = ()) -> Stepper:
         """Take a step.
