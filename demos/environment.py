@@ -16,20 +16,21 @@ from scipy.optimize import minimize
 from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Motor, Scene,
                         StVenantKirchhoff)
 
-mesh = MeshBeam.init_line(np.linspace(0, 0.5, 4), height=2e-3)
-arm = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(5e7, 0.4, 1200), width=0.02,
+mesh = MeshBeam.init_line(np.linspace(0, 0.5, 3), height=4e-3)
+arm = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(5e8, 0.4, 1200), width=0.02,
            damping=KelvinVoigt(2e-3))
 
 
 class Reach:
     """Turn the arm by a torque until its tip is at the target, an angle."""
 
-    dt, steps = 0.025, 40
+    dt, steps = 0.03, 30
 
     def __init__(self, target=0.8):
         scene = Scene(arm).pin("left").sensor("tip", "position", (0.5, 0))
         scene.sensor("tip speed", "velocity", (0.5, 0)).sensor("hub", "position", (0.02, 0))
-        self.stepper, self.target = scene.stepper(self.dt, [Motor((0, "left"), torque=1e-2)]), target
+        self.stepper = scene.stepper(self.dt, [Motor((0, "left"), torque=0.05)])
+        self.target = target
 
     def reset(self, seed=None):
         self.stepper.reset()
@@ -39,7 +40,8 @@ class Reach:
         """Angles of tip and hub that are left, and the angular velocity of the tip."""
         now = self.stepper.readings
         (x, y), (u, v) = now["tip"], now["tip speed"]
-        return np.array([self.target - np.arctan2(y, x), self.target - np.arctan2(*now["hub"][::-1]),
+        hub = np.arctan2(*now["hub"][::-1])
+        return np.array([self.target - np.arctan2(y, x), self.target - hub,
                          (x * v - y * u) / (x * x + y * y)])
 
     def step(self, action):
@@ -60,14 +62,15 @@ def episode(gains, environment):
 
 
 # %%
-# **Learn** from a first guess, in thirty episodes.
+# **Learn** from a first guess, in 24 episodes.
 
-environment, first = Reach(), np.array([0.5, 0.5, -0.1])
+environment, first = Reach(), np.array([1.0, 1.0, 0.0])
+simplex = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -0.8]])
 learned = minimize(lambda gains: -episode(gains, environment)[0], first, method="Nelder-Mead",
-                   options={"maxfev": 30}).x
+                   options={"maxfev": 24, "initial_simplex": first + simplex}).x
 before, after = (episode(gains, environment) for gains in (first, learned))
 print(f"reward {before[0]:.4f} with the first guess, {after[0]:.4f} learned: gains {learned}")
-assert after[0] > 0.8 * before[0] and np.abs(after[1][-1]) < 0.5 * np.abs(before[1]).max()
+assert after[0] > 0.75 * before[0] and abs(after[1][-1]) < 0.3
 
 # %%
 # **What it has learned**: the tip comes to the target, also to one that it was not trained for.

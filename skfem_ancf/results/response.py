@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
-from ..core.errors import InputError, NameUnknown, require_finite, require_index
+from ..core.errors import InputError, NameUnknown, require_index
 from ..core.near_misses import NearMisses
 from ..core.types import Array, StrPath
 from ..visuals.bode import plot_bode, plot_nyquist
@@ -39,7 +40,13 @@ class FrequencyResponse(NearMisses):
                 f"{high:.4g} rad/s, of {list(self.outputs)} to {list(self.inputs)}>")
 
     def of(self, output: int | str = 0, input: int | str = 0) -> Array:
-        """Complex amplitudes of one output for one input, by name or number, shape (n,)."""
+        """Complex amplitudes of one output for one input, shape (n,).
+
+        Parameters
+        ----------
+        output, input
+            Names or numbers.
+        """
         return self.values[:, _number("output", output, self.outputs),
                            _number("input", input, self.inputs)]
 
@@ -76,8 +83,7 @@ class FrequencyResponse(NearMisses):
             raise InputError(f"density must have the shape ({n}, {k}) or ({n}, {k}, {k}) of "
                              f"{n} frequencies and {k} input(s), got {np.shape(density)}")
         found = np.einsum("nri,nij,nrj->nr", self.values, S, self.values.conj()).real
-        return np.sqrt(np.trapezoid(found, self.frequencies, axis=0) if hasattr(np, "trapezoid")
-                       else np.trapz(found, self.frequencies, axis=0))
+        return np.sqrt(scipy.integrate.trapezoid(found, self.frequencies, axis=0))
 
     def plot(self, output: int | str = 0, input: int | str = 0, axes: Any = None, *,
              label: str | None = None, title: str | None = None,

@@ -59,12 +59,21 @@ class LinearModel:
     displacement u, of sizes s of loads and prescribed motions, and of readings y of sensors.
     :meth:`Scene.linearize <skfem_ancf.Scene.linearize>` makes one.
 
+    Parameters
+    ----------
+    system, state
+        The :class:`~skfem_ancf.equations.system.System` of the scene, and its State.
+    inputs
+        For each its name, its bound Loads, and the joint that it drives or None.
+    sensors
+        Names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
+
     Attributes
     ----------
     matrices
         :class:`~skfem_ancf.SceneMatrices` about the state.
-    inputs, outputs
-        Their names: lists of k and r texts.
+    inputs, outputs : list of str
+        Their names, k and r.
     B
         Forces of unit inputs, (N, k).
     G
@@ -189,8 +198,9 @@ class LinearModel:
 
     @cached_property
     def _dynamic(self):
-        M, D, K, _, J = self.matrices
-        return DynamicStiffness((K, D, self._mass()), J, self._system.constraints, self.prescribed)
+        _, D, K, _, J = self.matrices
+        return DynamicStiffness((K, D, self._mass()), J, self._system.constraints,
+                                self.prescribed)
 
 
 class DynamicStiffness:

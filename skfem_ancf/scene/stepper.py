@@ -49,12 +49,21 @@ class Stepper:
     The numbers are those of ``scene.integrate`` with the same inputs, to the last bit. Copies and
     pickles continue in the same way.
 
+    Parameters
+    ----------
+    scene
+        A scene with the inputs.
+    scheme, dt
+        A :class:`~skfem_ancf.Scheme`, and the size of a step.
+    held
+        The inputs by name.
+    start, velocity
+        A State to start from, or None, and velocities without one, shape (N,).
+
     Attributes
     ----------
-    inputs
-        Their names.
-    dt
-        Size of a step.
+    inputs : list of str
+        Names of the inputs.
     """
 
     def __init__(self, scene: Any, scheme: Scheme, dt: float, held: dict[str, Held],
