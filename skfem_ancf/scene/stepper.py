@@ -14,7 +14,7 @@ from ..core.errors import ConvergenceError, InputError, require_finite
 from ..core.types import Array
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import state_of
-from ..dynamics.run import StepFailed, integrator_of
+from ..dynamics.run import TimeStepFailed, integrator_of
 from ..dynamics.sensors import locate, read, read_steps
 from ..results.state import State
 
@@ -188,6 +188,6 @@ class Stepper:
     def _halved(self, y: Motion) -> Motion:
         try:
             return self._integrator.step(y, self.dt)
-        except StepFailed as failure:
+        except TimeStepFailed as failure:
             raise ConvergenceError(f"the step from t = {y.t:.6g} failed: {failure}; try a smaller "
                                    "dt", self.state) from None
