@@ -205,4 +205,4 @@ def bent(beam: Any, u: Array) -> tuple[float, bool]:
     (left, right), slopes = ends(beam, beam.q0_local + u)
     back = (right - left).conj() * slopes
     turn = slopes[1] * slopes[0].conj() * beam._turned_back
-    return (float(abs(np.arctan2(turn.imag, turn.real)).max()), bool((back.real < 0.0).any()))
+    return (float(abs(np.arctan2(turn.imag, turn.real)).max()), bool(back.real.min() < 0.0))

@@ -201,7 +201,8 @@ class BandMatrix:
         """Take its factors of :mod:`skfem_ancf.core.band`, which may have replaced its entries."""
         ab = band.flat.reshape(self.n, self._ld).T
         self._factor = ("ldl", band) if self.symmetric else ("gb", ab, band.pivots)
-        self.positive_definite = self.definite
+        self.positive_definite = self.symmetric and bool(
+            np.minimum.reduce(band.flat[::self._ld]) > 0.0)
 
     def to_cholesky(self) -> None:
         """Convert L D L^T factors with positive D to Cholesky factors."""
@@ -217,7 +218,7 @@ class BandMatrix:
         if self._factor is None or not self.symmetric:
             return False
         if self._factor[0] == "ldl":
-            return bool(np.minimum.reduce(self._factor[1].flat[::self._ld]) > 0.0)
+            return bool(self.positive_definite)
         return self._factor[0] == "pb"
 
     def pivots(self) -> Array:

@@ -115,14 +115,16 @@ def put_factors(A, done):
 def _factorize_lower(A, ld, width):
     n = A.size // ld
     for j in range(0, n, 4):
-        m = min(4, n - j)
+        m, w, y, z = min(4, n - j), (j + 1) * ld, (j + 2) * ld, (j + 3) * ld
+        g = h = v = x = 1.0  # inverse pivots
         for k in range(1, min(width + 4, n - j)):  # subtract from column j + k
             b, size = U((j + k) * ld), U(min(width + 4, n - j) - k)
             p, before = U(j * ld + k), A[b]
             if k >= m and m == 4:
-                w, y, z = (j + 1) * ld, (j + 2) * ld, (j + 3) * ld
+                if k == 4:  # few divisions
+                    g, h, v, x = 1 / A[U(j * ld)], 1 / A[U(w)], 1 / A[U(y)], 1 / A[U(z)]
                 q, r, s = U(w + k - 1), U(y + k - 2), U(z + k - 3)
-                c, d, e, f = A[p] / A[U(j * ld)], A[q] / A[U(w)], A[r] / A[U(y)], A[s] / A[U(z)]
+                c, d, e, f = A[p] * g, A[q] * h, A[r] * v, A[s] * x
                 for i in range(size):
                     A[b + i] -= c * A[p + i] + d * A[q + i] + e * A[r + i] + f * A[s + i]
             else:

@@ -128,6 +128,8 @@ class Backend:
 
     def _missing(self, name):
         """Names of a kernel and its parts that are not loaded."""
+        if self._flat is not None and name in LOADED:
+            return []
         missing = [part for part in self._parts(name) if part not in LOADED]
         return missing if name in LOADED else [*missing, name]
 

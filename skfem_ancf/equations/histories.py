@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -78,12 +78,16 @@ class Histories:
         return with_history(beam, np.zeros(part.stop - part.start) if history is None else
                             np.array(history[part]))
 
-    @contextmanager
-    def lent(self, history: Array | None = None, span: float = 0.0) -> Iterator[None]:
+    def lent(self, history: Array | None = None, span: float = 0.0
+             ) -> AbstractContextManager[None]:
         """Context with the history of a state, or of the reference configuration for None.
 
         ``span`` is the time of an increment from there.
         """
+        return self._lent(history, span) if self.values.size else nullcontext()
+
+    @contextmanager
+    def _lent(self, history: Array | None, span: float) -> Iterator[None]:
         before = self.values.copy(), self.span.copy(), self._increment
         try:
             self._increment = span
@@ -102,7 +106,9 @@ class Histories:
 
     def get(self) -> Array | None:
         """A copy of the history that is set; None if nothing has happened."""
-        return None if (self.values == self.rest).all() else self.values.copy()
+        if not self.values.size or (self.values == self.rest).all():
+            return None
+        return self.values.copy()
 
     def begin(self, u: Array, t: float, history: Array | None = None) -> Array | None:
         """Set the history of a start at u and t, or a given one; returns it.

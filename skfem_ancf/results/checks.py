@@ -134,11 +134,12 @@ def warn_of(state: Any) -> None:
     for text in _kinks(state):
         warn(text, ModelWarning)
     warn_of_points(state.system)
-    for beam, s in zip(state.system.beams, state.system.slices):
+    turns = state._turns or [None] * len(state.beams)
+    for beam, s, turn in zip(state.system.beams, state.system.slices, turns):
         u = state.u[s]
         shortest = 1.0 if beam.has_sections and not beam.kernel.linear else (
             kinematics.shortest(beam, u))
-        for text in _findings(beam, shortest, kinematics.bent(beam, u)[0]):
+        for text in _findings(beam, shortest, turning(beam, u) if turn is None else turn):
             warn(f"{text} (state.checks has the numbers)", ModelWarning)
 
 
@@ -151,6 +152,8 @@ def warn_of_points(system: Any) -> None:
 def pushed_points(system: Any) -> list[str]:
     """Findings of end faces of which a single point is moved along the axis."""
     c, out = system.constraints, list[str]()
+    if not (c.moves or c.joints):
+        return out
     moved = [dof for dof, value in zip(c.fixed, c.values(1.0)) if value]
     moved += [dof for joint in c.joints if isinstance(joint, PrescribedDisplacement)
               for dof in joint.dofs]

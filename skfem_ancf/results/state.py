@@ -141,6 +141,8 @@ class State(Immutable, MaterialPoints, SpringForces):
         :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the run stored.
     verdict
         What the solver knows of its stability, or None: it is found when asked for.
+    turns
+        Largest rotation of the axis of each beam over an element, if known.
 
     Attributes
     ----------
@@ -196,6 +198,7 @@ class State(Immutable, MaterialPoints, SpringForces):
     _motion: Any
     _origin: Any
     _verdict: Verdict | None
+    _turns: list[float] | None
 
     def __init__(self, system: System, u: Array, load: float = 1.0, force: Array | None = None,
                  converged: bool = True, iterations: int = 0, message: str = "",
@@ -203,7 +206,8 @@ class State(Immutable, MaterialPoints, SpringForces):
                  t: float | None = None, inertia: Array | float = 0.0,
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
                  verdict: Verdict | None = None, doubt: str = "",
-                 memory: Array | None = None, base: State | None = None) -> None:
+                 memory: Array | None = None, base: State | None = None,
+                 turns: list[float] | None = None) -> None:
         m = system.constraints.m
         multipliers = np.zeros(m) if multipliers is None else multipliers
         for name, value, size in (("u", u, system.N), ("multipliers", multipliers, m)):
@@ -214,7 +218,7 @@ class State(Immutable, MaterialPoints, SpringForces):
             system=system, u=u, load=load, multipliers=multipliers, converged=converged,
             iterations=iterations, message=message, steps=tuple(steps), t=t,
             acceleration=acceleration, doubt=doubt, memory=memory, base=base, _force=force,
-            _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin)
+            _inertia=inertia, _verdict=verdict, _motion=motion, _origin=origin, _turns=turns)
 
     def replace(self, **changes: Any) -> State:
         """A copy with changed attributes, as ``replace(message="guess")``.
@@ -236,7 +240,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         for name, value in changes.items():
             setattr(other, name, value)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
-            other._verdict = other._force = None
+            other._verdict = other._force = other._turns = None
         if {"u", "multipliers", "system"} & set(changes):
             other._motion = other._origin = other.memory = None
         other._freeze()

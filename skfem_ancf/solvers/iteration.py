@@ -92,8 +92,7 @@ def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any
                                 factors, joints)
     if definite:
         backend.keep_factors()
-    return Iterate(status, x[U].copy(), m[0].copy(), x[FORCE].copy(), record[0, :n].tolist(),
-                   record[1, :k].tolist())
+    return Iterate(status, x[U], m[0], x[FORCE], record[0, :n].tolist(), record[1, :k].tolist())
 
 
 @source

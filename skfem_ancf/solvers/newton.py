@@ -418,21 +418,20 @@ class Search:
             self.loose, self._unstabilised = self._loose(result.u), self._unstabilised + 1
             raise StepFailed("the loads do not hold what the supports leave free" + (
                 f": nothing holds {self.loose}" if self.loose else ""))
-        if self.rules.method == "auto" and self._folds(result.u):
+        if self.rules.method == "auto" and self._folds(result):
             again = self._folded is not None and np.allclose(
                 result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
             self._folded = self._folded or result
             if not again:  # if two strategies find it, the mesh is too coarse: a warning says so
                 raise StepFailed("the axis folds back within an element")
 
-    def _folds(self, u):
+    def _folds(self, result):
         """True if an axis folds back, or turns too far, within an element."""
         system = self.system
-        for beam, s in zip(system.beams, system.slices):
-            turn, folded = bent(beam, u[s])
-            if folded or (turn > FOLDED and beam.element.axis_degree <= 7):
-                return True
-        return False
+        bends = [bent(beam, result.u[s]) for beam, s in zip(system.beams, system.slices)]
+        result.turns = [turn for turn, _ in bends]
+        return any(folded or (turn > FOLDED and beam.element.axis_degree <= 7)
+                   for beam, (turn, folded) in zip(system.beams, bends))
 
     def _loose(self, u):
         """An unstabilised motion of an equilibrium, in words, from the last factors."""

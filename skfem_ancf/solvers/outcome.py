@@ -67,6 +67,8 @@ class StaticResult:
         Whether the equilibrium of the linearised law was no better start; it is not tried again.
     attempts
         An :class:`Attempt` for each strategy tried; the last one succeeded.
+    turns
+        Largest rotation of the axis of each beam over an element, in radians, if known.
     """
 
     u: Array
@@ -83,6 +85,7 @@ class StaticResult:
     rubbed: float = 0.0
     diverging: bool = False
     attempts: tuple[Attempt, ...] = ()
+    turns: list[float] | None = None
 
     @property
     def iterations(self) -> int:
