@@ -192,17 +192,24 @@ class CableKernel(ElementKernel):
 
     @cached_property
     def _outer(self):
-        """Coordinates of the bottom and top fibres, and their lengths in the reference."""
+        """Of the reference: coordinates and lengths of the bottom and top fibres, and measures."""
         Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
         y = np.multiply.outer([-1.0, 1.0], np.atleast_2d(Y))
-        return y, 1.0 - y * self.elements[0].rest[3]
+        rest = self._measured(0.0)
+        return y, 1.0 - y * rest[1], rest
+
+    def _measured(self, d):
+        """|r_X| and the curvature, (2, points, 1 or ne), for a change of the rows."""
+        z = (self.tables[0].frame + d).view(complex)[..., 0].T
+        return np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag])
 
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
-        e, (y, length) = self.elements[0], self._outer
+        y, length, rest = self._outer
         if np.iscomplexobj(u):
             eps, kappa = first_order(self.strain(u))
         else:
-            size, kappa = e.at(self._checked(u))[2][2:]
-            eps, kappa = size - e.rest[2], kappa - e.rest[3]
+            U = self.gather(self._checked(u))
+            U[:, self.nd // 2] -= U[:, 0]
+            eps, kappa = self._measured(self.tables[0].G @ U[:, 1:]) - rest
         return 1.0 + (eps - y * kappa) / length
