@@ -23,18 +23,18 @@ logger = logging.getLogger(__name__)
 #: Compiled functions and parts of this process by name.
 LOADED: dict[str, Any] = {}
 #: Parts that are called by address and that most scenes use, and those of some functions.
-PARTS = "StrainTables", "elements", "contacts", "band", "bands", "unsymmetric"
+PARTS = "StrainTables", "elements", "contacts", "hold_back", "band", "bands", "unsymmetric"
 NEEDED = {"equilibrium": ["band"], "steps": ["band", "bands", "unsymmetric"],
           "collocate": ["band", "bands", "gradients"]}
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
-COMPILING = {"StrainTables": 10.0, "elements": 3.0, "contacts": 11.0, "unsymmetric": 3.0,
-             "band": 2.0, "bands": 4.0, "equilibrium": 7.0, "tangent": 1.0, "force": 1.0,
-             "linearised": 1.0, "steps": 20.0}
+COMPILING = {"StrainTables": 10.0, "elements": 3.0, "contacts": 11.0, "hold_back": 1.0,
+             "unsymmetric": 3.0, "band": 2.0, "bands": 4.0, "equilibrium": 7.0, "tangent": 1.0,
+             "force": 1.0, "linearised": 1.0, "steps": 20.0}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
-              "hold_back": 2.0, "mean_force": 1.0, "viscous_force": 1.0}
+              "mean_force": 1.0, "viscous_force": 1.0}
 LOADING = 0.5
 SECONDS = {**COMPILING, **WHERE_USED}
 #: Seconds of compiling that need no reason once the parts are loaded.
