@@ -230,12 +230,15 @@ def about(results):
     since = changed(re.search(r"commit (\w+)", first["versions"]))
     return [f"One run: {first['machine']}; {first['versions']}. Of {len(found)} goals "
             f"{len(found) - missed} were met, {missed} missed; those are marked below.", "",
-            *([f"Changed since that commit, and not timed again: {', '.join(since)}.", ""]
-              if since else [])]
+            *(["Files that changed since that commit, and are not timed again. "
+               + " ".join(since), ""] if since else [])]
 
 
 def changed(commit):
-    """Files that decide times and are no longer what they were at a commit (a match), by git."""
+    """Files that decide times and are no longer what they were at a commit (a match), by git.
+
+    A sentence for each folder.
+    """
     if commit is None:
         return []
     found = subprocess.run(["git", "diff", "--name-only", commit[1], "--", *(
@@ -243,7 +246,9 @@ def changed(commit):
         check=False)
     if found.returncode:
         raise SystemExit(f"no commit {commit[1]} here: {found.stderr.strip()}")
-    return [f"`{line}`" for line in found.stdout.split()]
+    files = [line.rpartition("/") for line in found.stdout.split()]
+    return [f"In `{folder}`: " + ", ".join(f"`{name}`" for at, _, name in files if at == folder)
+            + "." for folder in dict.fromkeys(folder for folder, _, _ in files)]
 
 
 #: The lines of each table, by the case that it needs; "about" and "others" take all of them.

@@ -545,6 +545,16 @@ def test_plasticity_and_contact_together():
     assert end.field("plastic_strain", (0.03, 0.0009)) > 1e-4
 
 
+def test_an_obstacle_that_touches_the_beam_at_rest():
+    """By round-off, at the start of a run, where nothing has moved yet."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 0.1, 9), height=0.002), ElementBeamCable(5),
+                ElasticPlastic(E, NU, YIELD, 2e8), width=0.01)
+    scene = Scene(beam).clamp("left").obstacle(Circle((0.0, -0.051), 0.05))
+    scene.fix("right", "r^2", displacement=lambda t: -0.01 * t)
+    run = scene.run(1.0, increments=3)
+    assert run.displacement("right")[-1, 1] == pytest.approx(-0.01)
+
+
 # one's own
 
 class Damage(HistoryMaterial):

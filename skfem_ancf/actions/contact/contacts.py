@@ -278,6 +278,8 @@ class Contacts:
             if found is None:
                 return 0.0 * out
             du, size = found
+            if not (work.sum() > 0.0 and size(u) > 0.0):  # at rest, touching by round-off
+                continue
             out[k] = max((change.sum() - force @ du) / work.sum(), size(du) / size(u))
         return out
 
