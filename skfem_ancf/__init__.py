@@ -11,6 +11,7 @@ from .actions.joints import (Hinge, Joint, Motor, OnCircle, OnLine, PlaneSection
 from .actions.form_load import FormLoad
 from .actions.loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
 from .actions.point_force import MovingForce, PointForce, Train
+from .actions.pairs import BodyContact
 from .actions.obstacles import Circle, Contact, Line, Obstacle, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support
 from .beam.beam import Beam, reference_coordinates
@@ -54,6 +55,7 @@ __all__ = [
     "HHT",
     "AncfError",
     "Beam",
+    "BodyContact",
     "Buckling",
     "CallError",
     "CallbackError",

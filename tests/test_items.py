@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy import sparse
 from skfem import LinearForm
 
 from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, Energy, FormLoad, InputError,
@@ -56,6 +57,7 @@ ARGUMENTS = {
                                                             {"tip": (0, (1.0, 0.0))}),
     "foundation": (1e3, "bottom", False, 1.0, 0), "drag": (1.0, 1.0, 0.1),
     "point_mass": (0.5, (1.0, 0.0), 0.01, 0), "obstacle": (Circle((1.0, -0.2), 0.14),),
+    "contact": (0, 1),
     "hinge": ((0, 1), (1.0, 0.0)), "weld": ((0, 1), (1.0, 0.0)),
     "line": ((1.0, 0.0), (1.0, 0.5), 0), "circle": ((1.0, 0.0), (1.0, -1.0), 0),
     "position": ((1.0, 0.0), rising, 0), "angle": ("right", ramp, 0),
@@ -153,6 +155,34 @@ def across(v, w):
     return 100.0 * (w.F[0, 0] * v[1] - w.F[1, 0] * v[0])
 
 
+class Slip(Tip):
+    """A spring of the end that slips, with a sparse stiffness; its history is its slip."""
+
+    symmetric, k, most = False, 30.0, 0.05
+
+    def start(self):
+        return np.zeros(2)
+
+    def trial(self, u, history):
+        f = -self.k * (self.way(u) - history)
+        return f, max(1.0, np.sqrt(f @ f) / self.most)
+
+    def evaluate(self, u, v, t, history, dt):
+        f, beyond = self.trial(u, history)
+        rows = np.array([self.r.row(e, len(u)) for e in np.eye(2)])
+        return f / beyond @ rows, self.way(u) + f / beyond / self.k
+
+    def stiffness(self, u, v, t, history, dt):
+        f, beyond = self.trial(u, history)
+        K = -self.k / beyond * (np.eye(2) - (beyond > 1.0) * np.outer(f, f) / (f @ f + 1e-300))
+        rows = np.array([self.r.row(e, len(u)) for e in np.eye(2)])
+        return sparse.csr_array(rows.T @ K @ rows)
+
+    def energy(self, u, history):
+        d = self.way(u) - history
+        return 0.5 * self.k * (d @ d)
+
+
 def unscaled():
     return Energy(bedding, beam=0, scaled=False)
 
@@ -161,7 +191,7 @@ def following():
     return FormLoad(across, beam=0)
 
 
-CUSTOM = (Quartic, Pull, Bob, Rail, Lift, unscaled, following)
+CUSTOM = (Quartic, Pull, Slip, Bob, Rail, Lift, unscaled, following)
 
 
 def item_of(name):
@@ -198,10 +228,12 @@ def test_items_through_all_solvers(name):
         try:
             history = scene.integrate(2e-3, 1e-3, scheme=scheme)
         except InputError as error:  # of damping, of joints that move
-            assert scheme in ("energy-momentum-4", "gauss") and ": use '" in str(error)
+            known = ("energy-momentum-4", "gauss", *["radau"] * bool(scene.system.forces.changing))
+            assert scheme in known and " use '" in str(error)
             continue
         assert len(history) == 3 and np.all(np.isfinite(history.total_energy))
-    again = scene.integrate(2e-3, 1e-3, scheme=scheme, start=history.state(1), t_start=1e-3)
+        last = scheme
+    again = scene.integrate(2e-3, 1e-3, scheme=last, start=history.state(1), t_start=1e-3)
     assert_allclose(again.u[-1], history.u[-1], rtol=0, atol=1e-9)
 
 
@@ -222,7 +254,8 @@ def test_items_on_materials_with_a_history(name, law):
     for one in (state, copy.copy(state), pickle.loads(pickle.dumps(state))):
         again = scene.run(1.0, increments=2, start=one)
         assert_allclose(again.u[-1], run.u[-1], rtol=0, atol=1e-6)
-        assert_allclose(again.state(0).memory, state.memory, rtol=1e-5, atol=1e-5)
+        assert_allclose(again.state(0).memory, state.memory, rtol=1e-5,
+                        atol=1e-5 * max(1.0, np.abs(state.memory).max()))
     assert np.all(scene.modes(2, state).frequencies > 0)
     for scheme in ("generalized-alpha", "energy-momentum"):
         history = scene.integrate(2e-3, 1e-3, scheme=scheme)

@@ -67,7 +67,15 @@ class _Force(ForceElement):
         self._mass = None if not hasattr(item, "mass") else _entries(
             f"mass() of {item!r}", item.mass(), layout.N)
         if self._forced:
+            self.changing = self._is_sparse(layout)
             try_force(self, layout.sizes[self._dofs].reshape(-1, 2))
+
+    def _is_sparse(self, layout):
+        if not hasattr(self.item, "stiffness"):
+            return False
+        zero = np.zeros(layout.N)
+        past = (self.item.start(), 0.0) if hasattr(self.item, "start") else ()
+        return sparse.issparse(self.item.stiffness(zero, zero, 0.0, *past))
 
     def _whole(self, x):
         out = np.zeros(self._N, dtype=np.asarray(x).dtype)
@@ -93,14 +101,16 @@ class _Force(ForceElement):
         if not hasattr(self.item, name):
             return otherwise(x, v, t)
         found = getattr(self.item, name)(self._whole(x), self._whole(v), t, *past)
-        matrix = sparse.csr_array(found)[self._dofs][:, self._dofs].toarray()
+        matrix = sparse.csr_array(found)[self._dofs][:, self._dofs]
         n = len(self._dofs) // 2
-        return matrix.reshape(n, 2, n, 2)
+        return matrix if self.changing else matrix.toarray().reshape(n, 2, n, 2)
 
-    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+    def stiffness(self, x: Array, v: Array, t: float) -> Any:
         return self._derivative_by("stiffness", x, v, t, super().stiffness)
 
-    def resistance(self, x: Array, v: Array, t: float) -> Array:
+    def resistance(self, x: Array, v: Array, t: float) -> Any:
+        if self.changing and not hasattr(self.item, "damping"):
+            return sparse.csr_array((x.size, x.size))
         if not hasattr(self.item, "force"):
             return np.zeros((len(x), 2, len(x), 2))
         return self._derivative_by("damping", x, v, t, super().resistance)
@@ -126,11 +136,13 @@ class _Remembered(_Force):
         force, after = self.item.evaluate(self._whole(x), self._whole(v), t, history, dt)
         return self._at(force), after
 
-    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Any:
         return self._derivative_by("stiffness", x, v, t, lambda x, v, t: derivative(
             lambda y: self.evaluate(y, v, t, *past)[0], x), *past)
 
-    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Any:
+        if self.changing and not hasattr(self.item, "damping"):
+            return sparse.csr_array((x.size, x.size))
         return self._derivative_by("damping", x, v, t, lambda x, v, t: derivative(
             lambda w: self.evaluate(x, w, t, *past)[0], v), *past)
 

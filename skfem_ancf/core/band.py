@@ -9,11 +9,14 @@ factors replace it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
+from scipy import sparse
 from scipy.linalg import blas, lapack
+from scipy.sparse.linalg import splu
 
 from .source import F1, I1, indices, primitive, shaped, source
 from .types import Array
@@ -41,6 +44,43 @@ class Band(NamedTuple):
     width: int
     top: int
     kernels: I1 = ADDRESSES
+
+
+class CoupledBand(Band):
+    """A band matrix with entries anywhere, in NumPy alone: sparse factors while there are any.
+
+    ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both halves.
+    """
+
+    entries: Callable[[], tuple[Array, Array, Array]]
+    factors: Any = None
+
+    def factorize_all(self) -> bool:
+        """Set ``factors``, None if there are no entries; False if it has none."""
+        self.factors, (i, j, v) = None, self.entries()
+        if not len(v):
+            return True
+        a, b, w = _entries(self)
+        n = len(self.flat) // self.ld
+        A = sparse.csc_array((np.append(w, v), (np.append(a, i), np.append(b, j))), shape=(n, n))
+        try:
+            self.factors = splu(A, "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
+        except RuntimeError:
+            return False
+        return True
+
+
+def _entries(A):
+    """Rows, columns and values of a band matrix."""
+    rows = A.flat.reshape(-1, A.ld)
+    if A.top > 0:
+        j, k = np.nonzero(rows)
+        return j + k - A.top, j, rows[j, k]
+    j, k = np.nonzero(rows[:, :A.width + 1])
+    upper = rows if A.top == 0 else rows[:, A.ld // 2:]
+    i, below = j + k, k > 0
+    return (np.append(i, j[below]), np.append(j, i[below]),
+            np.append(rows[j, k], upper[j[below], k[below]]))
 
 
 def as_lapack(A: Band) -> Array:
@@ -93,6 +133,11 @@ def factorize(A):
     Only LAPACK's storage is pivoted. An indefinite symmetric matrix has L D L^T factors unless a
     leading submatrix is singular.
     """
+    if isinstance(A, CoupledBand):
+        if not A.factorize_all():
+            return False
+        if A.factors is not None:
+            return True
     if A.top != 0:
         ab, whole = (_pivoted(A), _whole(A)) if A.top < 0 else 2 * (as_lapack(A),)
         ab[:], A.pivots[:], info = lapack.dgbtrf(whole, A.width, A.width)
@@ -224,6 +269,9 @@ def solve_definite(A, L, fixed, b, x):
 
 def solve_many(A: Band, B: Array, X: Array) -> None:
     """X[k] = A^-1 B[k] for all k, with factors of A; B and X are (m, N)."""
+    if isinstance(A, CoupledBand) and A.factors is not None:
+        X[:] = A.factors.solve(B.T.copy()).T
+        return
     if A.top > 0 or A.pivots[-1:].any():
         ab = _pivoted(A) if A.top < 0 else as_lapack(A)
         X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T

@@ -97,6 +97,10 @@ class Collocation(Scheme):
 
     def require(self, system: System) -> None:
         system.histories.require_none(self, "its points lie within the step")
+        if system.forces.changing:
+            raise InputError(f"{self!r} does not take {system.forces.changing[0][0]!r}, whose "
+                             "stiffness has entries that change from step to step: use "
+                             "'energy-momentum' or 'generalized-alpha'")
         if system.constraints.m and not (self.joined or system.backend.tables.linear_joints):
             raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
                              "rigid bodies: use 'radau', or 'energy-momentum', which conserves "

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.tables import constraint, joint_directions
+from ..core.band import CoupledBand
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
 from ..core.linalg import halves
@@ -82,6 +83,8 @@ DEPTH = 6  # how often a step is halved
 LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
 #: Approximate iterations of a step, by which work in NumPy is counted.
 OF_STEP = 3
+#: Names in checkpoints of the entries beside the band.
+KEPT = "kept rows", "kept columns", "kept values"
 #: Largest number of steps in a block, and of stored floats.
 BLOCK, STORED = 256, 2_000_000
 
@@ -115,7 +118,8 @@ class Integrator:
             self._nodes = Condensed(system, A), CondensedMass(system)
         unsymmetric = scheme.conserving and self._nodes is None
         U = halves(system.N if unsymmetric else 0, system.bandwidth)
-        self._matrices = Matrices(M, system.mass_solver.factors.band, A.band, U, *_damping(system))
+        self._matrices = Matrices(M, system.mass_solver.factors.band, _coupled(A.band, system),
+                                  _coupled(U, system), *_damping(system))
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self._rule = Rule._make([
             int(scheme.conserving), *map(float, scheme.parameters), self.tol,
@@ -299,8 +303,20 @@ class Integrator:
             done, passed = s.forces.contacts.sweep.first(u, v, y.t + dt * np.arange(len(u)))
             if passed:
                 self._lost = f"the step jumps over the obstacle {passed}"
+        if done and s.forces.changing:
+            done = self._first_passed(y, rows, done, dt)
         if done < len(rows):
             self.forget()
+        return done
+
+    def _first_passed(self, y, rows, done, dt):
+        """The number of steps before the first one that leads through a body."""
+        before = y.u
+        for k, u in enumerate(rows[:done, 0]):
+            if text := self.system.forces.passed((before, y.t + k * dt), (u, y.t + k * dt + dt)):
+                self._lost = text
+                return k
+            before = u
         return done
 
     @property
@@ -403,6 +419,8 @@ class Integrator:
             found |= {} if mass is None else {"mass at": mass}
         if self.ready:
             found |= self._factors()
+        if self.system.forces.changing and not self._nodes:
+            found |= dict(zip(KEPT, self.system.forces.kept))
         return {name: np.array(array) for name, array in found.items()}
 
     def load(self, arrays: dict[str, Any]) -> None:
@@ -413,6 +431,11 @@ class Integrator:
         if self.ready:
             for name, array in self._factors().items():
                 array[...] = arrays[name]
+        if self.system.forces.changing and not self._nodes:
+            i, j, values = (np.array(arrays[name]) for name in KEPT)
+            self.system.forces.kept = i, j, values
+            if self.ready:
+                factors(self._matrices, self._state).factorize_all()
         if self._nodes:
             steps, mass = self._nodes
             if self.ready:
@@ -434,6 +457,21 @@ def _step_data(given: TimeValues, dt: float, system: System) -> StepData:
                           int(system.backend.tables.motion_varies))
     return StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
                       given.supports[:, -1].copy(), joints)
+
+
+def _coupled(A, system):
+    """A band matrix, with the entries of force elements that couple DOFs anywhere."""
+    if not system.forces.changing:
+        return A
+    A, free = CoupledBand(*A), system.constraints.free
+
+    def entries():
+        i, j, values = system.forces.kept
+        kept = free[i] & free[j]
+        return i[kept], j[kept], values[kept]
+
+    A.entries = entries
+    return A
 
 
 def _damping(system):

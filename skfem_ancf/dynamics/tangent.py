@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..actions.forces.kernels import (add_contact_tangent, add_elastic_force, add_friction_tangent,
-                                      element_stiffness, put_between)
+                                      element_stiffness, keep_entries, put_between)
 from ..actions.tables import (add_curvature_force, add_joint_force, add_load_stiffness,
                               add_products, joint_directions, mean_external_force)
 from ..beam.strain_energy import (add_force_of, add_unsymmetric, body_force, body_linearised,
@@ -183,6 +183,8 @@ def tangent(e, matrices, rule, s, w, state):
             matrices.rows.S[k, k] = s.damping_factor
     add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x.middle, matrices.A)
     _add_elements(e.forces, matrices, s, w)
+    keep_entries(e.forces, s.acting, s.stiffness_factor, w.y[0] if rule.conserving > 0 else w.x.u,
+                 w.x.u)
     if e.forces.contacts.number > 0:
         _add_obstacles(e, matrices, rule, s, w)
     for i in indices(A.size):

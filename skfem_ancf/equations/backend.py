@@ -105,6 +105,8 @@ class Backend:
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
         """The choice for the next call of a kernel, by its name and expected iterations."""
         missing, off = self._missing(name), self._off
+        if name in NEEDED and self.tables.system.forces.changing:
+            off = off or "contact of members, or another sparse stiffness"
         if off is not None:
             return Choice("plain", off)
         if not missing:

@@ -1,7 +1,8 @@
 """Linear systems ``[K, J^T; J, 0] [x; l] = [b; c]`` of a scene, and their inertia.
 
 There are four ways: LAPACK for a band matrix alone; a Schur complement for few multipliers and a
-definite K; sparse LU on the null space of J; static condensation for frames.
+definite K; sparse LU on the null space of J, also for entries outside of the band; static
+condensation for frames.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class LinearSolver:
     def __init__(self, system: Any) -> None:
         self._system, self.handle = proxy(system), handle_of(self)
         self._at: tuple[Array, float] = np.zeros(0), 0.0
-        self._joined: Schur | NullSpace | None = None
+        self._joined: Alone | Schur | NullSpace | None = None
         self._pattern = Pattern()
         #: True if the matrix is more than a band: multipliers, or force elements between distant
         #: nodes.
@@ -58,12 +59,14 @@ class LinearSolver:
         """Entries of force elements outside of the band, at free DOFs."""
         s = self._system
         i, j, w, place = s.forces.far_entries()
-        if not len(i):
-            return i, j, w
         u, t = self._at
-        D = s.forces.stiffness(s.backend.tables.plain.forces, t, u, 0.0 * u, 0.0)
+        if len(i):
+            w = w * s.forces.stiffness(s.backend.tables.plain.forces, t, u, 0.0 * u, 0.0)[place]
+        if s.forces.changing:
+            i, j, w = (np.append(a, b) for a, b in zip(
+                (i, j, w), s.forces.changing_entries(t, u, u)))
         free = s.constraints.free
-        return i, j, w * D[place] * (free[i] & free[j])
+        return i, j, w * (free[i] & free[j])
 
     def multiply(self, v: Array) -> Array:
         """The assembled tangent times v (N,), before :meth:`factorize`."""
@@ -107,6 +110,10 @@ class LinearSolver:
         s.K.add(*(x[inside] for x in more))
         more = tuple(x[~inside] for x in more)
         self._joined = None
+        if not len(more[0]) and not constraints.m:
+            s.K.factorize()
+            self._joined = Alone(s)
+            return
         if s.symmetric and not len(more[0]) and constraints.few:
             try:
                 self._joined = Schur(s.K, J, constraints)
@@ -179,6 +186,8 @@ class LinearSolver:
             return self._system.K.determinant_sign()
         if isinstance(self._joined, NullSpace):
             return determinant_sign(self._joined.reduced())
+        if isinstance(self._joined, Alone):
+            return self._system.K.determinant_sign()
         return -1 if self.inertia().negative % 2 else 1
 
     def forget(self) -> None:
@@ -194,6 +203,22 @@ class LinearSolver:
             return self._system.K.definite
         known = self._joined if self.condensed is None else self.condensed.ready
         return bool(known) and self._system.symmetric and self.inertia() == Inertia(0, False)
+
+
+class Alone:
+    """The factors of a band matrix, of a system that may be more at another displacement."""
+
+    def __init__(self, system: Any) -> None:
+        self._system = system
+
+    def solve(self, b: Array, c: Array) -> tuple[Array, Array]:
+        """Solve for a right-hand side b (n,); there are no multipliers."""
+        return self._system.K.solve(b), c
+
+    def inertia(self) -> Inertia:
+        """Inertia of the symmetric part of K."""
+        s = self._system
+        return (s.K if s.symmetric else s.K.symmetric_part()).inertia()
 
 
 class Schur:

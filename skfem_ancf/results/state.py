@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..actions.eigenstrain import EigenStrain
+from ..actions.item import Item
 from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of
 from ..beam.beam import Beam
@@ -526,13 +527,26 @@ class State(Immutable, MaterialPoints, SpringForces):
 
     # of the whole
 
-    def contact(self, obstacle: int | None = None) -> Contact:
-        """Contact points and pressures of an obstacle, by its number, or of all.
+    def contact(self, obstacle: int | Item | None = None,
+                on: WhichMember = None) -> Contact:
+        """Contact points and pressures of obstacles, and of members that touch each other.
 
-        Raises InputError if there is no obstacle.
+        Parameters
+        ----------
+        obstacle
+            The number of an obstacle, or the item: an :class:`~skfem_ancf.Obstacle` or
+            :class:`~skfem_ancf.BodyContact`; None for all.
+        on
+            The member whose surface it is, by object, name or number; None for all, with the forces
+            on both sides of members that touch each other.
+
+        Raises
+        ------
+        InputError
+            If there is no contact.
         """
         with self._history():
-            return contact_of(self, obstacle)
+            return contact_of(self, obstacle, on)
 
     @property
     def strain_energy(self) -> float:

@@ -22,6 +22,7 @@ from ..actions.joints.sliders import slider
 from ..actions.loads import EndMoment, Load, Pressure, Traction, Weight
 from ..actions.point_force import PointForce
 from ..actions.obstacles import Obstacle
+from ..actions.pairs import BodyContact
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
 from ..beam.beam import Beam
@@ -248,6 +249,7 @@ class Model(NearMisses):
     drag = adds("drag", Drag)
     point_mass = adds("point_mass", PointMass)
     obstacle = adds("obstacle", Obstacle)
+    contact = adds("contact", BodyContact)
 
     # joints
 

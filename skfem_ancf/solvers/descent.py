@@ -153,7 +153,7 @@ class Descent:
     def _held_back(self, t, u, du, dm):
         """Shorten a correction until nothing passes through an obstacle."""
         for _ in range(HALVED):
-            if self.system.forces.contacts.passed((u, t), (u + du, t)) is None:
+            if self.system.forces.passed((u, t), (u + du, t)) is None:
                 break
             du, dm = 0.5 * du, 0.5 * dm
         return du, dm

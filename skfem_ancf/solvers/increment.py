@@ -84,8 +84,7 @@ class Increment:
         """The equilibrium, a stable one if requested; raises StepFailed."""
         system, start, route = self.system, self.start, self.options.route
         found = self._augmented()
-        passed = system.forces.contacts.passed((start.u, route.acting(start.load)[1]),
-                                               (found.u, self.time))
+        passed = system.forces.passed((start.u, route.acting(start.load)[1]), (found.u, self.time))
         if passed:
             raise StepFailed(passed)
         if not stable or start.unstable:
@@ -130,6 +129,10 @@ class Increment:
         contacts = self.system.forces.contacts
         self.system.histories.put(self.start.memory, self.level - self.start.load)
         found = self._touching()
+        for _ in range(AUGMENTED):
+            if not self.system.forces.corrected(found.u, self.time):
+                break
+            found = self.iterate(found)
         if not contacts.augmented:
             return found
         for k in range(1, AUGMENTED + 1):

@@ -145,7 +145,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if moving:
             for i in indices(u.size):
                 du[i] += moved[i]
-        elif e.forces.contacts.number > 0:
+        elif e.forces.contacts.number > 0 or e.forces.changing > 0:
             hold_back(e, target.at, u, R, du, dm)
         moving = False
         for i in indices(u.size):

@@ -302,8 +302,8 @@ class Search:
 
     @property
     def touches(self) -> bool:
-        """True if there are obstacles."""
-        return bool(self.system.forces.contacts.obstacles)
+        """True if there are obstacles, or bodies that may touch."""
+        return bool(self.system.forces.contacts.obstacles or self.system.forces.changing)
 
     @property
     def rubs(self) -> bool:
@@ -373,7 +373,7 @@ class Search:
         system.histories.put(self._memory)
         # descents start where obstacles have moved to
         times = (route.acting(level)[1] for level in (0.0, 1.0))
-        if passed := contacts.passed(*((result.u, t) for t in times)):
+        if passed := system.forces.passed(*((result.u, t) for t in times)):
             raise StepFailed(passed)
 
         def iterate(begin: Any) -> Equilibrium:

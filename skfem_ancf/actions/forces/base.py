@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from ...beam.beam import Beam
 from ...beam.distribution import Facets
@@ -55,6 +56,9 @@ class ForceElement(Item):
     history. Its ``stiffness(x, v, t, history, dt)``, ``resistance(x, v, t, history, dt)`` and
     ``potential(x, history)``, the stored energy, are optional. A further increment of ``dt = 0``
     should give the same force. Set ``symmetric = False`` where what slips has no potential.
+    ``mean(x, y, t, history, dt)``, a mean force of a step with exact work, is optional, and by
+    default that of both ends. So is ``corrected(x, t, history)``: a history with which to repeat an
+    increment of statics, or None, as for a penalty that has to grow.
 
     Attributes
     ----------
@@ -70,6 +74,10 @@ class ForceElement(Item):
     entries
         For a sparse stiffness, once bound: rows and columns of its values, numbers of components of
         neighbouring links; None for the shape (n, 2, n, 2).
+    changing : bool
+        Stiffness and resistance are sparse matrices (2 n, 2 n) whose entries may be anywhere, and
+        elsewhere at each call, as in contact. Each link is then a pair of degrees of freedom. The
+        scene is solved by sparse factors while there are entries, and searches along corrections.
 
     Other Parameters
     ----------------
@@ -79,6 +87,8 @@ class ForceElement(Item):
         Positions and velocities of the points, shape (n, 2) each; time, in statics the load factor.
     y
         Positions at the end of a step, shape (n, 2); ``x`` is its start and ``t`` its middle.
+    history, dt, past
+        History at the start of an increment, (k,), and its time; ``past`` are both.
 
     Examples
     --------
@@ -134,6 +144,7 @@ class ForceElement(Item):
     links: Any = ()
     groups: Any = ()
     entries: tuple[Array, Array] | None = None
+    changing = False
 
     def bind(self, layout: Layout) -> Sequence[Vector]:
         """The points and sections on which it acts, called on a copy.
@@ -176,16 +187,35 @@ class ForceElement(Item):
             return force  # next to rest round-off, divided by |d|, would be a large force
         return force - excess / np.sum(d * d) * d
 
-    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+    def stiffness(self, x: Array, v: Array, t: float) -> Any:
         """Derivative of the force by the positions, shape (n, 2, n, 2), the derivative's axes last.
 
         By default by a complex step or differences.
         """
         return derivative(lambda y: self.force(y, v, t), x)
 
-    def resistance(self, x: Array, v: Array, t: float) -> Array:
+    def mean_stiffness(self, x: Array, y: Array, t: float, *past: Any) -> Any:
+        """Twice the derivative of :meth:`mean_force` by y, if ``changing``.
+
+        By default the stiffness in the middle.
+        """
+        return self.stiffness(0.5 * (x + y), 0.0 * x, t, *past)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Any:
         """Derivative of the force by the velocities, as :meth:`stiffness`."""
         return derivative(lambda w: self.force(x, w, t), v)
+
+    def stride(self, x: Array, y: Array) -> float:
+        """Number of intervals in which a line search looks at the force from x to y."""
+        return 1.0
+
+    def corrected(self, x: Array, t: float, history: Array) -> Array | None:
+        """In statics, a history with which to repeat an increment that ends at x, or None."""
+        return None
+
+    def passed(self, x: Array, y: Array, t: float) -> str | None:
+        """Why a step must not lead from x to y, as through a body; None if it may."""
+        return None
 
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
         """Rows, columns and values (k,) added to the mass matrix; None for none."""
@@ -265,6 +295,8 @@ class Remembering:
 
     def mean_force(self, x: Array, y: Array, t: float, span: float) -> Array:
         """The mean force (n, 2) of a step about t: of its ends; with the span 0 that at the end."""
+        if span and hasattr(self.element, "mean"):
+            return self.element.mean(x, y, t, self.history, float(self.span[0]))
         end = self.force(y, 0.0 * y, t + 0.5 * span)
         return 0.5 * (self.evaluate(x, 0.0 * x, t - 0.5 * span, 0.0)[0] + end) if span else end
 
@@ -276,6 +308,9 @@ class Remembering:
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         return self._derivative("stiffness", lambda y: self.force(y, v, t), x, x, v, t)
+
+    def mean_stiffness(self, x: Array, y: Array, t: float) -> Any:
+        return self.element.mean_stiffness(x, y, t, self.history, float(self.span[0]))
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         return self._derivative("resistance", lambda w: self.force(x, w, t), v, x, v, t)
@@ -297,8 +332,22 @@ class Remembering:
 
     def settle(self, u0: Array, u: Array, t: float) -> float:
         """As :meth:`accept` in statics, between displacements (N,)."""
-        x, y = (np.array([link(w) for link in self.links]) for w in (u0, u))
+        x, y = (positions(self, w) for w in (u0, u))
         return self.accept(x, y, 0.0 * y, t)
+
+    def correct(self, u: Array, t: float) -> bool:
+        """Set a history with which to repeat an increment that ends at u (N,); False for none."""
+        new = self.element.corrected(positions(self, u), t, self.history)
+        if new is not None:
+            self._values[:] = new
+        return new is not None
+
+
+def positions(element: Any, u: Array) -> Array:
+    """Positions (n, 2) of the links of a bound element at displacements (N,)."""
+    if not element.changing:
+        return np.array([link(u) for link in element.links])
+    return u[[link.dofs[:, 0] for link in element.links]]
 
 
 def recalled(element: Any) -> Any:
@@ -343,20 +392,43 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     x = np.array([x.start for x in bound.links])
     n, zero = len(x), np.zeros_like(x)
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
-    for name in ("stiffness", "resistance"):
-        require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
-                       (n, 2, n, 2))
+    own = not is_builtin(getattr(bound, "item", bound))
+    if bound.changing:
+        _require_pairs(bound)
+        if not own:
+            return
+    else:
+        for name in ("stiffness", "resistance"):
+            require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
+                           (n, 2, n, 2))
     # generic positions, as terms may vanish in the reference configuration
     sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
     y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
-    K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))
-    if not is_builtin(getattr(bound, "item", bound)):
+    K = _matrix(bound.stiffness(y, zero, 0.0), 2 * n)
+    if own:
         beside(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
-    if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
+    if bound.symmetric and not abs(K - K.T).max() <= 1e-4 * abs(K).max():
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
                          "symmetric: it has no potential. Set symmetric = False in its class")
     if not hasattr(bound, "start") and bound.potential_at(y, 0.0) is not None:
         beside(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
+
+
+def _matrix(K, n):
+    """A derivative as a matrix (n, n)."""
+    return K if sparse.issparse(K) else np.reshape(K, (n, n))
+
+
+def _require_pairs(bound):
+    """Raise InputError unless the links of a changing element are pairs of DOFs."""
+    x, n = np.array([x.start for x in bound.links]), len(bound.links)
+    K = bound.stiffness(x, 0.0 * x, 0.0)
+    if not sparse.issparse(K) or K.shape != (2 * n, 2 * n):
+        raise InputError(f"the stiffness of {bound!r}, with changing = True, must be a sparse "
+                         f"matrix of shape {(2 * n, 2 * n)}, got {shown(K)}")
+    if any(link.dofs.shape != (2, 1) or np.any(link.weights != 1.0) for link in bound.links):
+        raise InputError(f"{bound!r} has changing = True: each of its links must be a pair of "
+                         "degrees of freedom, as Vector(np.zeros(2), [[0], [1]], 1.0)")
 
 
 def _require_derivatives(bound, x, u, d):
@@ -365,7 +437,7 @@ def _require_derivatives(bound, x, u, d):
     for name, at in (("stiffness", lambda s: (x + v + s * d, 0.0 * d, 0.0)),
                      ("resistance", lambda s: (x, v + s * d, 0.0))):
         before, now, after = (np.asarray(bound.force(*at(s))) for s in (-1.0, 0.0, 1.0))
-        slope = np.tensordot(getattr(bound, name)(*at(0.0)), d, 2)
+        slope = (_matrix(getattr(bound, name)(*at(0.0)), d.size) @ d.ravel()).reshape(d.shape)
         require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)", after - before,
                       2.0 * slope, 1e-12 * np.abs(now).max())
 

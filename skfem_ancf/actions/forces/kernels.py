@@ -67,6 +67,8 @@ class ForceTables(NamedTuple):
         Handle of user-defined elements, 0 for none; the obstacles.
     address
         Address of the compiled :func:`of_kinds`; 0 in NumPy.
+    changing
+        Number of user-defined elements whose stiffness changes its pattern.
     """
 
     start: F1
@@ -85,6 +87,7 @@ class ForceTables(NamedTuple):
     custom: int
     contacts: ContactTables
     address: int = 0
+    changing: int = 0
 
 
 @source
@@ -109,8 +112,10 @@ def _of(kinds, kind, y, w, rows, out):
             _part(kinds, kind, VECTORS, w), _part(kinds, kind, rows, out))
 
 
-#: Values of ``what``.
+#: Values of ``what``; from PUSHING on of elements whose stiffness changes its pattern: their force,
+#: its derivative along a correction, the entries of the tangent of a step.
 ELASTIC, RESISTING, DERIVATIVES, TURNED, SETTLED = range(5)
+PUSHING, ALONG_PUSHING, ENTRIES = range(5, 8)
 
 
 @source
@@ -197,6 +202,8 @@ def add_friction_tangent(tables, t, factor, u, v, A):
 def contact_work(tables, t, u, du, f):
     """Product of the contact force at u and du; f is workspace, zero on return."""
     add_contact(tables.contacts, _at(FORCE, t), u, u, f)
+    if tables.changing > 0:
+        custom_elements(tables.custom, np.int64(PUSHING), t, 0.0, u, du, f)
     work = dot(f, du)
     clear(f)
     return work
@@ -207,6 +214,8 @@ def contact_along(tables, t, u, du, out):
     """Derivative of :func:`contact_work` along du, and the largest slip of an element, (2,)."""
     out[0], out[1] = 0.0, 0.0
     add_contact(tables.contacts, _at(ALONG, t), u, du, out)
+    if tables.changing > 0:
+        custom_elements(tables.custom, np.int64(ALONG_PUSHING), t, 0.0, u, du, out)
 
 
 @source
@@ -282,6 +291,13 @@ def add_element_damping(tables, t, u, v, A):
         D = np.empty(tables.size)
         element_damping(tables, t, u, v, D)
         add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+
+
+@source
+def keep_entries(tables, t, factor, u0, u1):
+    """Keep the derivatives of changing elements, times a factor, beside the band of a step."""
+    if tables.changing > 0:
+        custom_elements(tables.custom, np.int64(ENTRIES), t, factor, u0, u1, u0)
 
 
 @source

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from ...beam.domain import Domain
 from ...core.types import Array
@@ -16,8 +17,8 @@ from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
 from .base import ForceElement, KernelElement, Remembering, recalled
 from .control import Control
-from .kernels import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
-                      potential, run_kinds, vectors_of)
+from .kernels import (ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING, TORSION,
+                      ForceTables, element_stiffness, potential, run_kinds, vectors_of)
 from .springs import TorsionalSpring
 
 
@@ -92,7 +93,8 @@ class Forces:
         self._slices = []
         for element in self.custom:
             m = 2 * len(element.links)
-            shape = (m, m) if element.entries is None else element.entries[0].shape
+            shape = (0,) if element.changing else (
+                (m, m) if element.entries is None else element.entries[0].shape)
             end = at + int(np.prod(shape))
             self._slices.append((slice(row, row + m), slice(at, end)))
             blocks.append((element.links, row + np.arange(m), np.arange(at, end).reshape(shape)))
@@ -102,7 +104,13 @@ class Forces:
         self._far = [bool(np.any(np.abs(i - j) > bandwidth)
                           or places is not None and np.any(np.abs(places[i] - places[j]) > 1))
                      for i, j, _, _ in self._couplings]
-        self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
+        #: Elements whose stiffness changes its pattern, and their DOFs.
+        self.changing = [(e, np.concatenate([link.dofs.ravel() for link in e.links]))
+                         for e in self.custom if e.changing]
+        #: Entries of the last tangent of a step: rows, columns and values.
+        self.kept = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+        self.far = any(self._far) or bool(self.changing)
+        self.symmetric = all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         # those of user-defined laws first, then in the order of the parts
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
@@ -114,6 +122,8 @@ class Forces:
     def _coupling(self, k):
         """Rows, columns, weights and source positions of the derivatives of element k."""
         links, _, places = self._blocks[k]
+        if k >= len(self.parts) and self.custom[k - len(self.parts)].changing:
+            return places, places, np.zeros(0), places
         dofs = [link.dofs[c] for link in links for c in range(2)]
         if k >= len(self.parts) and (
                 entries := self.custom[k - len(self.parts)].entries) is not None:
@@ -164,7 +174,7 @@ class Forces:
             np.ascontiguousarray(numbers.T).ravel(), self.size,
             position(i[keep], j[keep]).astype(np.int64), place[keep].astype(np.int64), w[keep],
             (rows * between + columns).astype(np.int64), places.astype(np.int64),
-            handle if self.custom else 0, self.contacts.tables)
+            handle if self.custom else 0, self.contacts.tables, 0, len(self.changing))
 
     def acting_rows(self) -> Array:
         """Derivatives of positions of concentrated elements, shape (k, N)."""
@@ -313,8 +323,64 @@ class Forces:
         near, far = self._entries(False), self._entries(True)
         i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
         touched = self.contacts.entries(t, u, self._bandwidth)
-        return (np.append(i, touched[0]), np.append(j, touched[1]),
-                np.append(w * D[place], touched[2]))
+        parts = (i, j, w * D[place]), touched, self.changing_entries(t, u, u, v, factor)
+        return tuple(np.concatenate(x) for x in zip(*parts))  # type: ignore[return-value]
+
+    # elements with a pattern that changes
+
+    def changing_entries(self, t: float, u0: Array, u1: Array, v: Array | None = None,
+                         factor: float = 0.0) -> tuple[Array, Array, Array]:
+        """Rows, columns and values (k,) of the stiffness of changing elements, of the mean force
+        between two displacements if these are two arrays.
+
+        Plus a factor times the resistance.
+        """
+        none = np.zeros(0, np.int64)
+        found = [(none, none, np.zeros(0))]
+        for element, at in self.changing:
+            x, y = (u[at].reshape(-1, 2) for u in (u0, u1))
+            w = 0.0 * x if v is None else v[at].reshape(-1, 2)
+            K = element.stiffness(x, w, t) if u0 is u1 else element.mean_stiffness(x, y, t)
+            if element.resists and factor != 0.0:
+                K = K + factor * element.resistance(0.5 * (x + y), w, t)
+            K = sparse.coo_array(K)
+            found.append((at[K.row], at[K.col], -K.data))
+        return tuple(np.concatenate(x) for x in zip(*found))  # type: ignore[return-value]
+
+    def corrected(self, u: Array, t: float) -> bool:
+        """Change histories with which an increment is to be repeated; True if there are any."""
+        return sum(element.correct(u, t) for element in self.remembering) > 0
+
+    def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
+        """Why a step must not lead from a displacement and time to others, or None."""
+        if text := self.contacts.passed(a, b):
+            return text
+        for element, at in self.changing:
+            if text := element.passed(*(u[at].reshape(-1, 2) for u in (a[0], b[0])), b[1]):
+                return text
+        return None
+
+    def looks(self, u: Array, t: float) -> Iterator[tuple[Any, Any]]:
+        """Elements of bodies that touch each other, with what their ``look`` returns."""
+        for element, at in self.changing:
+            if hasattr(element, "look"):
+                yield element, element.look(u[at].reshape(-1, 2), t, element.history)
+
+    def _of_pattern(self, what, t, factor, u, w, out):
+        """Evaluate changing elements at displacements, for :meth:`add_custom`."""
+        if what == ENTRIES:
+            i, j, values = self.changing_entries(t, u, u if np.array_equal(u, w) else w)
+            self.kept = i, j, factor * values
+            return
+        if what == ALONG_PUSHING:
+            i, j, values = self.changing_entries(t, u, u)
+            out[0] += values @ (w[i] * w[j])
+        for element, at in self.changing:
+            x = u[at].reshape(-1, 2)
+            if what == PUSHING:
+                out[at] -= np.ravel(element.force(x, 0.0 * x, t))
+            else:
+                out[1] = max(out[1], element.stride(x, x + w[at].reshape(-1, 2)))
 
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
@@ -324,8 +390,12 @@ class Forces:
         time ``factor``; 1: the force at a due to velocities b; 2: the derivatives by positions,
         plus a factor times those by velocities; 3: keep the angles of torsional springs at a; 4:
         set the histories at the end of a step from a to b, with velocities in the second half of
-        b, and add what it dissipates.
+        b, and add what it dissipates. From 5 on a and b are displacements (N,), see
+        :meth:`_of_pattern`.
         """
+        if what >= PUSHING:
+            self._of_pattern(what, t, factor, a, b, out)
+            return
         self.recall()
         for element, (rows, places) in zip(self.custom, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
@@ -343,7 +413,7 @@ class Forces:
                 if isinstance(element, Remembering):
                     v = b[len(a):][rows].reshape(-1, 2)
                     out[0] += element.accept(x, y, v, t)
-            else:
+            elif not element.changing:
                 found = np.array(element.stiffness(x, y, t))
                 if element.resists and factor != 0.0:
                     found = found + factor * np.asarray(element.resistance(x, y, t))

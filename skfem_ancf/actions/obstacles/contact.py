@@ -9,11 +9,13 @@ import numpy as np
 
 from ...core.errors import InputError, require_index
 from ...core.types import Array
+from ..contact.contacts import SEEN
+from ..item import Item
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Contact of bodies with obstacles.
+    """Contact of bodies with obstacles, or with each other.
 
     Attributes
     ----------
@@ -25,9 +27,12 @@ class Contact:
         Normal force per reference area, shape (n,). Nodal values are in equilibrium with the
         forces, linear in between: forces of single points oscillate along an element.
     gap
-        Distance from the obstacle, negative for penetration, shape (n,).
+        Distance from the obstacle or the other body, negative for penetration, shape (n,).
     nearest
-        The smallest distance of all surface points, in contact or not.
+        The smallest distance of all surface points, in contact or not; of bodies from each other,
+        infinite if none is near.
+    sticking
+        True where friction holds the point, shape (n,).
     """
 
     points: Array
@@ -35,6 +40,7 @@ class Contact:
     pressure: Array
     gap: Array
     nearest: float
+    sticking: Array
 
     @property
     def total(self) -> Array:
@@ -54,23 +60,67 @@ class Contact:
                 f"{self.nearest:.3g}>")
 
 
-def contact_of(state: Any, obstacle: Any = None) -> Contact:
-    contacts = state.system.forces.contacts
-    if not contacts.obstacles:
-        raise InputError("the scene has no obstacle: scene.obstacle(Circle((0, -1), 0.5)) adds one")
-    which = None if obstacle is None else require_index("obstacle", obstacle,
-                                                        len(contacts.obstacles))
-    found, nearest = [], np.inf
-    t = state.load if state.t is None else state.t
+def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
+    forces = state.system.forces
+    if not (forces.contacts.obstacles or forces.changing):
+        raise InputError("the scene has no contact: scene.obstacle(Circle((0, -1), 0.5)) adds an "
+                         "obstacle, scene.contact('all') that of its members with each other")
+    member = None if on is None else _number(state.system.members, on)
+    if isinstance(which, Item):
+        known = [e for e in forces.elements if e.same(which) and (e.groups or hasattr(e, "look"))]
+        if not known:
+            raise InputError(f"{which!r} is no obstacle and no contact of this scene")
+    elif which is not None:
+        known = [forces.contacts.obstacles[require_index("obstacle", which,
+                                                         len(forces.contacts.obstacles))]]
+    else:
+        known = forces.elements
+    found = [*_of_obstacles(state, known, member), *_of_bodies(state, known, member)]
+    *parts, nearest = zip(*found) if found else (
+        *((np.zeros(shape),) for shape in ((2, 0), (2, 0), (0,), (0,))), (np.zeros(0, bool),),
+        (np.inf,))
+    places, force, pressure, gap, sticks = (np.concatenate(x, axis=-1) for x in parts)
+    return Contact(places, force, pressure, gap, min(nearest), sticks)
+
+
+def _number(members, which):
+    for k, one in enumerate(members):
+        if one is which or (which is not None and getattr(one, "name", None) == which):
+            return k
+    return require_index("on", which, len(members))
+
+
+def _of_obstacles(state, known, member):
+    """Contact points, forces, pressures, gaps, sticking and the least gap of each group."""
+    contacts, t = state.system.forces.contacts, state.load if state.t is None else state.t
     v = None if state.t is None else np.array(state.v)
-    pushes = contacts.pushes(np.array(state.u), v, t)
-    for (_, group), (k, *values) in zip(contacts.groups, pushes):
-        if which is None or k == which:
-            nearest = min(nearest, float(values[3].min()))
-            values[2] = _balanced(group, values[2])
-            found.append([x[..., values[2] > 0.0] for x in values])
-    places, force, pressure, gap = (np.concatenate(x, axis=-1) for x in zip(*found))
-    return Contact(places, force, pressure, gap, nearest)
+    pushes = contacts.pushes(np.array(state.u), v, t) if contacts.obstacles else []
+    for (_, group), (k, x, force, pressure, gap) in zip(contacts.groups, pushes):
+        one, first = contacts.obstacles[k], int(group.first[0])
+        if not any(one is other for other in known) or (
+                member is not None and not state.system.slices[member].start <= first < (
+                    state.system.slices[member].stop)):
+            continue
+        normal = pressure * group.areas
+        along = np.sqrt(np.maximum(np.sum(force**2, axis=0) - normal**2, 0.0))
+        sticks = along < (1.0 - SEEN) * one.friction * normal
+        pressure = _balanced(group, pressure)
+        touch = pressure > 0.0
+        yield (x[:, touch], force[:, touch], pressure[touch], gap[touch], sticks[touch],
+               float(gap.min()))
+
+
+def _of_bodies(state, known, member):
+    """The same of bodies that touch each other, on both sides."""
+    t = state.load if state.t is None else state.t
+    for element, found in state.system.forces.looks(np.array(state.u), t):
+        if not any(element.same(other) for other in known):
+            continue
+        x, y, force, pressure, gap, sticks, own, other = found
+        both = [np.append(x, y, axis=1), np.append(force, -force, axis=1),
+                *(np.tile(value, 2) for value in (pressure, gap, sticks))]
+        here = np.ones(2 * len(gap), bool) if member is None else np.append(own, other) == member
+        yield *(value[..., here] for value in both), float(np.min(both[3][here], initial=np.inf))
 
 
 def _balanced(group, pressure):

@@ -185,7 +185,7 @@ class Obstacle(ForceElement):
         """Points of bottom, top and both ends; an end counts as an element."""
         mesh, (xi, along) = beam.mesh, self._along(beam)
         m, h = 2 * len(xi), mesh.height
-        eta, across = _lobatto(ACROSS)  # as many points as an element has: some are shared
+        eta, across = lobatto(ACROSS)  # as many points as an element has: some are shared
         which = np.arange(m) % ACROSS
         eta, across = eta[which], across[which] / np.bincount(which)[which]
         parts = [self._points(beam, first, np.array([np.tile(xi, 2), np.repeat([0, 1], len(xi))]),
@@ -196,7 +196,7 @@ class Obstacle(ForceElement):
             np.concatenate(arrays, axis=-1) for arrays in zip(*parts))
         places = starts[:2].reshape(2, -1, m)
         radius = np.hypot(*(places - places.mean(axis=2, keepdims=True))).ravel() + np.abs(offsets)
-        E, density = _stiffest(beam.across, np.arange(mesh.nelements))
+        E, density = stiffest(beam.across, np.arange(mesh.nelements))
         k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
         firmest = 1.0 if self.penalty or augmented else FIRMER * max(1.0, E / (h * k))
         numbers = np.array([k, self.width or WIDTH * h, self.friction, k, self.damping,
@@ -208,7 +208,7 @@ class Obstacle(ForceElement):
 
     def _along(self, beam):
         """Points and weights along the elements of a beam."""
-        rule = _lobatto(self.points or beam.element.axis_degree + 2)
+        rule = lobatto(self.points or beam.element.axis_degree + 2)
         bend, longest = self.shape.bend, float(beam.mesh.lengths.max())
         apart = longest * float(np.max(np.diff(rule[0])))
         if self.points is None and bend > 0.0:
@@ -239,7 +239,7 @@ class Obstacle(ForceElement):
         weights = beam.element.of_mesh(mapping, at, elements)[0]
         if tind is None:  # lengths of both sides, by xi, and their widths
             half, length = m // 2, np.hypot(*mapping.DF(at, elements)[:, 0])
-            width = [np.broadcast_to(_face(beam.across, side, part, elements), (n, half))
+            width = [np.broadcast_to(face_width(beam.across, side, part, elements), (n, half))
                      for side, part in ((0, X[:, :half]), (1, X[:, half:]))]
             areas = w * length * np.concatenate(width, axis=1)
         else:
@@ -257,7 +257,7 @@ def _default(E, mesh):
     return E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
 
 
-def _stiffest(across, elements):
+def stiffest(across: Any, elements: Array) -> tuple[float, float]:
     """Largest modulus and largest density of the layers at mid-element."""
     E, density = [], []
     for layer in across.layers:
@@ -267,7 +267,7 @@ def _stiffest(across, elements):
     return float(max(E)), float(max(density))
 
 
-def _face(across, side, X, elements):
+def face_width(across: Any, side: int, X: Array, elements: Array) -> Any:
     """Width of bottom or top; the largest width of a section without faces, as a circle."""
     layer = across.layers[-side]
     if layer.face is not None and layer.face[side] == 0.0:
@@ -275,7 +275,7 @@ def _face(across, side, X, elements):
     return across.face(side, X, elements)
 
 
-def _lobatto(n):
+def lobatto(n: int) -> tuple[Array, Array]:
     """Gauss-Lobatto points and weights on [0, 1]."""
     x = gauss_lobatto(n)
     P = np.polynomial.legendre.Legendre.basis(n - 1)(x)

@@ -1,0 +1,190 @@
+"""Surfaces of beams, rigid bodies and domains: facets, which are polynomial curves.
+
+Plane vectors are complex numbers. Point ``zeta`` in [-1, 1] of a facet is at
+``c(zeta) = start(zeta) + sum(weights(zeta) * z[dofs])``, where z are the displacements of pairs of
+degrees of freedom. Its outer normal is ``side * 1j * c' / |c'|``, and the surface is at ``offset``
+along it: half the height for a cable, whose curve is its axis, else 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...beam.beam import Beam
+from ...beam.kernels.section import beam_gradients
+from ...beam.rigid import RigidBody
+from ...core.errors import InputError
+from ...core.quadrature import gauss_lobatto
+from ...core.types import Array
+from ..obstacles.obstacle import face_width, lobatto, stiffest
+
+#: Points across the end of a beam.
+ACROSS = 3
+#: Points along an edge of a rigid body, and largest number of such intervals.
+EDGE, PARTS = 4, 50
+
+
+class Facets(NamedTuple):
+    """Facets (F,) with B pairs of degrees of freedom each, and points of the surface (P,).
+
+    ``members``, ``chains`` and ``curves`` are numbers of their members, of the chains of these, and
+    of smooth parts of their surfaces; ``places`` and ``lengths`` where facets begin along these and
+    how long they are, ``spans`` that along an axis. ``heights`` is how thick the member is,
+    ``firmness`` its pressure per penetration, infinite if not known. Points have a facet, ``zeta``,
+    and an area, per width for bodies and domains.
+    """
+
+    dofs: Array  # (F, B)
+    weights: Array  # coefficients of powers of zeta, (F, B, n)
+    starts: Array  # (F, n)
+    sides: Array
+    offsets: Array
+    members: Array
+    chains: Array
+    curves: Array
+    places: Array
+    lengths: Array
+    spans: Array
+    heights: Array
+    firmness: Array
+    of: Array  # facets of points, (P,)
+    zeta: Array
+    areas: Array
+
+
+def facets_of(layout: Any, members: Any, origin: complex) -> Facets:
+    """The facets of some members of a layout, by number."""
+    parts: list[Facets] = []
+    for k in members:
+        member, first = layout.members[k], layout.offset(k) // 2
+        make = (_of_beam if isinstance(member, Beam) else
+                _of_body if isinstance(member, RigidBody) else _of_domain)
+        for part in make(member):
+            curves, chains = (x + (1 + max(map(np.max, before)) if before else 0) for x, before in (
+                (part.curves, [one.curves for one in parts]),
+                (part.chains, [one.chains for one in parts if one.members[0] != k])))
+            parts.append(part._replace(dofs=part.dofs + first, curves=curves, chains=chains,
+                                       members=np.full(len(part.dofs), k)))
+    return _joined(parts, origin)
+
+
+def _joined(parts, origin):
+    first = np.cumsum([0, *(len(part.dofs) for part in parts)])
+    B, n = (max(part.weights.shape[k] for part in parts) for k in (1, 2))
+    found = []
+    for part, at in zip(parts, first):
+        _, b, k = part.weights.shape
+        starts = np.pad(part.starts, ((0, 0), (0, n - k)))
+        starts[:, 0] -= origin
+        found.append(part._replace(
+            dofs=np.concatenate([part.dofs, np.tile(part.dofs[:, :1], B - b)], axis=1),
+            weights=np.pad(part.weights, ((0, 0), (0, B - b), (0, n - k))), starts=starts,
+            of=part.of + at))
+    return Facets(*(np.concatenate(x) for x in zip(*found)))
+
+
+def _facets(dofs, weights, x, zeta, rule, widths, **values):
+    """Facets from weights (F, B, n) and places x (F, n) at n points zeta, with points of a rule.
+
+    ``values`` are other fields, numbers or (F,).
+    """
+    F, (points, w) = len(dofs), rule
+    fit = np.linalg.inv(np.vander(zeta, increasing=True)).T
+    starts, number = x @ fit, np.arange(F)
+    speed = np.abs(np.polynomial.polynomial.polyval(
+        points, np.polynomial.polynomial.polyder(starts.T)))
+    one = dict.fromkeys(("offsets", "chains", "places", "spans"), 0) | values
+    one["curves"] = one["chains"] if np.ndim(one["spans"]) else number
+    kinds = {name: value + (0 * number if name in ("chains", "curves") else np.zeros(F))
+             for name, value in one.items()}
+    return Facets(dofs=dofs, weights=weights @ fit, starts=starts, members=number,
+                  lengths=speed @ w, of=np.repeat(number, len(points)), zeta=np.tile(points, F),
+                  areas=(speed * w * widths).ravel(), **kinds)
+
+
+def _of_beam(beam):
+    """Bottom and top, and both ends of each chain."""
+    mesh, element, mapping = beam.mesh, beam.element, beam.mesh.mapping()
+    if not beam.has_sections and mesh.heights is not None:
+        raise InputError(f"contact knows cables of constant height only, not {beam!r}: take an "
+                         "element with sections, as ElementBeamANCF(2)")
+    E = stiffest(beam.across, np.arange(mesh.nelements))[0]
+    common = {"heights": mesh.height, "firmness": E / mesh.height}
+    dofs = mesh.t[0][:, None] * (beam.nd // 2) + np.arange(beam.nd)
+    ends = np.append(np.flatnonzero(np.diff(mesh.chains)), mesh.nelements - 1)
+    begins = np.append(0, ends[:-1] + 1)
+    s = np.cumsum(mesh.lengths) - mesh.lengths
+    n = element.axis_degree + 1 + mapping.height_degree
+    nodes, rule = gauss_lobatto(n), _rule(element.axis_degree + 2)
+    for side, eta in ((-1.0, 0.0), (1.0, 1.0)):
+        at = eta if beam.has_sections else 0.5
+        X = np.array([0.5 + 0.5 * nodes, np.full(n, at)])
+        where = np.array([0.5 + 0.5 * rule[0], np.full(len(rule[0]), at)])
+        width = face_width(beam.across, int(eta), where, np.arange(mesh.nelements))
+        yield _facets(dofs, element.of_mesh(mapping, X)[0].transpose(1, 0, 2),
+                      _complex(mapping.F(X)), nodes, rule, width, sides=side, chains=mesh.chains,
+                      offsets=0.0 if beam.has_sections else 0.5 * mesh.height, places=s,
+                      spans=mesh.lengths + np.zeros(mesh.nelements), **common)
+    n = max(element.order, 1) + 1
+    nodes, rule = gauss_lobatto(n), _rule(ACROSS)
+    for e, xi, side in ((begins, 0.0, 1.0), (ends, 1.0, -1.0)):
+        X, where = (np.array([np.full(len(y), xi), 0.5 + 0.5 * y]) for y in (nodes, rule[0]))
+        weights = element.of_mesh(mapping, X, e)[0].transpose(1, 0, 2) + 0j
+        if not beam.has_sections:
+            slopes = beam_gradients(mesh, element, X, e)[0][0].transpose(0, 2, 1)
+            weights += 0.5j * mesh.height * nodes * slopes
+        yield _facets(dofs[e], weights, _complex(mapping.F(X, e)), nodes, rule,
+                      beam.across.outline(where, e), sides=side, chains=mesh.chains[e],
+                      places=s[e] + xi * mesh.lengths[e], **common)
+
+
+def _of_body(body):
+    """The edges of the outline."""
+    z = _complex(body.outline)
+    if np.sum(np.imag(np.conj(z) * np.roll(z, -1))) < 0.0:
+        z = z[::-1]  # counterclockwise
+    ends = np.array([z, np.roll(z, -1)]).T
+    weights = np.stack([np.ones(ends.shape), ends], axis=1)
+    turn, F = np.exp(1j * body.angle), len(z)
+    thick = float(np.min(np.ptp(body.outline, axis=1)))
+    n = int(np.clip(np.ceil(np.max(np.abs(np.diff(ends))) / thick), 1, PARTS))
+    yield _facets(np.tile([0, 1], (F, 1)), weights, _complex(body.position) + turn * ends,
+                  np.array([-1.0, 1.0]), _repeated(n), 1.0, sides=-1.0, heights=thick,
+                  firmness=np.inf)
+
+
+def _of_domain(domain):
+    """The edges of the boundary."""
+    n = domain.basis.elem.maxdeg + 1
+    nodes = gauss_lobatto(n)
+    trace = domain.basis.boundary(quadrature=(0.5 + 0.5 * nodes[None], np.ones(n)))
+    weights = np.array([np.asarray(trace.basis[k][0])[0] for k in range(0, trace.Nbfun, 2)])
+    dofs = domain.numbers(trace.element_dofs[::2]) // 2
+    kept = np.argsort(-np.abs(weights).max(axis=2), axis=0, kind="stable")
+    kept = kept[:int(np.max(np.sum(np.abs(weights).max(axis=2) > 1e-12, axis=0)))]
+    x = _complex(np.asarray(trace.global_coordinates()))
+    normal = _complex(np.asarray(trace.normals))[:, 0]
+    side = np.sign(np.real(np.conj(normal) * 1j * (x[:, -1] - x[:, 0])))
+    weights = np.take_along_axis(weights, kept[..., None], axis=0).transpose(1, 0, 2)
+    thick = min(np.ptp(x.real), np.ptp(x.imag))
+    yield _facets(np.take_along_axis(dofs, kept, axis=0).T, weights, x, nodes, _rule(n + 1), 1.0,
+                  sides=side, heights=thick, firmness=np.inf)
+
+
+def _rule(n):
+    """Gauss-Lobatto points and weights on [-1, 1]."""
+    x, w = lobatto(n)
+    return 2.0 * x - 1.0, 2.0 * w
+
+
+def _repeated(n):
+    """The same on n equal intervals."""
+    x, w = _rule(EDGE)
+    left = 2.0 * np.arange(n)[:, None] / n - 1.0
+    return (left + (1.0 + x) / n).ravel(), np.tile(w / n, n)
+
+
+def _complex(x):
+    return x[0] + 1j * x[1]
