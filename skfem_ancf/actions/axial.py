@@ -21,7 +21,7 @@ from ..beam.surfaces import add_nodal
 from ..core.errors import ask_field, require_finite
 from ..core.quadrature import gauss
 from ..core.types import Array, TimeFunction
-from ..sections.jumps import Pieces, pieces
+from ..sections.across import Pieces, pieces
 from ..mesh.places import as_point
 from .item import Item
 from .loads import DeadLoad, Load, number_at

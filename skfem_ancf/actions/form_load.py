@@ -18,7 +18,7 @@ from ..core.errors import (CallbackError, InputError, explained, require_finite,
                            require_slope, shown, warnings_as_errors)
 from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
-from .density import Density, points_of
+from .energy import Density, points_of
 from .item import beside
 from .loads import DeadLoad
 

@@ -14,7 +14,7 @@ from ..core.quadrature import lagrange
 from ..core.types import Array
 from ..elements.base import ElementBeam
 from ..mesh.mesh_beam import MeshBeam
-from ..sections.jumps import jumps
+from ..sections.across import jumps
 from .beam import Beam
 from .kinematics import direction_weights, probe_reference
 

@@ -11,7 +11,7 @@ from ..core.quadrature import gauss
 from ..core.types import Array, Place
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.places import facets_of
-from ..sections.jumps import pieces
+from ..sections.across import pieces
 from .beam import Beam
 from .distribution import Facets, station_of_node
 

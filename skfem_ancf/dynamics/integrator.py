@@ -21,10 +21,9 @@ from ..equations.system import System
 from .base import Motion, Scheme, in_steps, interpolate
 from .convergence import FAILURES, new_state
 from .time_functions import SAMPLES, TimeFunctions, TimeValues, rates
-from .dampers import Dampers, LowRankRows, solve_rows
 from .energy_momentum import EnergyMomentum
-from .records import (JointMotion, JointMotions, Matrices, Rule, StepData, acceleration_of_joints,
-                      drive_rate, mass_factor, new_work)
+from .records import (Dampers, JointMotion, JointMotions, LowRankRows, Matrices, Rule, StepData,
+                      acceleration_of_joints, drive_rate, mass_factor, new_work, solve_rows)
 from .steps import steps
 from .tangent import factors
 

@@ -11,8 +11,7 @@ from ..beam.strain_energy import body_mean_stress, body_stress, body_tangent, bo
 from ..core.band import (SPARE, Band, add_multiple, copy, factorize, factorize_complex, fix_stored,
                          solve, solve_complex, solve_dependent)
 from ..core.source import F1, F2, F3, indices, shaped, source
-from .dampers import add_damping
-from .records import JointMotions, row_of
+from .records import JointMotions, add_damping, row_of
 
 
 # named tuples of collocation: coefficients, prescribed functions, work arrays

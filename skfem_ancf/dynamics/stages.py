@@ -16,8 +16,8 @@ from ..actions.tables import (add_constraint_rate, add_joint_force, constraint, 
                               joint_directions)
 from .convergence import (DEPENDENT, DONE, FAILED, GO_ON, ITERATIONS, NOT_CONVERGED, RESTART,
                           SINGULAR, judged, round_off)
-from .dampers import damping_beside, damping_force
-from .records import JointMotion, acceleration_of_joints, drive_rate, row_of
+from .records import (JointMotion, acceleration_of_joints, damping_beside, damping_force,
+                      drive_rate, row_of)
 from .stage_tangent import factorize_stages, flat_points, join, solve_for
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed

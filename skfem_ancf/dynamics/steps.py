@@ -26,8 +26,7 @@ from ..core.source import indices, shaped, source
 from .convergence import (AUGMENTED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON, ITERATIONS,
                           LASTING, MIXED, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
                           SYMMETRIC, UNSETTLED, UNSYMMETRIC, judged, round_off)
-from .dampers import damping_force, solve_rows
-from .records import acceleration_of_joints, drive_rate, step_of
+from .records import acceleration_of_joints, damping_force, drive_rate, solve_rows, step_of
 from .tangent import (add_damping_force, add_elastic, add_impulses, directions, factorize_tangent,
                       factors, free_velocity, internal_force, kinetic_energy, residual, tangent,
                       to_damping_velocity, to_middle)

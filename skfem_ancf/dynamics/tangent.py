@@ -13,7 +13,7 @@ from ..core.band import (add_halves, add_multiple, clear, copy, dot, factorize, 
 from ..core.callbacks import call_solver, custom_joints
 from ..core.source import indices, source
 from .convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
-from .dampers import add_damping, damping_beside, factorize_rows
+from .records import add_damping, damping_beside, factorize_rows
 
 
 # the residual of a step, ``Q - f - M a - J^T lambda``, at an iterate

@@ -13,8 +13,7 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 from skfem.helpers import dot
 
-from ..actions.density import points_of
-from ..actions.energy import Energy
+from ..actions.energy import Energy, points_of
 from ..beam.kinematics import element_dofs
 from ..core.errors import InputError, ask_field, require_finite, require_like, require_positive
 from ..core.types import Array

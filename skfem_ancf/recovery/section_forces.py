@@ -20,7 +20,7 @@ from ..core.errors import AncfError
 from ..core.quadrature import gauss, lagrange
 from ..core.types import Array
 from ..mesh.mapping import MappingBeam, cross
-from ..sections.jumps import beside, jumps, pieces
+from ..sections.across import beside, jumps, pieces
 
 #: Quadrature points along an element for its loads.
 ALONG = 8

@@ -14,7 +14,7 @@ from ..core.caching import cached_property
 from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array
 from ..mesh.mapping import cross
-from ..sections.jumps import SIDE, beside
+from ..sections.across import SIDE, beside
 from .section_forces import NotFound, Sections
 
 
