@@ -16,7 +16,7 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
 #: Returned by public methods, and machinery all the same.
 MACHINERY = {"BandMatrix", "Finder", "Inertia", "Masses", "Points", "Recovery", "System",
              "Distribution", "Interpolation", "BeamLayer", "LayerPoints",
-             "Law", "Amplitude", "BodyFields", "Link", "Part",
+             "Law", "Amplitude", "BodyFields", "Link", "KernelElement",
              "StabilisedMode", "Sampling", "Rule", "Point", "Critical", "Vector"}
 
 
