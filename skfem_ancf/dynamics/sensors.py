@@ -194,10 +194,10 @@ class Recorder:
         found = [read_steps(sensor, at, steps) if sensor.moving else _stacked(name, next(columns))
                  for (name, sensor), at in zip(self.sensors, self._located)]
         self._t.append(np.array([y.t for y in steps]))
-        for (name, _), read, one in zip(self.sensors, self._read, found):
-            if read and one.shape[1:] != read[0].shape[1:]:
-                raise _varying(name, read[0][0].shape, one[0].shape)
-            read.append(one)
+        for (name, _), before, one in zip(self.sensors, self._read, found):
+            if before and one.shape[1:] != before[0].shape[1:]:
+                raise _varying(name, before[0][0].shape, one[0].shape)
+            before.append(one)
 
     def readings(self) -> Readings:
         """The readings so far."""
