@@ -39,6 +39,7 @@ from .results.checks import Checks
 from .results.path import CriticalPoint, Path
 from .results.response import FrequencyResponse
 from .results.state import Reaction, State
+from .scene.design import Design
 from .scene.frame import Frame
 from .scene.plan import Plan
 from .scene.linear_model import LinearModel, StateSpace
@@ -68,6 +69,7 @@ __all__ = [
     "ConvergenceError",
     "CriticalPoint",
     "DeadLoad",
+    "Design",
     "Domain",
     "Drag",
     "EigenStrain",

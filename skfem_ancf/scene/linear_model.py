@@ -98,7 +98,7 @@ class LinearModel:
         self.inputs = [label for name, c in columns for label in _labels(name, len(c))]
         self.B, self.G, self.prescribed = (
             np.column_stack(parts) for parts in zip(*(c for _, some in columns for c in some)))
-        rows = [(name, _rows(system, state, sensor)) for name, sensor in sensors]
+        rows = [(name, rows_of(system, state, sensor)) for name, sensor in sensors]
         self.outputs = [label for name, row in rows for label in _labels(name, len(row.u))]
         self.readings = Readings(*(np.concatenate(parts) for parts in zip(*(r for _, r in rows))))
 
@@ -287,7 +287,7 @@ def _driven(joint, state, t):
     return [(moved(by) - moved(-by)) / (2.0 * TURN) for by in steps]
 
 
-def _rows(system, state, sensor):
+def rows_of(system, state, sensor):
     """Derivatives of the readings of a sensor."""
     at, N, m = locate(sensor, system), system.N, system.constraints.m
     local = np.arange(N) if at is None or sensor.recover else np.unique(np.concatenate(

@@ -1,0 +1,268 @@
+"""Readings of static solutions as functions of parameters, and their derivatives by the adjoint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from ..actions.forces.base import derivative
+from ..core.errors import (ConvergenceError, InputError, NameUnknown, ask, ask_array,
+                           require_finite, require_function, shown)
+from ..core.types import Array
+from ..dynamics.sensors import Sensor, locate, read
+from ..equations.matrices import matrices_of
+from ..results.state import State
+from .linear_model import rows_of
+
+#: Step of the parameters, relative to their size, and a stencil of fourth order.
+STEP = 1e-3
+#: The same with contact, where it must not lift the body off.
+TOUCHING = 1e-6
+STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
+#: Relative change of an equation that is no round-off.
+CHANGED = 1e-12
+#: Step of displacements for readings that are functions, relative to the size of the scene.
+ASIDE = 1e-6
+
+
+class Design:
+    """Readings of the static solution of a scene as functions of parameters, with derivatives.
+
+    With the equations ``R(z, p) = 0`` of the displacements and multipliers z, a reading ``y(z, p)``
+    has the derivative ``dy/dp = y_p - a . R_p`` with the adjoint ``R_z^T a = y_z``: one
+    factorisation for all parameters and readings [1]. ``R_p`` and ``y_p`` are differences of
+    fourth order at fixed z, for which nothing is solved. Parameters that act on different degrees
+    of freedom, as heights at nodes, are changed together, see [2].
+
+    Parameters
+    ----------
+    build
+        A function of the parameters, an array (n,), that returns a
+        :class:`~skfem_ancf.Scene`. Materials, heights, shapes, loads, springs, obstacles and
+        energies of one's own may depend on them, and not the number of degrees of freedom.
+    readings
+        Names of sensors of that scene, or functions of the State that return a number or an array.
+        Functions are derived by differences by each degree of freedom: for small scenes.
+    sizes
+        Typical sizes of the parameters, (n,), by default their absolute values.
+
+    Raises
+    ------
+    InputError
+        If forces depend on the path, as friction or plasticity: then the state is at a kink, and a
+        derivative depends on the direction.
+
+    References
+    ----------
+    [1] Tortorelli, Michaleris: "Design sensitivity analysis: overview and review", Inverse Problems
+    in Engineering 1 (1994).
+
+    [2] Curtis, Powell, Reid: "On the estimation of sparse Jacobian matrices", IMA Journal of
+    Applied Mathematics 13 (1974).
+
+    Examples
+    --------
+    The deflection of a cantilever by its modulus and its load, F L^3 / (3 E I):
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, Design, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01)
+    >>> def build(p):
+    ...     beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(p[0], 0.3), width=0.01)
+    ...     scene = Scene(beam).clamp("left").point_force((0, -p[1]), at=(1, 0))
+    ...     return scene.sensor("tip", "displacement", at=(1, 0))
+    >>> (_, tip), jacobian = Design(build, ["tip"])([2e8, 1e-4])
+    >>> jacobian.shape, bool(abs(2e8 * jacobian[1, 0] / -tip - 1) < 1e-4)
+    ((2, 2), True)
+    """
+
+    def __init__(self, build: Callable[[Array], Any], readings: Sequence[Any],
+                 sizes: ArrayLike | None = None) -> None:
+        self.build = require_function("build", build, "of parameters (n,) that returns a Scene")
+        self.readings = list(readings)
+        self._sizes = None if sizes is None else require_finite("sizes", sizes, (None,))
+        self._last: tuple[Any, ...] = (None, None, None)
+        self._groups: list[tuple[Array, Array]] | None = None
+        self.state: State | None = None
+
+    def __call__(self, p: ArrayLike) -> tuple[Array, Array]:
+        """Values of the readings (r,), and their derivatives by the parameters, (r, n)."""
+        p = np.atleast_1d(require_finite("p", p)).astype(float)
+        if self._last[0] is None or not np.array_equal(self._last[0], p):
+            scene = self._scene(p)
+            state = self.state = self._solved(scene)
+            self._last = p.copy(), self._read(scene, state), self._jacobian(p, scene, state)
+        return self._last[1].copy(), self._last[2].copy()
+
+    def values(self, p: ArrayLike) -> Array:
+        """Values of the readings, shape (r,)."""
+        return self(p)[0]
+
+    def jacobian(self, p: ArrayLike) -> Array:
+        """Their derivatives by the parameters, shape (r, n)."""
+        return self(p)[1]
+
+    def objective(self, function: Callable[[Array], float]) -> Callable[[ArrayLike], Any]:
+        """For ``scipy.optimize.minimize(..., jac=True)``: a function of p.
+
+        Parameters
+        ----------
+        function
+            A number as a function of the readings, an array (r,).
+        """
+        def value_and_gradient(p: ArrayLike) -> tuple[float, Array]:
+            y, J = self(p)
+            return float(function(y)), derivative(function, y) @ J
+
+        return value_and_gradient
+
+    # the state
+
+    def _scene(self, p):
+        scene = ask("build(p)", self.build, p)
+        if not hasattr(scene, "solve_static"):
+            raise InputError(f"build(p) must return a Scene, got {shown(scene)}")
+        return scene
+
+    def _solved(self, scene):
+        last = self.state
+        if last is not None and last.system.N == scene.N:
+            try:
+                return scene.solve_static(start=scene.state(last.u))
+            except (ConvergenceError, InputError):  # the start may be the cause
+                pass
+        return scene.solve_static()
+
+    def _sensors(self, scene):
+        for one in self.readings:
+            if isinstance(one, str) and one not in scene.sensors:
+                raise NameUnknown("sensor", one, scene.sensors)
+            yield scene.sensors[one] if isinstance(one, str) else one
+
+    def _read(self, scene, state):
+        found = [np.zeros(0)]
+        for one in self._sensors(scene):
+            value = ask_array("a reading", None, one, state) if not isinstance(one, Sensor) else (
+                read(one, locate(one, state.system), state))
+            found.append(np.ravel(value))
+        return np.concatenate(found)
+
+    # derivatives
+
+    def _jacobian(self, p, scene, state):
+        if state.system.histories.dissipates:
+            raise InputError("forces of this scene depend on the path (friction, plasticity): the "
+                             "derivative of a reading depends on the direction, and is not defined")
+        adjoint = self._adjoint(scene, state)
+        r, n = len(adjoint), state.system.N + state.system.constraints.m
+        out = np.zeros((r, len(p)))
+        for numbers, at, change in self._changes(p, state):
+            rest = -adjoint[:, at[at < n]] * change[at < n]
+            np.add.at(out.T, numbers[at < n], rest.T)
+            own = at >= n
+            np.add.at(out, (at[own] - n, numbers[own]), change[own])
+        return out
+
+    def _adjoint(self, scene, state):
+        """The adjoint of each reading, (r, N + m)."""
+        system, found = state.system, matrices_of(state.system, state)
+        free, s, m = system.constraints.free, system.constraints.coordinate_sizes, found.J.shape[0]
+        keep = sparse.diags_array(free.astype(float))
+        A = sparse.block_array([[keep @ found.K + sparse.diags_array(1.0 - free),
+                                 keep @ found.J.T], [found.J, None]], format="csr")
+        size = float(np.sqrt(np.abs(found.K.diagonal() * s * s).max()))
+        rows = np.concatenate([np.where(free, s / size, size / s), np.full(m, size)])
+        columns = np.concatenate([s / size, np.full(m, size)])
+        A = (sparse.diags_array(columns) @ A.T @ sparse.diags_array(rows)).tocsc()
+        by_z = self._by_state(scene, state)
+        return rows * splu(A).solve((columns * by_z).T).T
+
+    def _by_state(self, scene, state):
+        """Derivatives of the readings by displacements and multipliers, (r, N + m)."""
+        found = [np.zeros((0, state.system.N + state.system.constraints.m))]
+        for one in self._sensors(scene):
+            if isinstance(one, Sensor) and not callable(one.what):
+                row = rows_of(state.system, state, one)
+                found.append(np.hstack([row.u, row.multipliers]))
+            else:
+                function = one.what if isinstance(one, Sensor) else one
+                found.append(_differences(function, state))
+        return np.concatenate(found)
+
+    def _changes(self, p, state):
+        """Derivatives of equations and readings by parameters: numbers, places, values."""
+        sizes = np.abs(p) if self._sizes is None else self._sizes
+        h = (TOUCHING if state.system.forces.contacts.obstacles else STEP) * np.where(
+            sizes > 0.0, sizes, sizes.max() or 1.0)
+        before = self._equations(p, state)
+        if self._groups is None or not all(len(of) == len(before) for _, of in self._groups):
+            self._groups = self._grouped(p, h, state)
+        for members, of in self._groups:
+            moved = np.isin(np.arange(len(p)), members) * h
+            change = sum(c * self._equations(p + k * moved, state) for k, c in STENCIL)
+            left = (of < 0) & (np.abs(change) > 1e3 * CHANGED * self._scale)
+            if np.any(left):  # the pattern is another one than at the start: contact, say
+                self._groups = None
+                yield from self._changes(p, state)
+                return
+            at = np.flatnonzero(of >= 0)
+            yield of[at], at, change[at] / h[of[at]]
+
+    def _grouped(self, p, h, state):
+        """Parameters that change different equations, with the parameter of each equation."""
+        before, groups = self._equations(p, state), []
+        for k in range(len(p)):
+            moved = p.copy()
+            moved[k] += h[k]
+            touched = np.abs(self._equations(moved, state) - before) > CHANGED * self._scale
+            for members, of in groups:
+                if not np.any(touched & (of >= 0)):
+                    break
+            else:
+                members, of = [], np.full(len(before), -1)
+                groups.append((members, of))
+            members.append(k)
+            of[touched] = k
+        return groups
+
+    def _equations(self, p, state):
+        """The equations at the displacements and multipliers of a state, and the readings."""
+        scene = self._scene(p)
+        system, u, load = scene.system, np.array(state.u), state.load
+        if system.N != state.system.N or system.constraints.m != state.system.constraints.m:
+            raise InputError("the parameters change the number of degrees of freedom or of joint "
+                             f"equations, from {state.system.N} and {state.system.constraints.m} "
+                             f"to {system.N} and {system.constraints.m}")
+        c, l = system.constraints, state.multipliers
+        with system.histories.lent(state.memory):
+            force = system.internal_force(u, None, load)
+        rest = force - load * system.external_force(u) + c.sparse_jacobian(u, load).T @ l
+        rest[c.fixed] = u[c.fixed] - c.values(load)
+        seen = self._read(scene, State(system, u, load, multipliers=l, memory=state.memory))
+        s = c.coordinate_sizes
+        forces = np.abs(force * s).max()
+        self._scale = np.concatenate([np.where(c.free, forces / s, s),
+                                      np.full(c.m, system.size), np.abs(seen).max(initial=0.0)
+                                      + np.zeros(len(seen))])
+        return np.concatenate([rest, c.constraint(u, load), seen])
+
+
+def _differences(function, state):
+    """Derivatives of a function of the State by displacements and multipliers, (r, N + m)."""
+    system = state.system
+    steps = np.concatenate([ASIDE * system.constraints.coordinate_sizes,
+                            ASIDE * np.maximum(1.0, np.abs(state.multipliers))])
+    z = np.concatenate([state.u, state.multipliers])
+
+    def at(moved):
+        return np.ravel(ask_array("a reading", None, function, State(
+            system, moved[:system.N], state.load, multipliers=moved[system.N:],
+            memory=state.memory)))
+
+    return np.array([(at(z + d) - at(z - d)) / (2.0 * step)
+                     for step, d in zip(steps, np.diag(steps))]).T
