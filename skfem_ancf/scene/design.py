@@ -44,7 +44,7 @@ class Design:
     build
         A function of the parameters, an array (n,), that returns a
         :class:`~skfem_ancf.Scene`. Materials, heights, shapes, loads, springs, obstacles and
-        energies of one's own may depend on them, and not the number of degrees of freedom.
+        user-defined energies may depend on them, but not the number of degrees of freedom.
     readings
         Names of sensors of that scene, or functions of the State that return a number or an array.
         Functions are derived by differences by each degree of freedom: for small scenes.
