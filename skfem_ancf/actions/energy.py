@@ -1,4 +1,4 @@
-"""User-defined energy densities of position, deformation gradient, material point and time."""
+"""User-defined energy densities, their derivatives, and loads given by densities."""
 
 from __future__ import annotations
 

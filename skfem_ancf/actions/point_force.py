@@ -1,4 +1,4 @@
-"""A dead force on a material point."""
+"""Forces on material points, at rest or moving, on the axis or off it."""
 
 from __future__ import annotations
 

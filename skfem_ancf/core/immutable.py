@@ -1,4 +1,4 @@
-"""Immutable objects."""
+"""Immutable objects, and how they are copied and pickled."""
 
 from __future__ import annotations
 

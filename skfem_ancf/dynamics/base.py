@@ -1,4 +1,4 @@
-"""The state of a motion at an instant, and the base class of schemes."""
+"""The state of a motion at an instant, the base class of schemes, differences in time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Collocation: implicit Runge-Kutta methods of high order."""
+"""Collocation: Gauss and Radau methods of high order."""
 
 from __future__ import annotations
 

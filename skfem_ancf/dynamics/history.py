@@ -1,4 +1,4 @@
-"""The result of a time integration."""
+"""The result of a time integration, its momentum and its energy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Named tuples of time steps: scheme, matrices, data of a step, work arrays."""
+"""Named tuples of time steps, joint rates and low-rank rows beside the band."""
 
 from __future__ import annotations
 

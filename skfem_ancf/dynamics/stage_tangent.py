@@ -1,4 +1,4 @@
-"""Factors of collocation for each eigenvalue, and their solutions."""
+"""Named tuples of collocation, factors for each eigenvalue, and their solutions."""
 
 from typing import NamedTuple
 

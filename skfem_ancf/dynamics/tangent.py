@@ -1,4 +1,4 @@
-"""The iteration matrix of a step and its factors."""
+"""Residual and iteration matrix of a step, and its factors."""
 
 import numpy as np
 

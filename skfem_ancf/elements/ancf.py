@@ -1,4 +1,4 @@
-"""The ANCF beam element of order N."""
+"""The ANCF beam elements of order N, of all degrees along the axis."""
 
 from __future__ import annotations
 

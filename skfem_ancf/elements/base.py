@@ -1,4 +1,4 @@
-"""Base class of beam elements: products of axis and section functions."""
+"""Base class of beam elements, and where their strain is sampled."""
 
 from __future__ import annotations
 

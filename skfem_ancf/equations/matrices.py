@@ -1,4 +1,4 @@
-"""Sparse matrices of a scene in a state, for custom solvers."""
+"""Sparse matrices of a scene in a state, and its linearised equations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Unconstrained rigid motions and their description."""
+"""Unconstrained rigid motions, redundant joints, and their description."""
 
 from __future__ import annotations
 

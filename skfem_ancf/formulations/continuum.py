@@ -1,4 +1,4 @@
-"""Full integration: every strain component at every integration point."""
+"""Full integration, with and without enhancements against Poisson locking."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The deformed body with its fields as points and cells, and as a .vtu file."""
+"""The deformed body with its fields as points and cells, as .vtu and as .pvd series."""
 
 from __future__ import annotations
 

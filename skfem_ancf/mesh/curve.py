@@ -1,4 +1,4 @@
-"""The smooth axis of a curved beam: a function of a parameter, its derivative and arc length."""
+"""The smooth axis of a curved beam: a function of a parameter, or a spline of points."""
 
 from __future__ import annotations
 

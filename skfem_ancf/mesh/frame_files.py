@@ -1,4 +1,4 @@
-"""Frames from meshio meshes: each line cell is a line, cell sets name groups."""
+"""Frames from meshio meshes and DXF drawings: each line cell is a line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The graph of a frame: lines between points of the plane."""
+"""The graph of a frame, lines between points of the plane, and meshes of its lines."""
 
 from __future__ import annotations
 

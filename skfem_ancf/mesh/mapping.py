@@ -1,4 +1,4 @@
-"""The map from the reference cell to the reference configuration of a beam."""
+"""The map from the reference cell to the reference configuration, tapers, nodal values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Members of a deformed configuration as points and cells, for plots and files."""
+"""Members of a deformed configuration as points, cells and arrays, for plots and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the description of a scene to equations, and from solutions to states."""
+"""From the description of a scene to equations, and from states to states."""
 
 from __future__ import annotations
 

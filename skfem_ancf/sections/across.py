@@ -1,4 +1,4 @@
-"""The section of one beam on its mesh: integration weights, stiffnesses and inertias."""
+"""The section of one beam on its mesh: weights, stiffnesses, shear, inertias, jumps."""
 
 from __future__ import annotations
 

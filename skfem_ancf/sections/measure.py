@@ -1,4 +1,4 @@
-"""Quadrature across a section: Gauss rules of the measure b(Y) dY."""
+"""Quadrature across a section: Gauss rules of the measure b(Y) dY, fixed or moving."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plots of the deformed body, coloured by a field."""
+"""Plots of the deformed body, coloured by a field, and of section forces."""
 
 from __future__ import annotations
 

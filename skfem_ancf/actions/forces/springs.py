@@ -1,4 +1,4 @@
-"""Springs and dashpots between points, and between section directions."""
+"""Springs and dashpots, linear or not, between points and between directions."""
 
 from __future__ import annotations
 

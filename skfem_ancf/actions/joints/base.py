@@ -1,4 +1,4 @@
-"""Base class of joints: constraint equations on points and sections of beams."""
+"""Base class of joints: constraint equations on points and sections; parts of joints."""
 
 from __future__ import annotations
 

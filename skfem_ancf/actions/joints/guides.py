@@ -1,4 +1,4 @@
-"""A material point on a fixed line or circle."""
+"""End sections and material points on fixed planes, lines and circles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nodes of a frame: all connections between the ends of its lines."""
+"""The nodes of a frame: connections between the ends of its lines, and settlements."""
 
 from __future__ import annotations
 

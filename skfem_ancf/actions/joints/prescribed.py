@@ -1,4 +1,4 @@
-"""Prescribed motion of a point or a section."""
+"""Prescribed motion of a point or a section, and motors."""
 
 from __future__ import annotations
 

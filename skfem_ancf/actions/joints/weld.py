@@ -1,4 +1,4 @@
-"""Weld between sections of two or more beams."""
+"""Connections of beams, bodies and domains: hinge, weld, glue."""
 
 from __future__ import annotations
 
