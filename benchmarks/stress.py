@@ -19,9 +19,9 @@ from scipy.linalg import eigh
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "validation"))
 import exact
 
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ConvergenceError, ElasticPlastic, ElementBeamANCF,
+                        ElementBeamANCFCubic, ElementBeamCable, MeshBeam, ModelWarning, NeoHookean,
+                        Prony, Scene, StVenantKirchhoff)
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.core.progress import progress_bar
 from skfem_ancf.core.quadrature import gauss
@@ -518,8 +518,35 @@ def thick_and_heavy(quick, out):
                           f"{iterations} iterations, {steps} load step(s)")
 
 
+def histories(quick, out):
+    """Bending beyond yield, and relaxation: any units, slenderness and curvature."""
+    check, p = "histories", 1e-3 / 1.001  # of hardening in the slope of the stress
+    elements = {"cable 5": ElementBeamCable(5), "N=2": ElementBeamANCF(2),
+                "N=3": ElementBeamANCF(3)}
+    for name, element in elements.items():
+        for s, unit, k in (((1e2, 1.0, 3.0),) if quick else (
+                (1e1, 1.0, 2.0), (1e2, 1.0, 3.0), (1e2, 1e-6, 3.0), (1e2, 1e9, 3.0),
+                (1e3, 1.0, 1.5))):
+            h, E, y = 1.0 / s, 2e11 * unit, 2.5e8 * unit
+            first, M_y = 2.0 * y / (E * h), y * WIDTH * h**2 / 6.0
+            steel = ElasticPlastic(E, NU, y, 1e-3 * E, points=20)
+            scene = Scene(Beam(line(8, h), element, steel, WIDTH)).clamp("left", thickness="free")
+            scene.joint("angle", at="right", angle=lambda t, w=k * first: w * t)
+            M = abs(scene.run(1.0, increments=10).state(-1).multipliers[0]) / M_y
+            exact = (1.0 - p) * (1.5 - 0.5 / k**2) + p * k
+            yield Row(check, f"plastic, {name}, L/h = {s:g}, E times {unit:g}, k = {k:g} k_y",
+                      "relative error of the moment", M / exact - 1.0, 5e-3)
+        for tau in (1.0,) if quick else (1e-6, 1.0, 1e9):
+            polymer = Prony(StVenantKirchhoff(2e9, NU), [0.4], [tau])
+            scene = Scene(Beam(line(4, 0.01), element, polymer, WIDTH)).clamp("left")
+            scene.joint("angle", at="right", angle=lambda t, a=tau: 0.1 * min(t / a, 1e-6) / 1e-6)
+            M = [x.multipliers[0] for x in scene.run([1e-6 * tau, 2.0 * tau], increments=4)]
+            yield Row(check, f"relaxation, {name}, time {tau:g}", "relative error of the moment",
+                      M[-1] / M[4] / (1.0 - 0.4 * (1.0 - np.exp(-2.0))) - 1.0, 1e-5)
+
+
 CHECKS = (formulations_table, slenderness, fine_and_slender, thick_and_heavy, poisson, orders,
-          units, far_away, length_ratios, loads, rigid_motions, spin, pendulum)
+          units, far_away, length_ratios, loads, rigid_motions, spin, pendulum, histories)
 
 
 def run(out="out/stress", quick=False, progress=None, checks=CHECKS):
