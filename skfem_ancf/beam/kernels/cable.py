@@ -132,24 +132,29 @@ class CableKernel(ElementKernel):
 
     def _with_fibres(self, mesh, element, same):
         """A table of fibres for each layer."""
-        if not self._across.constant:
-            raise InputError("a cable whose law has a history needs a constant section: for a "
-                             "taper, or functions of position, use an element with sections")
-        whole, n, L = self._table(mesh, element, same), self.points_number, mesh.lengths[:, None]
+        across = self._across
+        if mesh.heights is not None or any(callable(layer.grade) for layer in across.layers):
+            raise InputError("a cable whose law has a history needs a constant height and E: for a "
+                             "taper of the height use an element with sections")
+        same = same and across.constant
+        whole, n = self._table(mesh, element, same), self.points_number
+        L, tind = mesh.lengths[:, None], None
+        if same:
+            L, tind = L[:1], np.zeros(1, int)
         (pattern, order), out = _samples(n, 3), []
-        for layer in self._across.layers:
-            Y, A = fibres(self._across, layer, getattr(layer.material, "points", 2))
+        for layer in across.layers:
+            Y, A = fibres(across, layer, self.points, tind)
             along = np.concatenate([np.repeat(np.eye(n), len(Y), 0), np.kron(
                 np.eye(n), -Y[:, None])], axis=1)
-            weights = (L[:1] if same else L) * np.kron(self._rule[1], A)
+            weights = L * (self._rule[1][:, None] * A).reshape(len(A), -1)
             E = layer.material.axial_modulus
-            H = np.concatenate([E * np.sum(A * Y**k) * (-1.0) ** k * (L[:1] if same else L)
-                                * self._rule[1] for k in (0, 2, 1)], axis=1)
+            H = np.concatenate([E * np.sum(A * Y**k, axis=-1) * (-1.0) ** k * L * self._rule[1]
+                                for k in (0, 2, 1)], axis=1)
             law = law_tables(layer.material.law(), self)
             if law.kind == LINEAR:
                 along, weights = np.zeros((0, 2 * n)), np.zeros((1, 0))
             at = whole.at.copy()
-            at[:, OF_WEIGHTS] = np.arange(len(L)) if len(weights) > 1 else 0
+            at[:, OF_WEIGHTS] = np.arange(len(at)) if len(weights) > 1 else 0
             out.append(whole._replace(
                 at=at, pattern=pattern, H=np.ascontiguousarray(H[:, order]),
                 C=whole.C[:0] if out else whole.C, law=law, along=along, weights=weights))

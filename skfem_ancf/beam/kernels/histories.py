@@ -142,10 +142,9 @@ class ElementsWithHistory(Elements):
         return lost
 
 
-def fibres(across: Any, layer: Any, n: int) -> tuple[Array, Array]:
-    """Distances from the axis, and areas, of the fibres of a layer, (m,) both."""
-    eta, w = layer.measure.gauss(max(n, 2))
-    h = across.mesh.height
-    X = np.array([0.0 * eta + 0.5, eta])
-    area = w * h * across.breadth(layer, X, np.zeros(1, int))
-    return (eta - 0.5) * h, np.ravel(area + 0.0 * eta)
+def fibres(across: Any, layer: Any, xi: Array, tind: Array | None) -> tuple[Array, Array]:
+    """Distances from the axis (m,), and areas at points xi (n,) of elements, (ne, n, m)."""
+    eta, w = layer.measure.gauss(max(getattr(layer.material, "points", 2), 2))
+    h, X = across.mesh.height, np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+    area = np.tile(w, len(xi)) * h * across.breadth(layer, X, tind) + np.zeros((1, X.shape[1]))
+    return (eta - 0.5) * h, area.reshape(-1, len(xi), len(eta))
