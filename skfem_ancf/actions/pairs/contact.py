@@ -194,22 +194,29 @@ class BodyContact(ForceElement):
             return Meeting(S.pairs(p, e, zeta), a, a, 1.0, end)
         left = ~np.isin(start.p, p)
         p, e, zeta = (np.append(x, y[left]) for x, y in zip(end, start[:3]))
-        n, last = len(end.p), np.isin(p, start.p)
-        x, there = S.outside(z0)[0], np.ones(len(p), bool)
-        other = zeta.copy()
-        other[:n], there[:n] = S.project(x[p[:n]], e[:n], zeta[:n], z0)
-        other[n:], there[n:] = S.project(S.outside(z1)[0][p[n:]], e[n:], zeta[n:], z1)
-        other = np.where(there, other, zeta)
-        g0, g1 = (gaps(S.pairs(p, e, y), z) for y, z in (
-            (np.append(other[:n], zeta[n:]), z0), (np.append(zeta[:n], other[n:]), z1)))
-        order = np.argsort(start.p)
-        known = np.searchsorted(start.p, p[last], sorter=order)
-        g0[last], g1[:n] = start.gap[order[known]], end.gap
-        a, b = search.begins[p] - g0, search.begins[p] - g1
-        a[~last], b[n:] = np.minimum(a[~last], 0.0), np.minimum(b[n:], 0.0)
-        pairs, change = self._mean_place(p, e, np.sort([zeta, other], axis=0), a - b, z0, z1)
+        (other, a), (here, b) = (self._other(one, p, e, zeta, z) for one, z in (
+            (start, z0), (end, z1)))
+        pairs, change = self._mean_place(p, e, np.sort([here, other], axis=0), a - b, z0, z1)
         good = (np.abs(a - b) > CLOSE * search.height) & (np.abs(change) > 0.3 * np.abs(a - b))
         return Meeting(pairs, a, b, np.where(good, (a - b) / np.where(good, change, 1.0), 1.0), end)
+
+    def _other(self, known, p, e, zeta, z):
+        """Place and penetration of pairs at a state with known ones; none of those that are apart.
+        """
+        S, search = self.search.surfaces, self.search
+        gap, at = np.full(len(S.shift), np.inf), np.full(len(S.shift), -1)
+        gap[known.p], at[known.p] = known.gap, np.arange(len(known.p))
+        zeta, touch = zeta.copy(), at[p] >= 0
+        same = touch & (known.e[at[p]] == e) if len(known.p) else touch
+        zeta[same] = known.zeta[at[p[same]]]
+        rest = ~same
+        if np.any(rest):
+            found, there = S.project(S.outside(z)[0][p[rest]], e[rest], zeta[rest], z)
+            zeta[rest] = np.where(there, found, zeta[rest])
+            apart = rest & ~touch
+            gap[p[apart]] = np.maximum(gaps(S.pairs(p[apart], e[apart], zeta[apart]), z),
+                                       search.begins[p[apart]])
+        return zeta, search.begins[p] - gap[p]
 
     def _mean_place(self, p, e, ends, wanted, z0, z1):
         """Pairs at the place between two ``ends`` (2, n) where the gap changes as wanted.
@@ -230,7 +237,7 @@ class BodyContact(ForceElement):
             zeta = low + np.clip(share, 0.0, 1.0) * (high - low)
             pairs, change = at(zeta)
             left = change - wanted
-            if np.max(np.abs(left), initial=0.0) < 1e-16 * self.search.height:
+            if np.all(np.abs(left) <= 1e-3 * np.abs(wanted) + 1e-15 * self.search.height):
                 break
             same = left * below > 0.0
             low, below = np.where(same, zeta, low), np.where(same, left, below)

@@ -16,7 +16,6 @@ from math import perm
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
 
 from ...core.types import Array
 from .facets import Facets
@@ -70,6 +69,14 @@ def cross(a: Array, b: Array) -> Array:
     return np.imag(np.conj(a) * b)
 
 
+def horner(c: Array, zeta: Array) -> Any:
+    """Polynomials with coefficients c (k, n) at zeta (n,); 0 for none."""
+    out = 0.0 * zeta
+    for row in c[::-1]:
+        out = out * zeta + row
+    return out
+
+
 def powers(zeta: Array, n: int, order: int) -> Array:
     """A derivative of the powers 0 to n - 1 of zeta, (len(zeta), n)."""
     out = np.zeros((len(zeta), n))
@@ -109,9 +116,10 @@ class Surfaces:
         """
         f, zeta = self.facets, zeta.copy()
         curve = (f.starts[e] + np.einsum("nbk,nb->nk", f.weights[e], z[f.dofs[e]])).T
-        slope = [polyder(curve, order) for order in (1, 2)]
+        slope = curve[1:] * np.arange(1.0, len(curve))[:, None]
+        bends = slope[1:] * np.arange(1.0, len(slope))[:, None]
         for _ in range(PROJECT):
-            d, T, A = (polyval(zeta, y, tensor=False) for y in (curve, *slope))
+            d, T, A = (horner(y, zeta) for y in (curve, slope, bends))
             d, square = x - d, np.abs(T) ** 2
             bend = square - dot(A, d)
             step = np.clip(dot(T, d) / np.where(bend > 0.1 * square, bend, square), -FAR, FAR)

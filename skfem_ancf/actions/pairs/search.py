@@ -20,6 +20,8 @@ APART = 3.0
 JOINED, FINE = 1e-3, 8
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
+#: Number of states of which pairs are kept.
+KEPT = 3
 #: Parts of an element in which crossing axes are searched.
 COARSE = 2
 #: Largest penetration, in heights; a point as deep as the height lies on the other face.
@@ -58,6 +60,7 @@ class Search:
     def __init__(self, surfaces: Surfaces, allowed: Array, solids: Sequence[Any] = ()) -> None:
         self.surfaces, self.allowed, self.begins = surfaces, allowed, np.inf
         f, self._known = surfaces.facets, None
+        self._last: list[tuple[Array, Touching]] = []
         self.height = h = float(np.min(f.heights))
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
@@ -90,7 +93,18 @@ class Search:
         return Candidates(p, e[k], zeta[k], self.surfaces.curve(e[k], zeta[k], 0), x)
 
     def touching(self, z: Array) -> Touching:
-        """The pairs with a gap below the one at which the pressure begins."""
+        """The pairs with a gap below the one at which the pressure begins.
+
+        The last ones are kept: forces and stiffnesses ask for the same states in turn.
+        """
+        for at, found in self._last:
+            if np.array_equal(at, z):
+                return found
+        found = self._touching(z)
+        self._last = [*self._last[1 - KEPT:], (z.copy(), found)]
+        return found
+
+    def _touching(self, z):
         known, x, n = self.candidates(z)
         weights, start = known.seeds
         y = start + np.einsum("nb,nb->n", weights, z[self.surfaces.facets.dofs[known.e]])
