@@ -1,11 +1,16 @@
 """Contact of beams, rigid bodies and domains with each other."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, MeshQuad
+from skfem.helpers import ddot, sym_grad
 
-from skfem_ancf import (Beam, BodyContact, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        InputError, MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.forces.base import bind_force, recalled
 from skfem_ancf.beam.layout import Layout
 
@@ -136,6 +141,91 @@ def test_rods_that_collide_lengthwise_part_after_two_passages():
     assert end - begin == pytest.approx(0.8 * 2 * L / c, rel=0.03)
     assert np.ptp(history.total_energy) < 1e-10 * history.total_energy[0]
     assert_allclose(history.momentum[:, 0], history.momentum[0, 0], rtol=1e-11)
+
+
+def test_two_leaves_with_friction_have_a_loop():
+    """Coulomb in closed form: 1 / (1 -+ 3 mu h / 4 L) times the stiffness that they have without.
+    """
+    h, L, mu, ends = 0.05, 0.5, 0.3, [1.0, 1.8]
+    stiffness, slopes = 2 * 3 * 2e11 * 0.02 * h**3 / 12 / L**3, []
+    for friction in (0.0, mu):
+        scene = Scene(*(line(L, 8, h, (0.0, -k * h), ElementBeamANCFCubic(1)) for k in range(2)))
+        scene.clamp("left", 0).clamp("left", 1).contact("all", friction=friction)
+        scene.point_force((0.0, -1e-3 * stiffness), at="right", beam=0,
+                          amplitude=lambda t: np.interp(t, [0.0, *ends], [0.0, 1.0, 0.2]))
+        run = scene.run(ends, increments=5)
+        tip = run.displacement("right", 0)[:, 1] / -1e-3
+        slopes.append((0.2 / (tip[5] - tip[4]), 0.16 / (tip[7] - tip[8])))
+    share = 3 * mu * h / (4 * L)
+    assert slopes[1][0] / slopes[0][0] == pytest.approx(1 / (1 - share), abs=2e-3)
+    assert slopes[1][1] / slopes[0][1] == pytest.approx(1 / (1 + share), abs=2e-3)
+    work = -1e-3 * 1e-3 * stiffness * np.trapezoid(
+        [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 0.84, 0.68, 0.52, 0.36, 0.2], -tip)
+    state = run.state(10)
+    assert run.dissipated[10] == pytest.approx(work - state.strain_energy, rel=0.15)
+    assert np.all(np.diff(run.dissipated) > 0.0) and not state.contact().sticking.all()
+
+
+def test_a_rigid_plate_lies_on_a_cantilever():
+    weight, half = 2.0 * 9.81, np.array([[-0.05, 0.05, 0.05, -0.05], [-0.05, -0.05, 0.05, 0.05]])
+    plate = RigidBody(2.0, 0.01, (0.9, 0.06), outline=half)
+    beam = line(1.0, 8, 0.02, element=ElementBeamCable(5))
+    scene = Scene(beam, plate).clamp("left", 0).fix(None, "r^1", 0.0, plate)
+    state = scene.contact(beam, plate).gravity((0.0, -9.81)).solve_static()
+    found = state.contact(on=plate)
+    assert found.total[1] == pytest.approx(weight, rel=1e-6)
+    assert_allclose(found.total, -state.contact(on=beam).total, rtol=1e-9, atol=1e-9 * weight)
+    assert 0.849 < found.points[0].min() < found.points[0].max() < 0.951
+    arm = found.force[1] @ found.points[0] / weight  # deflection there, and by its own weight
+    EI, q = 2e11 * 0.02 * 0.02**3 / 12, 7800 * 9.81 * 0.02 * 0.02
+    tip = weight * arm**2 * (3 - arm) / 6 / EI + q / 8 / EI
+    assert state.displacement("right", 0)[1] == pytest.approx(-tip, rel=5e-3)
+
+
+def test_a_beam_presses_on_a_domain():
+    def law(u, v):
+        return 5e5 * ddot(sym_grad(u), sym_grad(v))
+
+    mesh = MeshQuad.init_tensor(np.linspace(0, 1, 9), np.linspace(-0.2, -0.02, 3)).with_defaults()
+    block = Domain(Basis(mesh, ElementVector(ElementQuad2())),
+                   LinearForm(lambda v, w: law(w["u"], v)), BilinearForm(lambda u, v, w: law(u, v)))
+    beam = line(1.0, 8, 0.02, element=ElementBeamCable(5),
+                material=StVenantKirchhoff(1e8, 0.0, 1000.0), width=0.05)
+    scene = Scene(beam, block).clamp("bottom", block).clamp("left", 0).contact(beam, block)
+    state = scene.point_force((0.0, -5.0), at="right", beam=0).solve_static()
+    found, supports = state.contact(on=block), state.reactions("bottom", block).force
+    assert_allclose(found.total, -supports, rtol=1e-6, atol=1e-6)
+    assert found.total[1] < -4.0 and found.penetration < 0.01 * 0.02
+    assert abs(state.contact(on=beam).total + found.total).max() < 1e-9
+
+
+def test_a_ring_is_pressed_flat_until_it_touches_itself():
+    """Its faces then are at the pole: the axes a height apart. Without contact they would cross."""
+    E, h, R = 1e6, 0.05, 1.0
+    ends = [np.linspace(-np.pi / 2, np.pi / 2, 25) + k * np.pi for k in range(2)]
+    halves = [Beam(MeshBeam.init_curve(lambda s: R * np.array([np.cos(s), np.sin(s)]), a, height=h),
+                   ElementBeamANCFCubic(1), StVenantKirchhoff(E, 0.0, 1.0), width=1.0)
+              for a in ends]
+    scene = Scene(*halves).contact("all", self_contact=True)
+    scene.weld((0, "left"), (1, "right"))
+    scene.weld((0, "right"), (1, "left"))
+    scene.fix("left", "r", 0.0, 0).fix("right", "r^1", 0.0, 0)
+    scene.point_force((0.0, -15 * E * h**3 / 12 / R**2), at="right", beam=0)
+    state = scene.run(1.0, increments=1).state(1)
+    assert state.displacement("right", 0)[1] == pytest.approx(h - 2 * R, abs=0.02 * h)
+    assert len(state.contact()) and state.contact().penetration < 0.01 * h
+
+
+def test_a_motion_with_contact_goes_on_from_a_checkpoint(tmp_path):
+    beams = [line(1.0, 4, 0.05, (0.0, 0.0), material=RUBBER),
+             line(1.0, 4, 0.05, (0.4, 0.06), material=RUBBER, angle=0.1)]
+    scene = Scene(*beams).contact("all", friction=0.3).initial_velocity((0.0, -2.0), 1)
+    whole, path = scene.integrate(0.012, 4e-4), tmp_path / "motion.npz"
+    scene.integrate(0.008, 4e-4, checkpoint=path)
+    part = scene.integrate(0.012, 4e-4, start=whole.state(20), t_start=0.008)
+    assert_allclose(part.u[-1], whole.u[-1], rtol=0, atol=1e-9 * np.abs(whole.u[-1]).max())
+    for one in (copy.copy(scene), pickle.loads(pickle.dumps(scene))):
+        assert np.array_equal(one.integrate(0.004, 4e-4).u, whole.u[:11])
 
 
 def test_what_does_not_fit_is_said():
