@@ -106,6 +106,8 @@ class Search:
 
     def _touching(self, z):
         known, x, n = self.candidates(z)
+        if not len(known.p):
+            return Touching(known.p, known.e, known.zeta, known.zeta)
         weights, start = known.seeds
         y = start + np.einsum("nb,nb->n", weights, z[self.surfaces.facets.dofs[known.e]])
         near = np.abs(x[known.p] - y) < self._near[known.e] + self.height
