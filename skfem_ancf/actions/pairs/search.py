@@ -38,6 +38,7 @@ class Candidates(NamedTuple):
     zeta: Array
     seeds: tuple[Array, Array]
     x: Array
+    z: Array
 
 
 class Touching(NamedTuple):
@@ -47,6 +48,9 @@ class Touching(NamedTuple):
     e: Array
     zeta: Array
     gap: Array
+
+
+NONE = Touching(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
 
 
 class Search:
@@ -61,6 +65,11 @@ class Search:
         self.surfaces, self.allowed, self.begins = surfaces, allowed, np.inf
         f, self._known = surfaces.facets, None
         self._last: list[tuple[Array, Touching]] = []
+        # motion of a point by each of its B degrees of freedom; slopes may shrink to a half
+        (N, _), (D, _) = surfaces.points
+        self._moves = np.zeros(int(f.dofs.max()) + 1)
+        np.maximum.at(self._moves, surfaces.dofs, N.shape[1] * (
+            np.abs(N) + 2.0 * np.abs(surfaces.shift / self._speeds())[:, None] * np.abs(D)))
         self.height = h = float(np.min(f.heights))
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
@@ -90,7 +99,8 @@ class Search:
         p, k = p[order], k[order]
         first = np.append(True, (np.diff(p) != 0) | (np.diff(e[k]) != 0))[:len(p)]
         p, k = p[first], k[first]
-        return Candidates(p, e[k], zeta[k], self.surfaces.curve(e[k], zeta[k], 0), x)
+        return Candidates(p, e[k], zeta[k], self.surfaces.curve(e[k], zeta[k], 0), x,
+                          z.copy())
 
     def touching(self, z: Array) -> Touching:
         """The pairs with a gap below the one at which the pressure begins.
@@ -100,9 +110,20 @@ class Search:
         for at, found in self._last:
             if np.array_equal(at, z):
                 return found
+        if self._nothing_near(z):
+            return NONE
         found = self._touching(z)
         self._last = [*self._last[1 - KEPT:], (z.copy(), found)]
         return found
+
+    def _nothing_near(self, z):
+        """True if nothing was near at the last search, and no point can have come near since.
+
+        By a bound on motion from the degrees of freedom alone.
+        """
+        known = self._known
+        return known is not None and not len(known.p) and np.max(
+            self._moves * np.abs(z - known.z)) < 0.5 * SKIN * self.height
 
     def _touching(self, z):
         known, x, n = self.candidates(z)
@@ -128,6 +149,10 @@ class Search:
         order = np.lexsort((away, p))
         best = order[np.append(True, np.diff(p[order]) != 0)[:len(p)]]
         return Touching(p[best], e[best], zeta[best], gap[best])
+
+    def _speeds(self):
+        """Lengths of the slopes of all points in the reference configuration, (P,)."""
+        return np.abs(self.surfaces.points[1][1])
 
     def place(self, e: Array, zeta: Array) -> Array:
         """Where points of facets are along their curve."""
