@@ -78,6 +78,22 @@ def test_same_statics(element, plane):
     assert alike(a.iterations, b.iterations) and abs(a.displacement((1, 0))[1]) > 0.8
 
 
+@pytest.mark.filterwarnings("ignore::skfem_ancf.StabilityWarning")
+@pytest.mark.parametrize("load", [2.0, 12.0])
+def test_same_statics_beyond_a_tangent_that_is_not_definite(load):
+    """A column under a multiple of its Euler load, at which the straight state is unstable."""
+    mesh, found = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), []
+    F = load * np.pi**2 * 2e8 * 0.3 * 0.01**3 / 12 / 4
+    for scene in both(mesh, ElementBeamCable(5), "assumed", StVenantKirchhoff(2e8, 0.3)):
+        scene.clamp("left").point_force((-F, -1e-3 * F), at=(1, 0))
+        found.append(scene.solve_static())
+    a, b = found
+    assert a.stability == b.stability == "stable"
+    assert_allclose(b.displacement((1, 0)), a.displacement((1, 0)), rtol=0, atol=1e-9)
+    s, up = np.linspace(0, 1, 9), a.position(np.array([np.linspace(0, 1, 9), np.zeros(9)]))
+    assert abs(up[0, -1]) < 0.9 and np.all(np.abs(np.hypot(*np.diff(up)) - s[1]) < 0.05 * s[1])
+
+
 @pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
 @pytest.mark.parametrize("scheme", [EnergyMomentum(), GeneralizedAlpha(0.8)], ids=repr)
 def test_same_motion_in_compiled_blocks(element, scheme):
