@@ -79,9 +79,9 @@ def test_same_statics(element, plane):
 
 
 @pytest.mark.filterwarnings("ignore::skfem_ancf.StabilityWarning")
-@pytest.mark.parametrize("load", [2.0, 12.0])
-def test_same_statics_beyond_a_tangent_that_is_not_definite(load):
-    """A column under a multiple of its Euler load, at which the straight state is unstable."""
+@pytest.mark.parametrize("load, tip", [(2.0, 0.07086), (12.0, -0.63217)])
+def test_same_statics_beyond_a_tangent_that_is_not_definite(load, tip):
+    """A column under a multiple of its Euler load, against the elastica."""
     mesh, found = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), []
     F = load * np.pi**2 * 2e8 * 0.3 * 0.01**3 / 12 / 4
     for scene in both(mesh, ElementBeamCable(5), "assumed", StVenantKirchhoff(2e8, 0.3)):
@@ -90,8 +90,7 @@ def test_same_statics_beyond_a_tangent_that_is_not_definite(load):
     a, b = found
     assert a.stability == b.stability == "stable"
     assert_allclose(b.displacement((1, 0)), a.displacement((1, 0)), rtol=0, atol=1e-9)
-    s, up = np.linspace(0, 1, 9), a.position(np.array([np.linspace(0, 1, 9), np.zeros(9)]))
-    assert abs(up[0, -1]) < 0.9 and np.all(np.abs(np.hypot(*np.diff(up)) - s[1]) < 0.05 * s[1])
+    assert abs(a.position((1, 0))[0] - tip) < 3e-3
 
 
 @pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
