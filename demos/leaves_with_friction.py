@@ -63,8 +63,8 @@ assert 0 < run.dissipated[-1] < work and not run.state(5).contact().sticking.all
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.8), layout="constrained")
 for (tip, part, _), label in ((smooth, "no friction"), (rough, f"friction {mu}")):
-    left.plot(1e3 * tip, 1e-3 * force * part, ".-", label=label)
-left.set(xlabel="displacement of the tip (mm)", ylabel="force (kN)")
+    left.plot(1e3 * tip, force * part - 2 * alone * tip, ".-", label=label)
+left.set(xlabel="displacement of the tip (mm)", ylabel="force less $2 k$ times displacement (N)")
 left.legend(frameon=False)
 plot_state(run.state(5), "S_xx", ax=right, unit="Pa", title="stress along the leaves $S_{xx}$",
            scale=20)

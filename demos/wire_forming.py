@@ -63,7 +63,7 @@ print(f"a mandrel of radius {1e3 * mandrel:.2f} mm gives an axis of radius 60 mm
 # %%
 # The wire on the mandrel and after springback, and the stress that stays across a section.
 
-fig, (one, two) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+fig, (one, two) = plt.subplots(1, 2, figsize=(10.5, 4), layout="constrained")
 on.plot("yield_ratio", ax=one, title="on the mandrel, and after springback")
 axis = off.position(np.array([np.linspace(0, 0.2, 101), np.zeros(101)]))
 one.plot(*axis, "k--", lw=1)
@@ -71,7 +71,7 @@ eta = np.linspace(-0.5, 0.5, 61) * h
 for state, label in ((on, "on the mandrel"), (off, "after springback")):
     two.plot(1e-6 * state.stress(np.array([0 * eta + 0.021, eta]))[0], 1e3 * eta, label=label)
 two.set(xlabel="axial stress (MPa)", ylabel="distance from the axis (mm)")
-two.legend(frameon=False, fontsize=8, loc="upper left")
+two.legend(frameon=False, fontsize=8, loc="lower right")
 plt.show()
 
 # %%
