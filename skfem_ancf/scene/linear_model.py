@@ -188,6 +188,9 @@ class LinearModel:
         omega = np.atleast_1d(require_finite("frequencies", frequencies))
         if omega.ndim != 1:
             raise InputError(f"frequencies must be an array (n,), got the shape {omega.shape}")
+        missing = "" if omega.all() else self._system.constraints.missing_supports
+        if missing:
+            raise SupportError(f"there is no static response, at the frequency 0: {missing}")
         dynamic = self._dynamic
         out = np.empty((len(omega), len(self.outputs), len(self.inputs)), complex)
         for k, w in enumerate(omega):
@@ -243,9 +246,8 @@ class DynamicStiffness:
         try:
             x = splu(A).solve(right)
         except RuntimeError:
-            raise SupportError("the dynamic stiffness is singular: a motion without supports has "
-                               "no static response, and an undamped mode none at its frequency"
-                               ) from None
+            raise SupportError("the dynamic stiffness is singular: this is the frequency of an "
+                               "undamped mode") from None
         u = self._prescribed.astype(complex)
         u[free] = s[free] * x[:n]
         return u, self._scale * x[n:]
