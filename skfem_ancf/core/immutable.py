@@ -69,7 +69,7 @@ def is_builtin(thing: Any) -> bool:
     --------
     >>> from skfem import ElementLineP1
     >>> from skfem_ancf import ElementBeamCable
-    >>> ours(ElementBeamCable(5)), ours(ElementLineP1()), ours(ours)
+    >>> is_builtin(ElementBeamCable(5)), is_builtin(ElementLineP1()), is_builtin(is_builtin)
     (True, False, True)
     """
     named = thing if isinstance(getattr(thing, "__qualname__", None), str) else type(thing)

@@ -92,7 +92,7 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     return found
 
 
-def read_steps(sensor, at, steps):
+def read_steps(sensor: Sensor, at: Any, steps: Sequence[Motion]) -> Array:
     """Values of a sensor at many steps, shape (n, ...)."""
     u = np.array([y.u for y in steps])
     if sensor.what == "velocity":
@@ -103,7 +103,7 @@ def read_steps(sensor, at, steps):
     return found + at.start if sensor.what == "position" else found
 
 
-def read(sensor, at, state):
+def read(sensor: Sensor, at: Any, state: State) -> Any:
     """The value of a sensor at one State."""
     what: Any = sensor.what
     if callable(what):

@@ -23,14 +23,14 @@ logger = logging.getLogger(__name__)
 #: Compiled functions and parts of this process by name.
 LOADED: dict[str, Any] = {}
 #: Parts that are called by address and that most scenes use, and those of some functions.
-PARTS = "StrainTables", "elements", "contacts", "hold_back", "band", "bands", "unsymmetric"
+PARTS = "StrainTables", "elements", "contacts", "band", "bands", "unsymmetric"
 NEEDED = {"equilibrium": ["band"], "steps": ["band", "bands", "unsymmetric"],
           "collocate": ["band", "bands", "gradients"]}
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
-COMPILING = {"StrainTables": 15.0, "elements": 5.0, "contacts": 17.0, "hold_back": 1.0,
-             "unsymmetric": 7.0, "band": 3.0, "bands": 5.0, "equilibrium": 10.0, "tangent": 1.0,
+COMPILING = {"StrainTables": 15.0, "elements": 5.0, "contacts": 17.0,
+             "unsymmetric": 7.0, "band": 3.0, "bands": 5.0, "equilibrium": 11.0, "tangent": 1.0,
              "force": 0.5, "linearised": 0.5, "steps": 27.0}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,

@@ -11,7 +11,7 @@ from ..actions.tables import (add_joint_force, add_load_stiffness, constraint,
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
 from ..core.band import diagonal, dot, largest, weighted_square
-from ..core.source import indices, primitive, source
+from ..core.source import indices, source
 
 
 @source
@@ -136,14 +136,8 @@ def mean_stiffness(diagonal, sizes):
 LEFT, TRIES, PARTS = 0.5, 12, 16
 
 
-@primitive("skfem_ancf.equations.loops")
-def hold_back(e, t, u, R, du, dm):
-    """:func:`put_hold_back`, in compiled code by address."""
-    put_hold_back(e, t, u, R, du, dm)
-
-
 @source
-def put_hold_back(e, t, u, R, du, dm):
+def hold_back(e, t, u, R, du, dm):
     """Line search for a correction that runs into obstacles; scales du and dm.
 
     The residual along the correction, of the equations linearised without contact plus the actual

@@ -19,14 +19,13 @@ from ..core.immutable import is_builtin
 from ..core.loops import BANDS, STATIC
 from ..core.source import F1, F2, F3
 from ..core.words import Words
-from .evaluation import put_hold_back
 from .tables import Equations
 
 _KINDS = Annotated[Kinds, MADE], int, F1, F1, float, F1
 _CONTACTS = ContactTables, Annotated[Question, MADE], F1, F1, F1
-_LAW, _HELD = (F1, F3, F3), (Equations, float, F1, F1, F1, F1)
+_LAW = F1, F3, F3
 _read, _call_law = reader(CompiledTables), caller(*_LAW)
-_call_kinds, _call_contacts, _call_hold_back = caller(*_KINDS), caller(*_CONTACTS), caller(*_HELD)
+_call_kinds, _call_contacts = caller(*_KINDS), caller(*_CONTACTS)
 
 
 def tables_of(body, k):
@@ -142,17 +141,12 @@ def run_kinds(tables, what, y, w, factor, out):
         _call_kinds(tables.address, (kinds, what, y, w, factor, out))
 
 
-def hold_back(e, t, u, R, du, dm):
-    _call_hold_back(e.forces.contacts.search, (e, t, u, R, du, dm))
-
-
 def run_contacts(tables, asked, u, v, out):
     _call_contacts(tables.address, (tables, asked, u, v, out))
 
 
 #: Other separately compiled functions, with annotations of their arguments.
-PARTS = {"elements": (of_kinds, _KINDS), "contacts": (of_contacts, _CONTACTS),
-         "hold_back": (put_hold_back, _HELD)}
+PARTS = {"elements": (of_kinds, _KINDS), "contacts": (of_contacts, _CONTACTS)}
 
 
 @cache
@@ -199,7 +193,7 @@ def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
     body = _flat_body(plain.body, words)
     if forces.contacts.number > 0:
         forces = forces._replace(contacts=forces.contacts._replace(
-            address=part("contacts"), search=part("hold_back")))
+            address=part("contacts")))
     if forces.number > 0:
         forces = forces._replace(address=part("elements"))
     if len(loads.eigenstrains):

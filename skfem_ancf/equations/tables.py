@@ -94,7 +94,7 @@ class Tables:
         forces, packs = self.plain.forces, self.plain.body.packs
         used = {"StrainTables": len(packs) > 0, "elements": forces.number > 0,
                 "laws": any(t.law.kind != LINEAR for t in packs),
-                "contacts": forces.contacts.number > 0, "hold_back": forces.contacts.number > 0,
+                "contacts": forces.contacts.number > 0,
                 "eigenstrains": len(self.plain.loads.eigenstrains) > 0}
         return [name for name, yes in used.items() if yes]
 

@@ -289,7 +289,7 @@ def _driven(joint, state, t):
     return [(moved(by) - moved(-by)) / (2.0 * TURN) for by in steps]
 
 
-def rows_of(system, state, sensor):
+def rows_of(system: Any, state: State, sensor: Sensor) -> Readings:
     """Derivatives of the readings of a sensor."""
     at, N, m = locate(sensor, system), system.N, system.constraints.m
     local = np.arange(N) if at is None or sensor.recover else np.unique(np.concatenate(

@@ -63,10 +63,12 @@ class Scene(Model):
                       ``load`` (a form of scikit-fem), ``energy`` (a density of yours)
     *joints*          ``hinge``, ``weld``, ``slider``, ``motor``, ``joint`` (others, by name)
     *other forces*    ``spring``, ``torsional_spring``, ``foundation``, ``point_mass``, ``drag``,
-                      ``damping``, ``control``, ``obstacle``, ``add`` (any item, also yours)
+                      ``damping``, ``control``, ``obstacle``, ``contact`` (of members with each
+                      other), ``add`` (any item, also yours)
     *statics*         ``solve_static``, ``solve_linear``; ``run``: over a time, without inertia;
                       ``continuation``: the path through snaps; ``buckling``
-    *motion*          ``integrate``, ``initial_velocity``, ``sensor``, ``resume``; ``modes``
+    *motion*          ``integrate``, ``initial_velocity``, ``sensor``, ``sensors``, ``resume``; ``modes``;
+                      ``stepper``: step by step; ``linearize``, ``frequency_response``
     *look*            ``plot``: before it is solved; ``plan``: what a solution will compute;
                       ``explore``: solved as a slider or an arrow is moved; ``units``;
                       ``beams``, ``bodies``, ``domains``, ``items``, ``loads``, ``joints``,
@@ -275,7 +277,7 @@ class Scene(Model):
         ...                    StVenantKirchhoff(2e8, 0.0, 7800), width=0.01))
         >>> plan = scene.clamp("left").gravity((0, -9.81)).plan()
         >>> print(plan["linear solver"])
-        banded Cholesky, half bandwidth 19
+        banded Cholesky, half bandwidth 15
         """
         with self._lock:
             return make_plan(self.system, kind)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ...core.types import Array
 from .gap import Surfaces, cross, dot
@@ -88,7 +88,7 @@ class Search:
         f, m = self.surfaces.facets, len(self._seed_zeta)
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
         y = self.surfaces.along(e, zeta, 0, z)
-        trees = [cKDTree(np.column_stack([a.real, a.imag])) for a in (x, y)]
+        trees = [scipy.spatial.cKDTree(np.column_stack([a.real, a.imag])) for a in (x, y)]
         reach = float(np.max(self._near)) + (1.0 + SKIN) * self.height
         found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
         p, k, far = found["i"], found["j"], found["v"]
@@ -217,7 +217,7 @@ class Search:
         """Pairs of segments of axes that may be as near, and are not parts of one body."""
         ends, chains, s, members = axes
         middle, half = ends.mean(axis=1), 0.5 * np.abs(ends[:, 1] - ends[:, 0])
-        tree = cKDTree(np.column_stack([middle.real, middle.imag]))
+        tree = scipy.spatial.cKDTree(np.column_stack([middle.real, middle.imag]))
         i, j = tree.query_pairs(2.0 * half.max() + near, output_type="ndarray").T
         apart = APART * self.height + 2.0 * (half[i] + half[j])
         some = self.allowed[members[i], members[j]] & (
