@@ -18,7 +18,6 @@ from ..core.errors import InputError, SupportError, require_finite, require_inte
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
-from ..results.modes import Modes
 from ..results.response import FrequencyResponse
 from ..results.state import State
 from ..solvers import eigen
@@ -158,7 +157,7 @@ class LinearModel:
 
     def _modal(self, k):
         """The same of the lowest modes."""
-        found: Modes = eigen.modes(self._system, self.state, require_integer("modes", k, 1))
+        found = eigen.modes(self._system, self.state, require_integer("modes", k, 1))
         T = found.shapes.T
         if np.iscomplexobj(T):
             raise InputError("the loads have no potential, and modes are complex: use "
@@ -291,7 +290,8 @@ def _driven(joint, state, t):
 
 def rows_of(system: Any, state: State, sensor: Sensor) -> Readings:
     """Derivatives of the readings of a sensor."""
-    at, N, m = locate(sensor, system), system.N, system.constraints.m
+    at: Any = locate(sensor, system)
+    N, m = system.N, system.constraints.m
     local = np.arange(N) if at is None or sensor.recover else np.unique(np.concatenate(
         [np.ravel(part.dofs) if isinstance(part, BeamPoints) else np.arange(N)[part.slice]
          for part in at.parts]))

@@ -67,8 +67,9 @@ class Scene(Model):
                       other), ``add`` (any item, also yours)
     *statics*         ``solve_static``, ``solve_linear``; ``run``: over a time, without inertia;
                       ``continuation``: the path through snaps; ``buckling``
-    *motion*          ``integrate``, ``initial_velocity``, ``sensor``, ``sensors``, ``resume``; ``modes``;
-                      ``stepper``: step by step; ``linearize``, ``frequency_response``
+    *motion*          ``integrate``, ``initial_velocity``, ``sensor``, ``sensors``, ``resume``;
+                      ``stepper``: step by step; ``modes``, ``linearize``,
+                      ``frequency_response``
     *look*            ``plot``: before it is solved; ``plan``: what a solution will compute;
                       ``explore``: solved as a slider or an arrow is moved; ``units``;
                       ``beams``, ``bodies``, ``domains``, ``items``, ``loads``, ``joints``,

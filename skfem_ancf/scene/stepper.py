@@ -152,7 +152,7 @@ class Stepper:
     def readings(self) -> dict[str, Array]:
         """Values of the sensors of the scene by name."""
         fields = [sensor for _, sensor, _ in self._sensors if not sensor.moving]
-        state = self.state if fields else None
+        state: Any = self.state if fields else None
         return {name: read_steps(sensor, at, [self._y])[0] if sensor.moving else
                 read(sensor, at, state) for name, sensor, at in self._sensors}
 
