@@ -120,6 +120,29 @@ def test_contact_without_friction():
     agree(Design(build, ["tip"]), [2e6, 0.05, 4.0, -0.18], rtol=1e-3, floor=1e-4, step=2e-5)
 
 
+def test_a_design_follows_what_its_parameters_act_on():
+    """An obstacle that is not touched at first, and parameters that act on nothing at first."""
+    def build(p):
+        E, F, place = p
+        scene = Scene(beam_of(E)).clamp("left").point_force((0, -F), at=(1, 0))
+        scene.obstacle(Circle((0.5, place), 0.15))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    used = Design(build, ["tip"])
+    assert np.all(used.jacobian([2e6, 0.1, -0.3])[:, 2] == 0.0)
+    p = [2e6, 4.0, -0.18]
+    assert np.allclose(used.jacobian(p), Design(build, ["tip"]).jacobian(p), rtol=1e-5, atol=0.0)
+
+    def unloaded(p):
+        scene = Scene(beam_of(p[0])).clamp("left").point_force((0, -p[1]), at=(1, 0))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    used = Design(unloaded, ["tip"], sizes=[1e6, 1.0])
+    assert used.jacobian([2e6, 0.0])[1, 0] == 0.0
+    fresh = Design(unloaded, ["tip"], sizes=[1e6, 1.0]).jacobian([2e6, 1.0])
+    assert np.allclose(used.jacobian([2e6, 1.0]), fresh, rtol=1e-6, atol=0.0)
+
+
 def test_frame():
     def build(p):
         points = [(0, 0), (0, 1), (1, 1.2), (2, 1), (2, 0)]

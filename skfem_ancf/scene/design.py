@@ -26,6 +26,8 @@ TOUCHING = 1e-6
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 #: Relative change of an equation that is no round-off.
 CHANGED = 1e-12
+#: Relative difference of a change by all parameters from the sum of those by each.
+AGREE = 1e-3
 #: Step of displacements for readings that are functions, relative to the size of the scene.
 ASIDE = 1e-6
 
@@ -161,11 +163,10 @@ class Design:
         adjoint = self._adjoint(scene, state)
         r, n = len(adjoint), state.system.N + state.system.constraints.m
         out = np.zeros((r, len(p)))
-        for numbers, at, change in self._changes(p, state):
-            rest = -adjoint[:, at[at < n]] * change[at < n]
-            np.add.at(out.T, numbers[at < n], rest.T)
-            own = at >= n
-            np.add.at(out, (at[own] - n, numbers[own]), change[own])
+        numbers, at, change = self._changes(p, state)
+        of_z = at < n
+        np.add.at(out.T, numbers[of_z], -(adjoint[:, at[of_z]] * change[of_z]).T)
+        np.add.at(out, (at[~of_z] - n, numbers[~of_z]), change[~of_z])
         return out
 
     def _adjoint(self, scene, state):
@@ -199,19 +200,32 @@ class Design:
         sizes = np.abs(p) if self._sizes is None else self._sizes
         h = (TOUCHING if state.system.forces.contacts.obstacles else STEP) * np.where(
             sizes > 0.0, sizes, sizes.max() or 1.0)
-        before = self._equations(p, state)
-        if self._groups is None or not all(len(of) == len(before) for _, of in self._groups):
-            self._groups = self._grouped(p, h, state)
+        if self._groups is not None:
+            found = self._of_groups(p, h, state)
+            if self._agree(found, p, h, state):
+                return found
+        # parameters act elsewhere than they did at the last groups: contact, say
+        self._groups = self._grouped(p, h, state)
+        return self._of_groups(p, h, state)
+
+    def _of_groups(self, p, h, state):
+        found = []
         for members, of in self._groups:
             moved = np.isin(np.arange(len(p)), members) * h
             change = sum(c * self._equations(p + k * moved, state) for k, c in STENCIL)
-            left = (of < 0) & (np.abs(change) > 1e3 * CHANGED * self._scale)
-            if np.any(left):  # the pattern is another one than at the start: contact, say
-                self._groups = None
-                yield from self._changes(p, state)
-                return
             at = np.flatnonzero(of >= 0)
-            yield of[at], at, change[at] / h[of[at]]
+            found.append((of[at], at, change[at] / h[of[at]]))
+        return tuple(map(np.concatenate, zip(*found)))
+
+    def _agree(self, found, p, h, state):
+        """True if derivatives add up to the change by all parameters, by steps of their own."""
+        numbers, at, values = found
+        moved = h * (1.0 + 0.5 * np.cos(np.arange(1.0, len(p) + 1.0)))
+        ends = [self._equations(p + sign * moved, state) for sign in (1.0, -1.0)]
+        parts, change = values * moved[numbers], 0.5 * (ends[0] - ends[1])
+        sums, sizes = (np.bincount(at, x, len(change)) for x in (parts, np.abs(parts)))
+        return np.all(np.abs(change - sums) <= AGREE * (sizes + np.abs(change))
+                      + 1e3 * CHANGED * self._scale)
 
     def _grouped(self, p, h, state):
         """Parameters that change different equations, with the parameter of each equation."""
