@@ -88,26 +88,25 @@ class Design:
         self.build = require_function("build", build, "of parameters (n,) that returns a Scene")
         self.readings = list(readings)
         self._sizes = None if sizes is None else require_finite("sizes", sizes, (None,))
-        self._last: tuple[Any, ...] = (None, None, None)
+        self._p = self._values = self._J = None
         self._groups: list[tuple[Array, Array]] | None = None
         self.state: State | None = None
 
     def __call__(self, p: ArrayLike) -> tuple[Array, Array]:
         """Values of the readings (r,), and their derivatives by the parameters, (r, n)."""
-        p = np.atleast_1d(require_finite("p", p)).astype(float)
-        if self._last[0] is None or not np.array_equal(self._last[0], p):
-            scene = self._scene(p)
-            state = self.state = self._solved(scene)
-            self._last = p.copy(), self._read(scene, state), self._jacobian(p, scene, state)
-        return self._last[1].copy(), self._last[2].copy()
+        return self.values(p), self.jacobian(p)
 
     def values(self, p: ArrayLike) -> Array:
         """Values of the readings, shape (r,)."""
-        return self(p)[0]
+        self._solve(p)
+        return self._values.copy()
 
     def jacobian(self, p: ArrayLike) -> Array:
         """Their derivatives by the parameters, shape (r, n)."""
-        return self(p)[1]
+        self._solve(p)
+        if self._J is None:
+            self._J = self._jacobian(self._p, self._built, self.state)
+        return self._J.copy()
 
     def objective(self, function: Callable[[Array], float]) -> Callable[[ArrayLike], Any]:
         """For ``scipy.optimize.minimize(..., jac=True)``: a function of p.
@@ -124,6 +123,16 @@ class Design:
         return value_and_gradient
 
     # the state
+
+    def _solve(self, p):
+        """Find the state at p, unless it is the last one."""
+        p = np.atleast_1d(require_finite("p", p)).astype(float)
+        if self._p is not None and np.array_equal(self._p, p):
+            return
+        scene = self._scene(p)
+        state = self._solved(scene)
+        self._p, self._built, self.state, self._J = p, scene, state, None
+        self._values = self._read(scene, state)
 
     def _scene(self, p):
         scene = ask("build(p)", self.build, p)
