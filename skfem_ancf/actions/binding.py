@@ -99,7 +99,7 @@ class _Force(ForceElement):
 
     def _derivative_by(self, name, x, v, t, otherwise, *past):
         if not hasattr(self.item, name):
-            return otherwise(x, v, t)
+            return sparse.csr_array((x.size, x.size)) if self.changing else otherwise(x, v, t)
         found = getattr(self.item, name)(self._whole(x), self._whole(v), t, *past)
         matrix = sparse.csr_array(found)[self._dofs][:, self._dofs]
         n = len(self._dofs) // 2
@@ -109,9 +109,7 @@ class _Force(ForceElement):
         return self._derivative_by("stiffness", x, v, t, super().stiffness)
 
     def resistance(self, x: Array, v: Array, t: float) -> Any:
-        if self.changing and not hasattr(self.item, "damping"):
-            return sparse.csr_array((x.size, x.size))
-        if not hasattr(self.item, "force"):
+        if not (hasattr(self.item, "force") or self.changing):
             return np.zeros((len(x), 2, len(x), 2))
         return self._derivative_by("damping", x, v, t, super().resistance)
 
@@ -141,8 +139,6 @@ class _Remembered(_Force):
             lambda y: self.evaluate(y, v, t, *past)[0], x), *past)
 
     def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Any:
-        if self.changing and not hasattr(self.item, "damping"):
-            return sparse.csr_array((x.size, x.size))
         return self._derivative_by("damping", x, v, t, lambda x, v, t: derivative(
             lambda w: self.evaluate(x, w, t, *past)[0], v), *past)
 

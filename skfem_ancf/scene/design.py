@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from ..actions.forces.base import derivative
 from ..core.errors import (ConvergenceError, InputError, NameUnknown, ask, ask_array,
@@ -17,7 +15,7 @@ from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
 from ..results.state import State
-from .linear_model import rows_of
+from .linear_model import Bordered, rows_of
 
 #: Step of the parameters, relative to their size, and a stencil of fourth order.
 STEP = 1e-3
@@ -88,7 +86,10 @@ class Design:
         self.build = require_function("build", build, "of parameters (n,) that returns a Scene")
         self.readings = list(readings)
         self._sizes = None if sizes is None else require_finite("sizes", sizes, (None,))
-        self._p = self._values = self._J = None
+        self._p: Any = None
+        self._built: Any = None
+        self._values: Any = None
+        self._J: Any = None
         self._groups: list[tuple[Array, Array]] | None = None
         self.state: State | None = None
 
@@ -181,16 +182,8 @@ class Design:
     def _adjoint(self, scene, state):
         """The adjoint of each reading, (r, N + m)."""
         system, found = state.system, matrices_of(state.system, state)
-        free, s, m = system.constraints.free, system.constraints.coordinate_sizes, found.J.shape[0]
-        keep = sparse.diags_array(free.astype(float))
-        A = sparse.block_array([[keep @ found.K + sparse.diags_array(1.0 - free),
-                                 keep @ found.J.T], [found.J, None]], format="csr")
-        size = float(np.sqrt(np.abs(found.K.diagonal() * s * s).max()))
-        rows = np.concatenate([np.where(free, s / size, size / s), np.full(m, size)])
-        columns = np.concatenate([s / size, np.full(m, size)])
-        A = (sparse.diags_array(columns) @ A.T @ sparse.diags_array(rows)).tocsc()
-        by_z = self._by_state(scene, state)
-        return rows * splu(A).solve((columns * by_z).T).T
+        equations = Bordered([found.K], found.J, system.constraints, np.zeros((system.N, 0)))
+        return equations.adjoint([1.0], self._by_state(scene, state).T).T
 
     def _by_state(self, scene, state):
         """Derivatives of the readings by displacements and multipliers, (r, N + m)."""
@@ -209,12 +202,13 @@ class Design:
         sizes = np.abs(p) if self._sizes is None else self._sizes
         h = (TOUCHING if state.system.forces.contacts.obstacles else STEP) * np.where(
             sizes > 0.0, sizes, sizes.max() or 1.0)
+        noise = CHANGED * self._magnitudes(state)
         if self._groups is not None:
             found = self._of_groups(p, h, state)
-            if self._agree(found, p, h, state):
+            if self._agree(found, p, h, state, noise):
                 return found
         # parameters act elsewhere than they did at the last groups: contact, say
-        self._groups = self._grouped(p, h, state)
+        self._groups = self._grouped(p, h, state, noise)
         return self._of_groups(p, h, state)
 
     def _of_groups(self, p, h, state):
@@ -226,7 +220,7 @@ class Design:
             found.append((of[at], at, change[at] / h[of[at]]))
         return tuple(map(np.concatenate, zip(*found)))
 
-    def _agree(self, found, p, h, state):
+    def _agree(self, found, p, h, state, noise):
         """True if derivatives add up to the change by all parameters, by steps of their own."""
         numbers, at, values = found
         moved = h * (1.0 + 0.5 * np.cos(np.arange(1.0, len(p) + 1.0)))
@@ -234,15 +228,15 @@ class Design:
         parts, change = values * moved[numbers], 0.5 * (ends[0] - ends[1])
         sums, sizes = (np.bincount(at, x, len(change)) for x in (parts, np.abs(parts)))
         return np.all(np.abs(change - sums) <= AGREE * (sizes + np.abs(change))
-                      + 1e3 * CHANGED * self._scale)
+                      + 1e3 * noise)
 
-    def _grouped(self, p, h, state):
+    def _grouped(self, p, h, state, noise):
         """Parameters that change different equations, with the parameter of each equation."""
         before, groups = self._equations(p, state), []
         for k in range(len(p)):
             moved = p.copy()
             moved[k] += h[k]
-            touched = np.abs(self._equations(moved, state) - before) > CHANGED * self._scale
+            touched = np.abs(self._equations(moved, state) - before) > noise
             for members, of in groups:
                 if not np.any(touched & (of >= 0)):
                     break
@@ -267,12 +261,16 @@ class Design:
         rest = force - load * system.external_force(u) + c.sparse_jacobian(u, load).T @ l
         rest[c.fixed] = u[c.fixed] - c.values(load)
         seen = self._read(scene, State(system, u, load, multipliers=l, memory=state.memory))
-        s = c.coordinate_sizes
-        forces = np.abs(force * s).max()
-        self._scale = np.concatenate([np.where(c.free, forces / s, s),
-                                      np.full(c.m, system.size), np.abs(seen).max(initial=0.0)
-                                      + np.zeros(len(seen))])
         return np.concatenate([rest, c.constraint(u, load), seen])
+
+    def _magnitudes(self, state):
+        """Typical magnitudes of the terms in the equations, and of the readings."""
+        system, seen = state.system, np.abs(self._values)
+        s, c = system.constraints.coordinate_sizes, system.constraints
+        with system.histories.lent(state.memory):
+            work = np.abs(system.internal_force(np.array(state.u), None, state.load) * s).max()
+        return np.concatenate([np.where(c.free, work / s, s), np.full(c.m, system.size),
+                               np.full(len(seen), seen.max(initial=0.0))])
 
 
 def _differences(function, state):
@@ -280,12 +278,12 @@ def _differences(function, state):
     system = state.system
     steps = np.concatenate([ASIDE * system.constraints.coordinate_sizes,
                             ASIDE * np.maximum(1.0, np.abs(state.multipliers))])
-    z = np.concatenate([state.u, state.multipliers])
 
-    def at(moved):
+    def at(k, step):
+        z = np.concatenate([state.u, state.multipliers])
+        z[k] += step
         return np.ravel(ask_array("a reading", None, function, State(
-            system, moved[:system.N], state.load, multipliers=moved[system.N:],
-            memory=state.memory)))
+            system, z[:system.N], state.load, multipliers=z[system.N:], memory=state.memory)))
 
-    return np.array([(at(z + d) - at(z - d)) / (2.0 * step)
-                     for step, d in zip(steps, np.diag(steps))]).T
+    return np.array([(at(k, step) - at(k, -step)) / (2.0 * step)
+                     for k, step in enumerate(steps)]).T

@@ -169,7 +169,7 @@ class LinearModel:
     def _rest(self, T, K):
         """Displacements (N, k) of unit inputs without those of modes, static."""
         shift = SHIFT * max(np.abs(np.diag(K)).max(), np.finfo(float).tiny)
-        out = self._dynamic.solve((1.0, 0.0, shift), self.B, self.G)[0].real
+        out = self._dynamic.solve((1.0, 0.0, shift), self.B, self.G)[0]
         return out - T @ np.linalg.solve(K + shift * np.eye(len(K)), T.T @ self.B)
 
     # frequencies
@@ -201,19 +201,20 @@ class LinearModel:
     @cached_property
     def _dynamic(self):
         _, D, K, _, J = self.matrices
-        return DynamicStiffness((K, D, self._mass()), J, self._system.constraints,
-                                self.prescribed)
+        return Bordered((K, D, self._mass()), J, self._system.constraints, self.prescribed)
 
 
-class DynamicStiffness:
-    """Solutions with sums of K, D and M, on one sparsity pattern, with joints and supports.
+class Bordered:
+    """Solutions with sums of matrices such as K, D and M, with joints and supports.
 
-    ``prescribed`` are displacements of fixed degrees of freedom, (N, k).
+    The sums have one sparsity pattern. ``prescribed`` are displacements of fixed degrees of
+    freedom, (N, k).
     """
 
     def __init__(self, matrices: Sequence[Any], J: Any, constraints: Any,
                  prescribed: Array) -> None:
         self._free, self._prescribed, self._J = constraints.free, prescribed, J
+        self._matrices = matrices
         s = self._sizes = constraints.coordinate_sizes
         S, free = sparse.diags_array(s[self._free]), self._free
         parts = [sparse.csc_array(S @ A[free][:, free] @ S) for A in matrices]
@@ -225,10 +226,10 @@ class DynamicStiffness:
                                     format="csc") if m else sparse.csc_array((n, n))
         for A in parts:
             A.resize((n + m, n + m))
-        self._pattern = sparse.csc_array(sum((abs(A) for A in parts), abs(joints)), dtype=complex)
+        self._pattern = sparse.csc_array(sum((abs(A) for A in parts), abs(joints)))
         self._pattern.sort_indices()
         places = _places(self._pattern)
-        self._values = np.zeros((4, self._pattern.nnz))
+        self._values = np.zeros((len(parts) + 1, self._pattern.nnz))
         for row, A in zip(self._values, (*parts, joints)):
             A.sum_duplicates()
             row[np.searchsorted(places, _places(A))] = A.data
@@ -236,20 +237,39 @@ class DynamicStiffness:
 
     def solve(self, factors: Sequence[complex], B: Array, G: Array) -> tuple[Array, Array]:
         """Displacements (N, k) and multipliers (m, k) for forces B and right-hand sides G."""
-        A, s, free = self._pattern.copy(), self._sizes[:, None], self._free
-        A.data = np.array([*factors, 1.0]) @ self._values + 0j
-        n = int(free.sum())
+        free, (sizes, lu) = self._free, self._factors(factors)
         force = B - sum(c * x for c, x in zip(factors, self._right))
-        right = np.concatenate([(s * force)[free],
-                                self._scale * (G - self._J @ self._prescribed)]).astype(complex)
+        right = np.concatenate([force[free], G - self._J @ self._prescribed])
+        x = sizes * lu.solve((sizes * right).astype(np.result_type(*factors, float)))
+        u, n = self._prescribed.astype(x.dtype), int(free.sum())
+        u[free] = x[:n]
+        return u, x[n:]
+
+    def adjoint(self, factors: Sequence[float], by: Array) -> Array:
+        """The adjoint (N + m, r) of readings with derivatives ``by`` (N + m, r).
+
+        At fixed degrees of freedom the equation is that of the prescribed displacement.
+        """
+        (sizes, lu), N = self._factors(factors), len(self._free)
+        out, free = by.copy(), np.append(self._free, np.ones(len(by) - N, bool))
+        found = np.zeros_like(by)
+        found[free] = sizes * lu.solve(sizes * by[free], "T")
+        out[free] = found[free]
+        K = sum(c * A for c, A in zip(factors, self._matrices))
+        out[~free] -= (K.T @ found[:N] + self._J.T @ found[N:])[~self._free]
+        return out
+
+    def _factors(self, factors):
+        """Sizes of the free unknowns, (n + m, 1), and LU factors of the scaled matrix."""
+        A = self._pattern.astype(np.result_type(*factors, float))
+        A.data = np.array([*factors, 1.0]) @ self._values
+        s = self._sizes[self._free]
+        sizes = np.append(s, np.full(A.shape[0] - len(s), self._scale))[:, None]
         try:
-            x = splu(A).solve(right)
+            return sizes, splu(A)
         except RuntimeError:
             raise SupportError("the dynamic stiffness is singular: this is the frequency of an "
                                "undamped mode") from None
-        u = self._prescribed.astype(complex)
-        u[free] = s[free] * x[:n]
-        return u, self._scale * x[n:]
 
 
 def _places(A):
@@ -301,14 +321,17 @@ def rows_of(system: Any, state: State, sensor: Sensor) -> Readings:
                      multipliers=state.multipliers + multipliers)
 
     def by(n, numbers, change):
-        rest, units = np.ravel(read(sensor, at, moved(0.0))), np.eye(n)
-        out = np.zeros((len(rest), n))
+        rest = np.ravel(read(sensor, at, moved(0.0)))
+        out, unit = np.zeros((len(rest), n)), np.zeros(n)
         for k in numbers:
-            out[:, k] = np.ravel(read(sensor, at, change(units[k]))) - rest
+            unit[k] = 1.0
+            out[:, k] = np.ravel(read(sensor, at, change(unit))) - rest
+            unit[k] = 0.0
         return out
 
     if sensor.what in ("velocity", "acceleration"):
-        units = np.eye(N)[local]
+        units = np.zeros((len(local), N))
+        units[np.arange(len(local)), local] = 1.0
         row = np.zeros((len(np.ravel(at.start)), N))
         row[:, local] = at.velocity(state.u + 0.0 * units, units).reshape(len(local), -1).T
         zero = np.zeros_like(row)

@@ -599,6 +599,12 @@ class Scene(Model):
             self._velocities = {**self._velocities, k: (v, found)}
         return self
 
+    @property
+    def _velocity(self):
+        """The initial velocity, shape (N,)."""
+        return np.concatenate([self._velocities[k][1] if k in self._velocities else np.zeros(b.N)
+                               for k, b in enumerate(self.layout.members)])
+
     def integrate(self, t_end: float, dt: float | str,
                   scheme: str | Scheme | type[Scheme] = "energy-momentum",
                   start: State | None = None, *, t_start: float | None = None,
@@ -671,15 +677,12 @@ class Scene(Model):
         True
         """
         with self._lock:
-            velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
-                                       np.zeros(b.N) for k, b in enumerate(self.layout.members)])
             u = None if start is None else displacement(self.system, start)
             if isinstance(scheme, str) and scheme == "auto":
                 scheme = choose_scheme(self.system, require_positive("rtol", rtol)).scheme
             return integrate(self.system, t_end, dt, get_scheme(scheme), u,
-                             velocity if self._velocities else None, t_start, t_eval, tol, rtol,
-                             progress, start, breakpoints, checkpoint, every, until, check,
-                             self._located())
+                             self._velocity, t_start, t_eval, tol, rtol, progress, start,
+                             breakpoints, checkpoint, every, until, check, self._located())
 
     def run(self, steps: Steps | ArrayLike, increments: int = 20, start: State | None = None, *,
             tol: float = 1e-8, max_iterations: int = 30, min_step: float = 1e-4,
@@ -785,12 +788,12 @@ class Scene(Model):
 
     def _located(self, names=None):
         """Names and sensors, all or some of the scene or given as such."""
-        found = dict[str, Sensor]()
-        for one in self._sensors if names is None else names:
+        found = dict(self._sensors) if names is None else dict[str, Sensor]()
+        for one in names or ():
             if not isinstance(one, Sensor) and one not in self._sensors:
                 raise NameUnknown("sensor", one, self._sensors)
-            found[repr(one)[1:-1] if isinstance(one, Sensor) else one] = (
-                one if isinstance(one, Sensor) else self._sensors[one])
+            found.update({repr(one)[1:-1]: one} if isinstance(one, Sensor) else {
+                one: self._sensors[one]})
         for sensor in found.values():
             locate(sensor, self.system)
         return list(found.items())
@@ -859,10 +862,8 @@ class Scene(Model):
                     entries = [Entry(e.given, tuple(moved if x is joint else x for x in e.bound))
                                for e in entries]
             scene._entries, scene._system = tuple(entries), None
-            velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
-                                       np.zeros(b.N) for k, b in enumerate(self.layout.members)])
             return Stepper(scene, get_scheme(scheme), require_positive("dt", dt), held, start,
-                           velocity)
+                           self._velocity)
 
     def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
                progress: bool | None = None) -> History:

@@ -70,11 +70,10 @@ class Stepper:
                  start: State | None, velocity: Array) -> None:
         self.scene, self.dt, self.inputs = scene, dt, list(held)
         self._scheme, self._held, self._given = scheme, list(held.values()), (start, velocity)
-        self._begin()
         self.reset()
 
     def _begin(self):
-        """What depends on the equations only."""
+        """The equations, and what takes steps of them."""
         self._system = s = self.scene.system
         if s.forces.sampled:
             raise InputError(f"{s.forces.sampled[0]!r} samples by itself, and a stepper is sampled "
@@ -89,9 +88,8 @@ class Stepper:
         motion = None if self._given[0] is None else self._given[0]._motion
         self._begun, self._n = 0.0 if motion is None else motion.t, 0
         self._values = [one.first for one in self._held]
+        self._begin()
         self._set(self._values)
-        self._integrator = integrator_of(self._system, self._scheme)
-        self._integrator.longest = 1
         self._y = self._start()
         return self
 
@@ -107,10 +105,7 @@ class Stepper:
 
     def copy(self) -> Stepper:
         """A stepper that continues from here by itself."""
-        other = copy(self)
-        other._begin()
-        other._integrator.load(self._integrator.arrays())
-        return other
+        return copy(self)
 
     def __getstate__(self):
         found = {name: value for name, value in vars(self).items()

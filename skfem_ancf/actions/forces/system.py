@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -233,18 +232,6 @@ class Forces:
     def sampled(self) -> list[Control]:
         """Controls with a sampling time."""
         return [e for e in self.custom if isinstance(e, Control) and e.dt is not None]
-
-    @contextmanager
-    def without_samples(self) -> Iterator[None]:
-        """The elements as at the start of a motion, without held values of controls."""
-        held = [control.held for control in self.sampled]
-        for control in self.sampled:
-            control.hold(())
-        try:
-            yield
-        finally:
-            for control, values in zip(self.sampled, held):
-                control.hold(values)
 
     def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
         """Evaluate sampled controls that are due; ``first`` clears held values."""
