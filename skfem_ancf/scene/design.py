@@ -23,7 +23,7 @@ STEP = 1e-3
 TOUCHING = 1e-6
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 #: Relative change of an equation that is no round-off.
-CHANGED = 1e-12
+CHANGED = 1e-10
 #: Relative difference of a change by all parameters from the sum of those by each.
 AGREE = 1e-3
 #: Step of displacements for readings that are functions, relative to the size of the scene.
@@ -228,7 +228,7 @@ class Design:
         parts, change = values * moved[numbers], 0.5 * (ends[0] - ends[1])
         sums, sizes = (np.bincount(at, x, len(change)) for x in (parts, np.abs(parts)))
         return np.all(np.abs(change - sums) <= AGREE * (sizes + np.abs(change))
-                      + 1e3 * noise)
+                      + 10.0 * noise)
 
     def _grouped(self, p, h, state, noise):
         """Parameters that change different equations, with the parameter of each equation."""
