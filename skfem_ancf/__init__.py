@@ -1,6 +1,5 @@
 """Planar ANCF beams of any order as scikit-fem elements."""
 
-from .actions.axial import FollowerForce, LineLoad
 from .actions.eigenstrain import EigenStrain, Temperature
 from .actions.energy import Energy, check_derivatives
 from .actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, RotatingFrame,
@@ -9,8 +8,8 @@ from .actions.item import Item
 from .actions.joints import (Hinge, Joint, Motor, OnCircle, OnLine, PlaneSection, PrescribedAngle,
                              PrescribedPosition, PrescribedTurn, Sleeve, Slot, Weld)
 from .actions.form_load import FormLoad
-from .actions.loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
-from .actions.point_force import MovingForce, PointForce, Train
+from .actions.loads import DeadLoad, EndMoment, LineLoad, Load, Pressure, Traction, Weight
+from .actions.point_force import FollowerForce, MovingForce, PointForce, Train
 from .actions.pairs import BodyContact
 from .actions.obstacles import Circle, Contact, Line, Obstacle, Polygon, SignedDistance
 from .actions.supports import Clamp, Pin, Support

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCFHermite, ElementBeamCable,
                         InputError, MeshBeam, Scene, StVenantKirchhoff)
 from skfem_ancf.elements.base import DEGREES
-from skfem_ancf.mesh.reference_cell import SECTIONS, hermite_basis
+from skfem_ancf.mesh.mapping import SECTIONS
+from skfem_ancf.core.quadrature import hermite_basis
 
 E, NU, RHO, B = 2e8, 0.3, 7800.0, 0.01
 

@@ -11,7 +11,7 @@ from skfem import Basis, ElementVector
 
 from skfem_ancf import ElementBeamANCF, InputError, MeshBeam, MeshError, NameUnknown
 from skfem_ancf.elements.ancf import POINT_FAMILIES
-from skfem_ancf.mesh.reference_cell import SECTIONS
+from skfem_ancf.mesh.mapping import SECTIONS
 
 ORDERS = range(1, 11)
 SIZES = [(1.0, 1.0), (0.01, 3.0), (250.0, 1e-3)]

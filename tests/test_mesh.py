@@ -8,7 +8,7 @@ from skfem import Basis, FacetBasis, MeshLine, MeshQuad
 from skfem.generic_utils import OrientedBoundary
 
 from skfem_ancf import AncfError, InputError, MeshBeam, MeshError
-from skfem_ancf.mesh.reference_cell import ElementBeamP1
+from skfem_ancf.mesh.numbering import ElementBeamP1
 
 
 def area(mesh):

@@ -8,7 +8,7 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamCable, Frame, InputError, MeshBeam, RigidBody, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.core.near_misses import NearMisses
+from skfem_ancf.core.errors import NearMisses
 
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, cast
@@ -11,23 +12,24 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..beam.beam import Beam
-from ..beam.distribution import Distribution, on_facets, stations_of_vector
+from ..beam.distribution import (AXIS, Distribution, Sampled, on_facets, on_points,
+                                 stations_of_vector)
 from ..beam.domain import Domain
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
 from ..beam.surfaces import add_nodal, divided, surfaces_of
-from ..core.errors import (AncfError, InputError, ModelWarning, ask_field,
-                           ask_number, require_finite, require_finite_scalar, require_function,
-                           require_slope, shown, warn)
+from ..core.errors import (AncfError, InputError, ModelWarning, ask_field, ask_number,
+                           require_finite, require_finite_scalar, require_function, require_slope,
+                           sample, shown, warn)
 from ..core.immutable import is_builtin, read_only
-from ..core.sampling import sample
+from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
+from ..sections.across import Pieces, pieces
 from .item import Item, beside, require_entries
 from .places import members_at, nearest_of
-
 
 #: Warn of a traction on a cable if its neglected moment exceeds these parts of force times length,
 #: and of force times height (round-off).
@@ -564,3 +566,138 @@ class EndMoment(Load):
 
     def potential(self, u: Array) -> float:
         return -self.M * self.angle(u)
+
+
+# loads that depend on time
+
+_NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
+
+
+class TimedLoad(Load):
+    """A force that depends on time and not on the displacement.
+
+    A subclass defines :meth:`places` or :meth:`at`. Single static solutions take the load at time
+    1; :meth:`skfem_ancf.Scene.run` and motions take the current time.
+    """
+
+    constant = False
+    # of the load at a time
+    _time: float | None = None
+    _vector: Any = None
+    _distribution: Any = None
+    _last: Any = None
+
+    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
+        """Forces (2,) at time t, each with its element and reference point (2,)."""
+        raise NotImplementedError
+
+    def at(self, t: float) -> tuple[Array, Distribution]:
+        """Force (N,) at time t and its distribution; by default from :meth:`places`."""
+        return on_points(self.beam, self.places(t))
+
+    @property
+    def first_order(self) -> bool:
+        return False
+
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        last, time = self._last, 1.0 if t is None else float(t)
+        if last is None or last._time != time:
+            last = self._last = self._now(time)._with(_time=time)
+        return self.factor(t), last
+
+    def _now(self, time: float) -> Load:
+        vector, distribution = self.at(time)
+        return self._with(_vector=vector, _last=None, _distribution=distribution)
+
+    def force(self, u: Array) -> Array:
+        return self.acting(None)[1].force(u) if self._vector is None else self._vector
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        return self.force(u1)
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        return _NONE
+
+    def potential(self, u: Array) -> float:
+        return -float(self.force(u) @ u)
+
+    def distribution(self, u: Array) -> Distribution | None:
+        if self._distribution is None:
+            return self.acting(None)[1].distribution(u)
+        return self._distribution
+
+
+class LineLoad(Load):
+    """A dead force per length of the reference axis.
+
+    Parameters
+    ----------
+    force
+        Force per length, shape (2,), or a function of points x (2, ...) of the reference axis that
+        returns (2, ...); or of x and the time.
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+    """
+
+    #: Numbers of the loaded chains of elements, shape (k,); None for all.
+    chains: Any = None
+
+    def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.per_length = force if callable(force) else require_finite("force", force, (2,))
+
+    def bind(self, beam: Beam) -> Load:
+        given = self.per_length
+        if of_place_and_time(given):
+            return LineLoadInTime(beam, self.chains, given, self.amplitude)
+        vector, distribution = _along_axis(beam, self.chains, given, "force(x)")
+        return DeadLoad(beam, vector, self.amplitude, distribution)
+
+
+def _along_axis(beam, chains, given, name):
+    """Force (N,) and distribution of a force per length, on some chains of elements or on all."""
+    mapping, (xi, w) = beam.mesh.mapping(), gauss(beam.element.axis_degree + 5)
+    e = np.arange(beam.mesh.nelements)
+    e = e if chains is None else e[np.isin(beam.mesh.chains, chains)]
+    part, size = Pieces(e, np.zeros(len(e)), np.ones(len(e))), np.ones((len(e), 1))
+
+    def at(X, e):
+        return ask_field(name, given, mapping.F(X, e))
+
+    if callable(given):
+        part = pieces(at, e)
+        size = (part.end - part.begin)[:, None]
+    x = part.begin[:, None] + size * xi
+    X = np.array([x, 0.5 + 0.0 * x])
+    values = at(X, part.elements) if callable(given) else given[:, None, None]
+    values = values * np.hypot(*mapping.DF(X, part.elements)[:, 0])
+    vector = np.zeros(beam.N)
+    functions = beam.element.of_mesh(mapping, X, part.elements)[0]
+    add_nodal(beam, part.elements, np.einsum("kep,iep->eik", values * size * w, functions), vector)
+    return vector, Distribution(sampled=(Sampled(
+        AXIS, part.elements, xi, values, parts=np.array([part.begin, part.end])),))
+
+
+class LineLoadInTime(TimedLoad):
+    """A time-dependent force per length of a beam, bound."""
+
+    def __init__(self, beam: Beam, chains: Any, force: Any,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.chains, self.per_length = chains, force
+
+    def at(self, t: float) -> tuple[Array, Distribution]:
+        return _along_axis(self.beam, self.chains, lambda x: self.per_length(x, t), "force(x, t)")
+
+
+def of_place_and_time(force: Any) -> bool:
+    """True for a function of two required arguments, x and the time."""
+    if not callable(force):
+        return False
+    try:
+        parameters = inspect.signature(force).parameters.values()
+    except (TypeError, ValueError):  # of a built-in function
+        return False
+    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+               for p in parameters) == 2

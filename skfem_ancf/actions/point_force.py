@@ -1,9 +1,9 @@
-"""Forces on material points, at rest or moving, on the axis or off it."""
+"""Forces on material points, at rest or moving, dead or follower, on the axis or off it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,12 +13,15 @@ from ..beam.distribution import Distribution, on_points
 from ..beam.kernels.section import beam_gradients
 from ..beam.kinematics import locate, probe_reference
 from ..beam.layout import Layout, WhichBeam, WhichMember
+from ..beam.masses import TURN
+from ..beam.points import Points
 from ..beam.rigid import RigidBody, on_body
 from ..core.errors import (InputError, ask, require_direction, require_finite,
                            require_finite_scalar, require_positive)
 from ..core.types import Array, TimeFunction
+from ..mesh.places import as_point
 from .item import Item
-from .loads import DeadLoad, Load, number_at
+from .loads import DeadLoad, Load, TimedLoad, number_at
 
 # a dead force on a point of a cable beside its axis: a force on the axis and a couple
 
@@ -139,63 +142,10 @@ class PointForce(Load):
         return DeadLoad(beam, vector, self.amplitude, distribution)
 
 
-# moving loads: a force that moves along a beam, and a train of forces
-
-_NONE = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
 
-class TimedLoad(Load):
-    """A force that depends on time and not on the displacement.
 
-    A subclass defines :meth:`places` or :meth:`at`. Single static solutions take the load at time
-    1; :meth:`skfem_ancf.Scene.run` and motions take the current time.
-    """
 
-    constant = False
-    # of the load at a time
-    _time: float | None = None
-    _vector: Any = None
-    _distribution: Any = None
-    _last: Any = None
-
-    def places(self, t: float) -> Sequence[tuple[Array, int, Array]]:
-        """Forces (2,) at time t, each with its element and reference point (2,)."""
-        raise NotImplementedError
-
-    def at(self, t: float) -> tuple[Array, Distribution]:
-        """Force (N,) at time t and its distribution; by default from :meth:`places`."""
-        return on_points(self.beam, self.places(t))
-
-    @property
-    def first_order(self) -> bool:
-        return False
-
-    def acting(self, t: float | None) -> tuple[float, Load]:
-        last, time = self._last, 1.0 if t is None else float(t)
-        if last is None or last._time != time:
-            last = self._last = self._now(time)._with(_time=time)
-        return self.factor(t), last
-
-    def _now(self, time: float) -> Load:
-        vector, distribution = self.at(time)
-        return self._with(_vector=vector, _last=None, _distribution=distribution)
-
-    def force(self, u: Array) -> Array:
-        return self.acting(None)[1].force(u) if self._vector is None else self._vector
-
-    def mean_force(self, u0: Array, u1: Array) -> Array:
-        return self.force(u1)
-
-    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        return _NONE
-
-    def potential(self, u: Array) -> float:
-        return -float(self.force(u) @ u)
-
-    def distribution(self, u: Array) -> Distribution | None:
-        if self._distribution is None:
-            return self.acting(None)[1].distribution(u)
-        return self._distribution
 
 
 class MovingForce(TimedLoad):
@@ -306,3 +256,103 @@ class Train(TimedLoad):
                 xi = (x - ends[e]) / (ends[e + 1] - ends[e])
                 places.append((force * along, e, np.array([xi, 0.5])))
         return places
+
+
+class FollowerForce(Load):
+    """A point force that rotates with the tangent of the axis, or with a rigid body.
+
+    It has no potential and may cause flutter. On the face of a cable it has the couple of its
+    distance from the axis.
+
+    Parameters
+    ----------
+    force
+        The force in the reference configuration, shape (2,).
+    at
+        The material point (x, y), shape (2,).
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`; the beam may be a RigidBody.
+    line
+        Number of the chain of elements whose tangent is used, where several meet.
+    """
+
+    constant = False
+    symmetric = False
+    for_bodies = True
+    # of a bound one: element and xi, coordinates and weights of its place and of the tangent
+    _place: tuple[int, float] | None
+    _dofs: Any
+    _weights: Any
+    _along: Any
+    _slopes: Any
+    _start: Any
+    _turn: Any
+    _couple: float = 0.0
+
+    def __init__(self, force: ArrayLike, at: Any, beam: WhichMember = None,
+                 amplitude: TimeFunction = None, line: int | None = None) -> None:
+        at, beam = on_body(at, beam)
+        super().__init__(beam, amplitude)
+        self.total, self.at, self.line = require_finite("force", force, (2,)), at, line
+
+    def expand(self, layout: Layout) -> Sequence[Item]:
+        return (self._with(beam=number_at(layout, self.at, self.beam)),)
+
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        bound, lever = cast("FollowerForce", super().bind(cast("Beam", beam))), 0.0
+        if isinstance(beam, RigidBody):
+            bound._dofs, weights = beam.probe(self.at)
+            bound._place, bound._start = None, beam.q0[2:]
+            bound._along, bound._slopes = beam.direction()
+        else:
+            found = Points([beam], [slice(beam.N)]).find(as_point(self.at, beam.mesh), beam,
+                                                         self.line, ask=True).parts[0]
+            e, X = int(found.e[0]), found.X[:, 0]
+            if is_off_axis(beam, X):
+                lever = float(beam.mesh.mapping().offset(X.reshape(2, 1, 1), np.array([e]))[0, 0])
+                X = np.array([X[0], 0.5])
+            bound._dofs, weights = probe_reference(beam, e, X)
+            bound._place, bound._along = (e, float(X[0])), bound._dofs
+            slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
+                                           np.array([e]))
+            bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
+        bound._weights = np.broadcast_to(weights, bound._dofs.shape)
+        # the force is a matrix times the unit tangent
+        (x, y), n = self.total, bound._start / np.hypot(*bound._start)
+        a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
+        bound._turn = np.array([[a, b], [-b, a]])
+        bound._couple = -a * lever  # of the component along the axis
+        return bound
+
+    def _tangent(self, u):
+        return self._start + u[self._along] @ self._slopes
+
+    def _force(self, u):
+        d = self._tangent(u)
+        force = (self._turn @ d / np.hypot(*d))[:, None] * self._weights
+        if self._couple:
+            force = force + self._couple * (TURN @ d / (d @ d))[:, None] * self._slopes
+        return force
+
+    def force(self, u: Array) -> Array:
+        out = np.zeros(self.beam.N)
+        np.add.at(out, self._dofs, self._force(u))
+        return out
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        d = self._tangent(u)
+        size = np.hypot(*d)
+        D = self._turn @ (np.eye(2) - np.outer(d, d) / size**2) / size
+        values = np.einsum("ij,ik,l->ikjl", D, self._weights, self._slopes)
+        if self._couple:
+            D = self._couple * (TURN - 2.0 * np.outer(TURN @ d, d) / size**2) / size**2
+            values += np.einsum("ij,k,l->ikjl", D, self._slopes, self._slopes)
+        rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
+        columns = np.broadcast_to(self._along[None, None], values.shape)
+        return rows.ravel(), columns.ravel(), values.ravel()
+
+    def distribution(self, u: Array) -> Distribution:
+        if self._place is None:
+            return Distribution()
+        e, xi = self._place
+        return Distribution(stations=(e + xi,), points=((e, xi, self._force(u).T),))

@@ -17,8 +17,7 @@ from ..core.types import Place
 from ..mesh.places import is_point, node_of
 from .item import Item
 from .joints.weld import Hinge
-from .joints.guides import PlaneSection
-from .joints.prescribed import PrescribedDisplacement
+from .joints.prescribed import PlaneSection, PrescribedDisplacement
 
 
 class Support(Item):

@@ -16,19 +16,18 @@ from ..beam.rigid import RigidBody
 from ..core.errors import AncfError
 from ..core.types import Array
 from ..mesh.places import facets_of
-from .axial import FollowerForce, LineLoad, of_place_and_time
 from .eigenstrain import EigenStrain
 from .forces import Control, Drag, Foundation, PointMass, Spring, TorsionalSpring
 from .forces.springs import end_of
 from .joints import Hinge, Weld
 from .joints.weld import Glue
-from .joints.guides import OnCircle, OnLine, PlaneSection
 from .joints.nodes import COMPONENTS, Nodes
-from .joints.prescribed import (PrescribedAngle, PrescribedDisplacement, PrescribedPosition,
-                                PrescribedTurn)
-from .joints.sliders import Sleeve, Slot
-from .loads import DeadLoad, EndMoment, Load, Pressure, Traction, Weight
-from .point_force import PointForce, TimedLoad
+from .joints.prescribed import (PlaneSection, PrescribedAngle, PrescribedDisplacement,
+                                PrescribedPosition, PrescribedTurn)
+from .joints.sliders import OnCircle, OnLine, Sleeve, Slot
+from .loads import (DeadLoad, EndMoment, LineLoad, Load, Pressure, TimedLoad, Traction, Weight,
+                    of_place_and_time)
+from .point_force import FollowerForce, PointForce
 from .places import Vector, is_ground, named_place, point, section
 from .supports import Support
 

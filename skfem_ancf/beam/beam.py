@@ -12,19 +12,17 @@ from scipy.sparse import csr_matrix
 from skfem.assembly import Basis, FacetBasis
 from skfem.element import ElementVector
 
-from ..core.caching import cached_property
 from ..core.errors import (InputError, NameUnknown, require_finite, require_flag, require_integer,
                            require_label, require_like, require_names, require_unmasked, shown)
-from ..core.immutable import Immutable, read_only
+from ..core.immutable import Immutable, cached_property, read_only
 from ..core.types import Array, Place
 from ..elements import ElementBeam, choose_element
 from ..formulations import get_formulation
 from ..formulations.base import Formulation, Term
 from ..materials import Material
 from ..materials.damping import KelvinVoigt
-from ..mesh.location import Finder
 from ..mesh.mesh_beam import MeshBeam, reach
-from ..mesh.places import facets_of
+from ..mesh.places import Finder, facets_of
 from ..sections import Across, Rectangle, Section
 from . import kinematics
 from .masses import Masses, exact_rule, masses_of
@@ -71,7 +69,7 @@ class Beam(Immutable):
     element
         A beam element, such as ``ElementBeamANCF(3)``, or "auto": the element of lowest order that
         represents ``fields`` within ``tolerance``, see
-        :func:`skfem_ancf.elements.choose.choose_element`.
+        :func:`skfem_ancf.elements.ancf.choose_element`.
     material
         A material, such as :class:`~skfem_ancf.StVenantKirchhoff`; None if the section has its own
         materials.
@@ -275,7 +273,7 @@ class Beam(Immutable):
 
     @cached_property
     def finder(self) -> Finder:
-        """Locates points in elements, a :class:`~skfem_ancf.mesh.location.Finder`."""
+        """Locates points in elements, a :class:`~skfem_ancf.mesh.places.Finder`."""
         return Finder(self.mesh)
 
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:

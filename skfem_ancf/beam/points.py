@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.errors import (InputError, MeshError, require_finite, require_integer, require_point,
                            shown)
 from ..core.types import Array

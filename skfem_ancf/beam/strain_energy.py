@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.source import I1, I2, primitive, shaped, source
 from ..core.types import Array
 from .beam import Beam

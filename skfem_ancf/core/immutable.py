@@ -1,21 +1,21 @@
-"""Immutable objects, and how they are copied and pickled."""
+"""Immutable objects, how they are copied and pickled, and caches of what is computed from them."""
 
 from __future__ import annotations
 
+import functools
 import inspect
 import sys
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from functools import lru_cache, wraps
 from importlib import import_module
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from skfem.assembly.form.form import Form
 from skfem.generic_utils import OrientedBoundary
 
 from .errors import CallError, ImmutableError, InputError, NameUnknown, require_options
-
 
 # pickles of scikit-fem's objects in attributes of the package's, without changing its classes
 
@@ -95,7 +95,7 @@ class _Freezing(type):
         super().__init__(*arguments)
         #: names of cached properties
         cls._derived = {name for one in cls.__mro__ for name, value in vars(one).items()
-                        if isinstance(value, cached_property)}
+                        if isinstance(value, functools.cached_property)}
 
     def __call__(cls, *args, **kwargs):
         try:
@@ -192,3 +192,60 @@ def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
                          "attribute of that name, or pass it to replace")
     return type(thing)(**{name: getattr(thing, name) for name in names if name not in changes},
                        **changes)
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+if TYPE_CHECKING:
+    from functools import cached_property
+else:
+    class cached_property(functools.cached_property):
+        """As of Python 3.12: without the lock for all objects, at which other threads wait."""
+
+        def __get__(self, instance, owner=None):
+            if instance is None:
+                return self
+            value = instance.__dict__[self.attrname] = self.func(instance)
+            return value
+
+
+class ArrayKey:
+    """A hashable key of arrays, compared by shape, type and values."""
+
+    def __init__(self, *arrays: Any) -> None:
+        self.arrays = arrays
+        self._key = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
+
+    def __eq__(self, other):
+        return isinstance(other, ArrayKey) and self._key == other._key
+
+    def __hash__(self):
+        return hash(self._key)
+
+
+def array_cache(maxsize: int) -> Callable[[Function], Function]:
+    """``functools.lru_cache`` for functions of arrays; results must be read-only.
+
+    Examples
+    --------
+    >>> @array_cache(maxsize=8)
+    ... def total(x):
+    ...     print("computed")
+    ...     return x.sum()
+    >>> bool(total(np.ones(3)) == total(np.ones(3)))
+    computed
+    True
+    """
+    def decorate(function: Function) -> Any:
+        @lru_cache(maxsize)
+        def of_keys(*keys: Any) -> Any:
+            return function(*(k.arrays[0] if isinstance(k, ArrayKey) else k for k in keys))
+
+        @wraps(function)
+        def cached(*args: Any) -> Any:
+            return of_keys(*(ArrayKey(a) if isinstance(a, np.ndarray) else a for a in args))
+
+        return cached
+
+    return decorate

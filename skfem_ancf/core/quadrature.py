@@ -1,8 +1,9 @@
-"""Gauss rules along the axis and across the section of the reference cell."""
+"""Gauss rules along the axis and across the section of the reference cell; polynomials on it."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from math import comb, perm
 from typing import Any
 
 import numpy as np
@@ -81,3 +82,39 @@ def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
             if i != j:
                 out[:, i] *= (x - b) / (a - b)
     return out
+
+
+@lru_cache
+def _hermite_coefficients(m: int, derivative: int) -> Array:
+    """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
+
+    Bernstein coefficients times binomials, (2 m, n + 1 - derivative): without cancellation, as all
+    have one sign (Farouki and Rajan, "On the numerical condition of polynomials in Bernstein form",
+    Computer Aided Geometric Design 4, 1987).
+    """
+    n = 2 * m - 1
+    left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
+            for k in range(m)]
+    rows = np.array(left + [[(-1) ** k * b for b in row[::-1]] for k, row in enumerate(left)],
+                    dtype=object)
+    rows = np.diff(rows, derivative, axis=1) * perm(n, derivative)
+    rows = rows * [comb(n - derivative, i) for i in range(rows.shape[1])]
+    return np.array(rows / perm(n, m), dtype=float)
+
+
+#: Exponents of the largest degree, and beyond it.
+_POWERS = np.arange(64)[:, None]
+
+
+def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
+    """Hermite functions of degree 2 m - 1 with derivatives 0 ... m-1 at 0, then at 1.
+
+    Shape (2 m,) + xi.shape.
+    """
+    x, degree = np.asarray(xi), 2 * m - 1 - derivative
+    if degree < 0:
+        return np.zeros((2 * m,) + x.shape)
+    k = _POWERS[:degree + 1]
+    if x.ndim == 1:
+        return _hermite_coefficients(m, derivative) @ ((x + 0.0)**k * (1.0 - x) ** k[::-1])
+    return hermite_basis(m, x.ravel(), derivative).reshape((2 * m,) + x.shape)

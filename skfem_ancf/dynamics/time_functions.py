@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
-from ..core.sampling import sample
+from ..core.errors import sample
 from ..core.types import Array
 from ..equations.system import System
 

@@ -1,10 +1,8 @@
 """Beam elements. A new element is one file and one line here."""
 
-from .ancf import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
-                   ElementBeamPatelShabana)
+from .ancf import (ORDER_OF_FIELD, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                   ElementBeamCable, ElementBeamPatelShabana, choose_element)
 from .base import ElementBeam
-from .cable import ElementBeamCable
-from .choose import ORDER_OF_FIELD, choose_element
 
 #: Elements by name.
 ELEMENTS = {

@@ -1,15 +1,21 @@
-"""The ANCF beam elements of order N, of all degrees along the axis."""
+"""The ANCF elements of order N, of all degrees along the axis, the cable, and a choice of them."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..core.errors import require_integer, require_option
+from ..core.errors import (InputError, require_integer, require_like, require_names, require_option,
+                           require_positive)
 from ..core.immutable import is_builtin, read_only
-from ..core.quadrature import gauss_lobatto
-from ..core.types import Array
-from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
+from ..core.quadrature import gauss_lobatto, hermite_basis
+from ..core.types import Array, Isotropic
+from ..mesh.mesh_beam import MeshBeam
+from ..mesh.mapping import SECTIONS
+from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, StabilisedMode, require_degree
 
 
 def _chebyshev(n: int) -> Array:
@@ -189,3 +195,137 @@ class ElementBeamANCFCubic(ElementBeamANCFHermite):
 
     def __init__(self, order: int, points: str = "chebyshev") -> None:
         super().__init__(order, 3, points)
+
+
+class ElementBeamCable(ElementBeam):
+    """Axis element: ``r`` and its derivatives along X are the degrees of freedom.
+
+    Sections stay plane and normal to the axis. The stiffnesses are EA and EI; the thickness follows
+    from S_yy = 0. Use it for slender beams.
+
+    N = EA (stretch - 1) and M = EI (change of curvature) at any deformation: the nominal stress in
+    a fibre is E (stretch - 1), or E / (1 - nu^2) times the same in plane strain. Output is the
+    Green-Lagrange strain eps_xx = (stretch^2 - 1) / 2 and the second Piola-Kirchhoff stress S_xx =
+    E (stretch - 1) / stretch.
+
+    Parameters
+    ----------
+    degree
+        Degree of the axis along X: 3 (``r``, ``r_X``), 5 (and ``r_XX``; the best for frames and
+        point loads), 7, ... 15 (derivatives up to order (degree - 1) / 2). One or two elements of
+        degree 9 and more replace many where the loads are smooth.
+
+    Raises
+    ------
+    InputError
+        If the degree is not odd, or not from 3 to 15.
+
+    References
+    ----------
+    Berzeri, Shabana: "Development of simple models for the elastic forces in the absolute nodal
+    co-ordinate formulation", Journal of Sound and Vibration 235 (2000); Gerstmayr, Irschik: "On
+    the correct representation of bending and axial deformation in the absolute nodal coordinate
+    formulation with an elastic line approach", Journal of Sound and Vibration 318 (2008).
+
+    Examples
+    --------
+    >>> from skfem_ancf import ElementBeamCable
+    >>> ElementBeamCable().dofnames, ElementBeamCable(5).dofnames
+    (['r', 'r_X'], ['r', 'r_X', 'r_XX'])
+    """
+
+    order = 0
+    kinematics = "cable"
+    carries_shear_parabola = False
+
+    def __init__(self, degree: int = 3) -> None:
+        m = (require_degree(degree) + 1) // 2
+        super().__init__(SectionFunctions(np.zeros((1, 0))), ["r_" + "X" * k for k in range(2, m)],
+                         [(0.0, k, 0) for k in range(2, m)], [])
+        self.maxdeg = self.axis_degree
+
+    def raised(self) -> ElementBeamCable | None:
+        if type(self) is not ElementBeamCable or self.axis_degree == DEGREES[-1]:
+            return None
+        return ElementBeamCable(self.axis_degree + 2)
+
+    @property
+    def strain_degree(self) -> int:
+        # |r_X| and the curvature are not polynomials: one point for each Hermite function
+        return self.axis_degree
+
+    @property
+    def mesh_sections(self) -> str:
+        # an axis of degree 5 has all that is known of a curved mesh whose axis is cubic
+        return "linear" if self.axis_degree < 7 else SECTIONS[self.nodal_dofs - 1]
+
+    def axis(self, xi: Array, derivative: int) -> Array:
+        """The Hermite functions of the axis, or a derivative by xi, (2 m,) + xi.shape.
+
+        Parameters
+        ----------
+        xi
+            Points, of any shape (...).
+        derivative
+            Order of the derivative.
+        """
+        return hermite_basis(self.nodal_dofs, xi, derivative)
+
+    @cached_property
+    def sampling(self) -> Sampling:
+        return Sampling(self.axis_degree - 1, {})
+
+    @property
+    def stabilised(self) -> tuple[StabilisedMode, ...]:
+        # the mode that a higher degree misses in one element is resisted where two meet, and that
+        # of the cubic axis by a third point
+        return ()
+
+
+#: Least order for a field of the section; 0 is the cable.
+ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_xy": 3, "S_yy": 5,
+                  "S_xy": 3}
+
+
+def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[str] = (),
+                   tolerance: float = 1e-3) -> ElementBeam:
+    """The element of lowest order that represents the fields to a given accuracy.
+
+    The error of a beam theory is a power of h / L, with L the length of the beam. The cable omits
+    shear, ``3 E I / (k_s G A L^2)`` of the deflection of a cantilever. A section of order 1 or 2
+    omits warping, about ``(h / L)^2 / 10``. Order 3 represents the shear parabola, with an error of
+    order ``(h / L)^3``. The result is a quintic cable, or has cubic sections, or linear ones on a
+    beam shorter than 20 heights.
+
+    Parameters
+    ----------
+    mesh, material
+        Mesh and material of the beam.
+    fields
+        Fields of the section that are needed: names from :data:`ORDER_OF_FIELD`.
+    tolerance
+        Relative error of the deflection due to the theory, without the discretisation error.
+
+    Raises
+    ------
+    NameUnknown
+        If a field is not known.
+    """
+    require_like("mesh", mesh, "MeshBeam", "height", "lengths")
+    require_like("material", material, "Material", "E", "G", "nu")
+    fields = require_names("field", fields, ORDER_OF_FIELD)
+    tolerance = require_positive("tolerance", tolerance)
+    if tolerance >= 1.0:
+        raise InputError(f"the tolerance is relative and below 1, got {tolerance!r}")
+    ratio = mesh.height / float(mesh.lengths.sum())
+    k_s = 10.0 * (1.0 + material.nu) / (12.0 + 11.0 * material.nu)
+    shear = 0.25 * material.E / (k_s * material.G) * ratio**2
+    wanted = max((ORDER_OF_FIELD[name] for name in fields), default=0)
+    enough = (0 if shear <= tolerance else 2 if 0.1 * ratio**2 <= tolerance else
+              3 if ratio**3 <= tolerance else 5)
+    if not material.is_hooke:  # a cable uses E and nu only
+        wanted = max(wanted, 2)
+    order = max(wanted, enough)
+    if order == 0:
+        return ElementBeamCable(5)
+    return ElementBeamANCFCubic(order) if ratio < 0.05 else ElementBeamANCF(order)

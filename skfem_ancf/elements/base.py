@@ -10,14 +10,13 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 from skfem.element import DiscreteField, Element
 
-from ..core.caching import cached_property
 from ..core.errors import InputError, MeshError, require_finite, shown
-from ..core.immutable import Immutable
-from ..core.quadrature import gauss, gauss_lobatto
+from ..core.immutable import Immutable, cached_property
+from ..core.quadrature import gauss, gauss_lobatto, hermite_basis
 from ..core.types import Array, Rule
-from ..mesh.mapping import MappingBeam, nodal_derivatives, turned
+from ..mesh.mapping import SECTIONS, MappingBeam, nodal_derivatives, turned
 from ..mesh.mesh_beam import MeshBeam
-from ..mesh.reference_cell import SECTIONS, RefBeam, hermite_basis
+from ..mesh.numbering import RefBeam
 
 
 # sampling points of the formulation "assumed", and the modes that they miss
@@ -213,7 +212,7 @@ class ElementBeam(Immutable, Element):
         Parameters
         ----------
         measure, shear
-            A measure with ``gauss(n)``, see :mod:`skfem_ancf.sections.measure`; the shear factor.
+            A measure with ``gauss(n)``, see :mod:`skfem_ancf.sections.section`; the shear factor.
         """
         other = self._thawed()
         other._measure, other.shear = measure, shear

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ..beam.kernels.law import CUSTOM, HISTORY
 from ..core import code_cache
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.callbacks import deferred
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, wanted

@@ -14,9 +14,8 @@ from ..actions.joints.base import Joint, IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam.beam import Beam
 from ..beam.rigid import RigidBody
-from ..core.caching import cached_property
 from ..core.errors import InputError, ModelWarning, SupportError, shown
-from ..core.immutable import is_builtin
+from ..core.immutable import cached_property, is_builtin
 from ..core.types import Array
 from .mobility import advice, first_of, free_rigid_motions, repeated, shared, who
 from .signature import DENSE, FREE, first_dependent

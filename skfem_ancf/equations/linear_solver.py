@@ -14,7 +14,7 @@ from weakref import proxy
 import numpy as np
 
 from ..core.band import fix
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.callbacks import handle_of
 from ..core.linalg import NO_FACTORS, BandMatrix, Inertia
 from ..core.types import Array

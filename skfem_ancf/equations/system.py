@@ -23,7 +23,7 @@ from ..beam.domain import Domain
 from ..beam.kinematics import bent
 from ..beam.points import Points
 from ..beam.rigid import RigidBody
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.errors import InputError
 from ..core.linalg import BandMatrix
 from ..core.types import Array

@@ -7,7 +7,7 @@ from weakref import ref
 import numpy as np
 
 from ..core.band import Band
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ..core.errors import require_option
 from .assumed import Assumed
-from .base import COMPONENTS, Formulation, Term
-from .continuum import Continuum, EnhancedContinuum, StrainSplit
+from .base import COMPONENTS, Continuum, EnhancedContinuum, Formulation, StrainSplit, Term
 
 #: The formulations by name.
 FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSplit, Assumed)}

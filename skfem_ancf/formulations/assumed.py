@@ -14,8 +14,7 @@ from ..materials import LinearLaw
 from ..materials.base import Material
 from ..materials.history import AtRest
 from ..mesh.mesh_beam import MeshBeam
-from .base import Formulation, Term, refuse_rigid_sections
-from .continuum import AXIS, split_moduli
+from .base import AXIS, Formulation, Term, refuse_rigid_sections, split_moduli
 
 
 #: Poisson ratio in plane strain to which linear sections take laws that are not split.

@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 from skfem.mapping import Mapping
 
-from ..core.caching import cached_property
 from ..core.errors import MeshError, ask_array, require_function, require_positive
-from ..core.quadrature import lagrange
+from ..core.immutable import cached_property
+from ..core.quadrature import hermite_basis, lagrange
 from ..core.types import Array
-from .location import Inverse, InverseOfLines, with_slope
-from .reference_cell import SECTIONS, hermite_basis
+from .places import Inverse, InverseOfLines, with_slope
+
+#: Interpolation of sections with 1, 2, ... nodal derivatives along X, the 0th included.
+SECTIONS = ("linear", "cubic", "quintic", "septic",
+            *(f"of degree {degree}" for degree in (9, 11, 13, 15)))
+
 
 # heights that vary along the axis: a cubic polynomial of xi in each element
 

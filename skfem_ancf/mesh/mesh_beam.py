@@ -14,21 +14,17 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
-from ..core.caching import cached_property
 from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
                            require_finite_scalar, require_function, require_integer,
                            require_moderate, require_option, require_options, require_path,
                            require_positive, require_unmasked, shown)
-from ..core.immutable import is_builtin, packed
+from ..core.immutable import cached_property, is_builtin, packed
 from ..core.types import Array, StrPath
 from . import files
 from .curve import Curve, axis_of, check_curvature, derivative_of
-from .location import Finder
-from .mapping import MappingBeam, heights_of, scaled
-from .numbering import NumberedMesh, default_tags
-from .places import as_point, is_point, points_of_rows
-from .reference_cell import SECTIONS, ElementBeamP1
-from .refinement import halved
+from .mapping import SECTIONS, MappingBeam, heights_of, scaled
+from .numbering import ElementBeamP1, NumberedMesh, default_tags, halved
+from .places import Finder, as_point, is_point, points_of_rows
 
 EPS = float(np.finfo(float).eps)
 
@@ -321,7 +317,7 @@ class MeshBeam(NumberedMesh):
     def with_sections(self, sections: str) -> MeshBeam:
         """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
 
-        The names are those of :data:`skfem_ancf.mesh.reference_cell.SECTIONS`. From "quintic" on
+        The names are those of :data:`skfem_ancf.mesh.mapping.SECTIONS`. From "quintic" on
         the axis is interpolated with the same degree; below it is cubic. A ``Beam`` chooses the
         interpolation of its element, which represents a curved reference configuration exactly. For
         straight beams all are the same.

@@ -1,18 +1,331 @@
-"""Places on a beam: a boundary, a material point, a function, facets."""
+"""Places on a beam: a boundary, a material point, a function, facets; the location of points."""
 
 from __future__ import annotations
 
 import numbers
 from collections.abc import Callable
+from math import factorial
 from typing import Any, cast
 
 import numpy as np
+import scipy
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike
 
 from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, ask, is_masked,
                            require_point, shown)
+from ..core.immutable import cached_property
 from ..core.types import Array, Place
-from .location import Finder
+from ..core.quadrature import hermite_basis
+
+EPS = float(np.finfo(float).eps)
+#: A distance outside of elements that have no such point.
+FARTHEST = float(np.finfo(float).max)
+
+#: Tolerance and largest number of Newton iterations.
+CLOSE, ITERATIONS = 1e-7, 30
+
+#: Samples of each element in the search tree, steps to neighbours from the nearest sample, and
+#: further candidates for a point that is in none of these elements.
+SAMPLES, WALK, CANDIDATES = 4, 3, 6
+
+
+def _taylor(m):
+    return np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d) for d in range(2 * m)])
+
+
+def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
+    """A polynomial with coefficients (n, ...), lowest first, and its derivative."""
+    return (polyval(xi, coefficients, tensor=False),
+            polyval(xi, polyder(coefficients), tensor=False))
+
+
+class Inverse:
+    """The map from the body to the reference cell.
+
+    ``axis`` relative to ``start`` and ``director``, times the largest height, are Hermite
+    coefficients; ``heights`` are coefficients (4, ne) of the relative height, None if constant.
+    """
+
+    def __init__(self, start: Array, axis: Array, director: Array, height: float,
+                 heights: Array | None) -> None:
+        self.start = start
+        self.axis, self.director = (_taylor(c.shape[1] // 2) @ c for c in (axis, director))
+        n, m = self.axis.shape[1], self.director.shape[1]
+        #: Minus the cross product of both; the axial coordinate does not depend on the height.
+        self.beside = np.zeros((n + m - 1, axis.shape[2]))
+        for k in range(n):
+            self.beside[k:k + m] -= _cross(self.axis[:, k, None], self.director)
+        self.largest, self.heights = height, heights
+
+    def height(self, e: Any, xi: Array) -> Any:
+        """Height at axial coordinates xi (n, ...) of elements e (n,)."""
+        if self.heights is None:
+            return self.largest
+        return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
+
+    def __call__(self, x: Array, e: Any) -> Array:
+        """Reference points of points of elements e, both (2, n, npoints); NaN where there is none.
+
+        Newton's method, from the middle of the elements.
+        """
+        axis, director, beside = (c[..., e, None] for c in (self.axis, self.director, self.beside))
+        gap = x - self.start[:, e, None]
+        # (point - axis) x director vanishes at the section through the point
+        beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
+        beside[:director.shape[1]] += _cross(gap[:, None], director)
+        X = np.full(x.shape, 0.5)
+        for _ in range(ITERATIONS):
+            value, slope = with_slope(beside, X[0])
+            change = value / slope
+            X[0] -= np.clip(change, -1.0, 1.0)
+            # the square of the last correction is left
+            far = np.abs(change) > CLOSE * (1.0 + np.abs(X[0]))
+            if not np.any(far):
+                break
+        r, n = (np.array([polyval(X[0], c, tensor=False) for c in of]) for of in (axis, director))
+        X[1] = 0.5 + np.sum((gap - r) * n, axis=0) * self.largest / (
+            np.sum(n * n, axis=0) * self.height(e, X[0]))
+        X[:, far] = np.nan
+        return X
+
+
+def _cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+class InverseOfLines(Inverse):
+    """The same for a mesh of straight elements, with the coordinates of a point on the chord."""
+
+    def __init__(self, mesh: Any, heights: Array | None) -> None:
+        left, right = mesh.t
+        self.start = mesh.p[:, left]
+        self.chord = mesh.p[:, right] - self.start
+        self.square = self.chord[0] * self.chord[0] + self.chord[1] * self.chord[1]
+        self.largest, self.heights = mesh.height, heights
+
+    def __call__(self, x: Array, e: Any) -> Array:
+        gap, X = x - self.start[:, e, None], np.empty(x.shape)
+        chord, square = self.chord[:, e, None], self.square[e, None]
+        X[0] = (chord[0] * gap[0] + chord[1] * gap[1]) / square
+        X[1] = 0.5 + _cross(chord, gap) / (np.sqrt(square) * self.height(e, X[0]))
+        return X
+
+
+class Finder:
+    """Finds the elements of a :class:`~skfem_ancf.MeshBeam` that contain points, vectorised."""
+
+    def __init__(self, mesh: Any) -> None:
+        self.mesh, self.mapping = mesh, mesh.mapping()
+        self.inverse, self.is_chain = self.mapping.inverse, mesh.is_chain
+        self.size = float(np.abs(mesh.p).max())
+        # points of an exact curve may lie a little outside its cubic elements
+        self.allowed = 1e-6 if mesh.is_straight else 1e-3
+        #: Tolerance of equal distances from axes.
+        self.equal = 1e-8 * mesh.height
+
+    @cached_property
+    def _beside(self):
+        """The previous and the next element in the chain, (2, nelements); -1 at its ends."""
+        left, right = self.mesh.t
+        joined, e = right[:-1] == left[1:], np.arange(self.mesh.nelements)
+        out = np.empty((2, len(e)), int)
+        out[0, :1] = out[1, -1:] = -1
+        out[0, 1:], out[1, :-1] = np.where(joined, e[:-1], -1), np.where(joined, e[1:], -1)
+        return out
+
+    def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
+        """Elements (n,), reference points (2, n) and distances outside of them for points (2, n).
+
+        Distances are relative to the element: zero in the body, infinite far away. Of several
+        chains that contain a point the one with the nearest axis is taken; the fourth result is
+        true where there are several. ``chain`` restricts the search to the chain of this number.
+        """
+        noise = 1e-9 + 8 * EPS * (
+            self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
+        tied = np.zeros(x.shape[1], dtype=bool)
+        with np.errstate(all="ignore"):
+            if chain is not None:
+                some = np.flatnonzero(self.mesh.chains == chain)[None]
+                e, X, outside = self._best(x, some, noise)
+                return e, np.clip(X, 0.0, 1.0), outside, tied
+            if self.is_chain:
+                return *self._find(x, noise), tied
+            e, X, outside = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape), np.full(
+                x.shape[1], np.inf)
+            self._nearest_axis(x, noise, e, X, outside, tied)
+            left = np.flatnonzero(outside)
+            if len(left):
+                e[left], X[:, left], outside[left] = self._find(x[:, left], noise)
+        return e, X, outside, tied
+
+    def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
+        """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
+        e, X, outside, tied = self.find(x, chain)
+        if (outside > self.allowed).any():
+            raise self._refusal(x, outside, chain)
+        return e, X, tied
+
+    def from_axis(self, e: Array, X: Array) -> Array:
+        """Distance of reference points (2, n) of elements (n,) from the axis, shape (n,)."""
+        return np.abs(X[1] - 0.5) * np.ravel(self.inverse.height(e, X[0][:, None]))
+
+    def chains_at(self, x: Array) -> list[tuple[float, int]]:
+        """Chains that contain a point (2, 1), and the distances of their axes from it."""
+        found = []
+        for chain in range(int(self.mesh.chains[-1]) + 1):
+            e, X, outside, _ = self.find(x, chain)
+            if outside[0] == 0.0:
+                found.append((float(self.from_axis(e, X)[0]), chain))
+        return found
+
+    def _nearest_axis(self, x, noise, e, X, outside, tied):
+        """Among all elements that contain points choose those with the nearest axis, in place."""
+        k, some = self._around(x)
+        Y = self.inverse(x[:, k, None], some)[..., 0]
+        inside = self._outside(Y, noise) == 0.0
+        k, some, Y = k[inside], some[inside], np.clip(Y[:, inside], 0.0, 1.0)
+        off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
+        np.minimum.at(least, k, off)
+        near = off <= least[k] + self.equal
+        k, some, Y = k[near], some[near], Y[:, near]
+        order = np.lexsort((some, k))
+        at, first = np.unique(k[order], return_index=True)
+        first = order[first]
+        e[at], X[:, at], outside[at] = some[first], Y[:, first], 0.0
+        chains = self.mesh.chains
+        np.logical_or.at(tied, k, chains[some] != chains[e[k]])
+
+    def _around(self, x):
+        """Pairs of points and elements that may contain them: numbers (m,) of both."""
+        points, elements = [], []
+        for some, tree, radius in self._circles:
+            near = tree.query_ball_point(x.T, radius, return_sorted=False)
+            many = np.fromiter(map(len, near), dtype=int, count=len(near))
+            points.append(np.repeat(np.arange(x.shape[1]), many))
+            elements.append(some[np.concatenate([*near, []]).astype(int)])
+        return np.concatenate(points), np.concatenate(elements)
+
+    @cached_property
+    def _circles(self):
+        """Groups of elements of similar size: a tree of their centres and bounding circles."""
+        middle = self.mapping.F(np.array([[0.5], [0.5]])).reshape(2, -1)
+        radius = 0.51 * (self.mesh.lengths + self.mesh.height)
+        level = np.floor(np.log2(radius)).astype(int)
+        out = []
+        for k in np.unique(level):
+            some = np.flatnonzero(level == k)
+            out.append((some, scipy.spatial.cKDTree(middle[:, some].T), float(radius[some].max())))
+        return out
+
+    def _find(self, x, noise):
+        if self._line is not None:
+            # as :meth:`_find` on a single straight line
+            d, start = self._line
+            # a point of the section between two elements is one of the left
+            e = (start + noise * self.mesh.lengths)[1:].searchsorted(d @ x)
+            X = self.inverse(x[:, :, None], e)[..., 0]
+            outside = self._outside(X, noise)
+            outside[outside > 1.0] = np.inf
+            return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
+        e, X, outside = self._nearest(x, noise)
+        left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
+        if len(left):
+            e[left], X[:, left], outside[left] = self._best(
+                x[:, left], self._candidates(x[:, left]), noise)
+            for i in left[outside[left] > self.allowed]:  # rare: neighbouring coils are nearer
+                all_of_them = np.arange(self.mesh.nelements)[None]
+                e[i], X[:, i], outside[i] = (part[..., 0] for part in self._best(
+                    x[:, i:i + 1], all_of_them, noise))
+        return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
+
+    @staticmethod
+    def _outside(X, noise):
+        out = np.maximum(*np.abs(X - 0.5)) - 0.5
+        out[out < noise] = 0.0
+        out[np.isnan(out)] = FARTHEST
+        return out
+
+    @cached_property
+    def _samples(self):
+        samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
+        return self.mapping.F(samples).reshape(2, -1)
+
+    @cached_property
+    def _far(self):
+        """Points farther from all samples than this are outside all elements."""
+        return 0.75 * self.mesh.height + float(np.max(self.mesh.lengths))
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """A bounding box of the body: least and largest x, least and largest y."""
+        (x0, y0), (x1, y1) = (f(self._samples, axis=1).tolist() for f in (np.min, np.max))
+        return x0 - self._far, x1 + self._far, y0 - self._far, y1 + self._far
+
+    @cached_property
+    def _tree(self):
+        return scipy.spatial.cKDTree(self._samples.T)
+
+    def _candidates(self, x):
+        k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
+        near = self._tree.query(x.T, k=k)[1].reshape(x.shape[1], k)
+        return np.sort(near // SAMPLES, axis=1)
+
+    @cached_property
+    def _line(self):
+        """The direction of a single straight line, and where its elements begin; or None."""
+        mesh, d = self.mesh, self.mesh.p_X[:, 0]
+        one = mesh.is_straight and self.is_chain and np.ptp(mesh.p_X, axis=1).max() < 1e-9
+        return (d, d @ mesh.p[:, :-1]) if one else None
+
+    def _nearest(self, x, noise):
+        """The nearest element, or its neighbour where the point is beyond the common node."""
+        distance, near = self._tree.query(x.T)
+        e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
+        X, outside = np.empty(x.shape), np.empty(x.shape[1])
+        X[:], outside[:] = 0.5, np.inf
+        steps = 0
+        while len(todo):
+            X[:, todo] = self.inverse(x[:, todo, None], e[todo])[..., 0]
+            outside[todo] = self._outside(X[:, todo], noise)
+            # a point of the section between two elements is one of the left
+            before, after = self._beside[:, e[todo]]
+            other = np.where(X[0, todo] <= noise, before,
+                             np.where(X[0, todo] > 1.0 + noise, after, -1))
+            on, steps = (other >= 0) & (steps < WALK), steps + 1
+            todo = todo[on]
+            e[todo] = other[on]
+        return e, X, outside
+
+    def _best(self, x, candidates, noise):
+        """The best of the candidates (n, k) for each point."""
+        n, k = x.shape[1], candidates.shape[1]
+        candidates = np.broadcast_to(candidates, (n, k))
+        X = self.inverse(np.repeat(x, k, axis=1)[:, :, None], candidates.ravel())
+        X = X[..., 0].reshape(2, n, k)
+        outside = self._outside(X.reshape(2, -1), noise).reshape(n, k)
+        rows, which = np.arange(n), np.argmin(outside, axis=1)
+        return candidates[rows, which], X[:, rows, which], outside[rows, which]
+
+    @cached_property
+    def extent(self) -> str:
+        """Extent of the body as text."""
+        X = np.array(np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])).reshape(2, -1)
+        x = self.mapping.F(X).reshape(2, -1)
+        low, high = x.min(axis=1), x.max(axis=1)
+        return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
+                f"{low[1]:.6g} to {high[1]:.6g}")
+
+    def _refusal(self, x, outside, chain):
+        bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
+        x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
+        return MeshError(
+            f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
+            f"{'the body' if chain is None else 'the line that was named'}"
+            f"{more if len(outside) > 1 else ''}: points are given by their position in the "
+            f"reference configuration of height {mesh.height:.6g}, whose axis runs from "
+            f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")
+
 
 #: Tolerance for a point on a section, relative to an adjacent element.
 NEAR = 1e-6

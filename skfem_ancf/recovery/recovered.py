@@ -34,13 +34,13 @@ from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..beam.remembered import remembers
 from ..beam.strains import on_grid, stress_at
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.linear import largest
 from ..core.quadrature import gauss
 from ..core.types import Array, Law
-from ..formulations.continuum import EnhancedContinuum
+from ..formulations.base import EnhancedContinuum
 from ..materials import LinearLaw
-from ..mesh.refinement import by_element
+from ..mesh.numbering import by_element
 from ..sections import Layer
 from ..sections.across import EDGE
 from .section_forces import ALONG, NotFound, NotRecovered, SectionForces, Together

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.errors import AncfError
 from ..core.quadrature import gauss, lagrange
 from ..core.types import Array

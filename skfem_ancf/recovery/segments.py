@@ -10,7 +10,7 @@ import scipy
 from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 
 from ..beam.distribution import AXIS
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array
 from ..mesh.mapping import cross

@@ -9,8 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..core.errors import InputError, NameUnknown, require_index
-from ..core.near_misses import NearMisses
+from ..core.errors import InputError, NameUnknown, NearMisses, require_index
 from ..core.types import Array, StrPath
 from ..visuals.bode import plot_bode, plot_nyquist
 

@@ -18,11 +18,9 @@ from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
 from ..beam.rigid import RigidBody
-from ..core.caching import cached_property
-from ..core.errors import InputError, NameUnknown, require_flag, shown
-from ..core.immutable import Immutable
+from ..core.errors import InputError, NameUnknown, NearMisses, require_flag, shown
+from ..core.immutable import Immutable, cached_property
 from ..core.linear import first_order, step
-from ..core.near_misses import NearMisses
 from ..core.types import Array, Place
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.axial import LineLoad
 from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
-from ..actions.loads import DeadLoad, EndMoment, Load, number_at
+from ..actions.loads import DeadLoad, EndMoment, LineLoad, Load, number_at
 from ..actions.places import members_at
 from ..actions.symbols import Symbol, at_node, force_symbol, symbols
 from ..beam.beam import Beam

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeV
 
 from numpy.typing import ArrayLike
 
-from ..actions.axial import FollowerForce, LineLoad
 from ..actions.binding import bind_item
 from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
 from ..actions.energy import Energy
@@ -19,8 +18,8 @@ from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass
 from ..actions.item import Item
 from ..actions.joints import Hinge, Joint, Motor, Weld, get_joint
 from ..actions.joints.sliders import slider
-from ..actions.loads import EndMoment, Load, Pressure, Traction, Weight
-from ..actions.point_force import PointForce
+from ..actions.loads import EndMoment, LineLoad, Load, Pressure, Traction, Weight
+from ..actions.point_force import FollowerForce, PointForce
 from ..actions.obstacles import Obstacle
 from ..actions.pairs import BodyContact
 from ..actions.places import joined
@@ -29,8 +28,7 @@ from ..beam.beam import Beam
 from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
 from ..beam.rigid import RigidBody
-from ..core.errors import InputError, require_text, shown
-from ..core.near_misses import NearMisses
+from ..core.errors import InputError, NearMisses, require_text, shown
 from ..core.types import TimeFunction
 from ..materials.damping import Damping
 from ..mesh.places import on_other_mesh

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..beam.kinematics import bent
-from ..core.caching import cached_property
+from ..core.immutable import cached_property
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
                            require_flag, require_integer, require_option, require_positive)
 from ..core.linalg import NO_FACTORS

@@ -6,9 +6,8 @@ from typing import Any
 
 from ...core.errors import require_option
 from .base import Joint, bind_joint
-from .guides import OnCircle, OnLine, PlaneSection
-from .prescribed import Motor, PrescribedAngle, PrescribedPosition, PrescribedTurn
-from .sliders import Sleeve, Slot
+from .prescribed import Motor, PlaneSection, PrescribedAngle, PrescribedPosition, PrescribedTurn
+from .sliders import OnCircle, OnLine, Sleeve, Slot
 from .weld import Glue, Hinge, Weld
 
 #: The joints by name.

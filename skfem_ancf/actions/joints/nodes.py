@@ -13,8 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from ...beam.beam import Beam
 from ...beam.kinematics import direction
 from ...beam.layout import Layout
-from ...core.errors import MeshError
-from ...core.sampling import sample
+from ...core.errors import MeshError, sample
 from ...core.types import Array
 from ...mesh.frame_graph import FrameGraph
 from .base import Joint

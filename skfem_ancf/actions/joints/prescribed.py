@@ -1,4 +1,4 @@
-"""Prescribed motion of a point or a section, and motors."""
+"""Prescribed motion of a point or a section, plane sections, and motors."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ...beam.layout import Layout, WhichMember
+from ...beam.kinematics import plane
+from ...beam.layout import Layout, WhichBeam, WhichMember
 from ...beam.rigid import on_body
 from ...core.errors import (InputError, ask_number, require_finite_scalar, require_function,
-                            require_label)
-from ...core.sampling import sample
-from ...core.types import Array, TimeFunction
+                            require_label, sample)
+from ...core.types import Array, Place, TimeFunction
+from ...mesh.places import node_of
 from ..item import Item
 from ..loads import EndMoment
-from ..places import both_of, point, section
+from ..places import Vector, both_of, point, section
 from .base import Aligned, Joint, angle_to, gradients, rotation
 
 #: Largest number of intervals of an integral over time.
@@ -250,3 +251,38 @@ class Motor(Item):
         places = [(self.at, M)] + ([] if self.other is None else [(self.other, -M)])
         return [EndMoment(place, size, layout.number(which), amplitude)._with(couple=couple)
                 for (which, place), size in places]
+
+
+# an end section with fixed direction and free thickness
+
+class PlaneSection(Joint):
+    """t . r_Y = 0 at every section point: section slopes stay in the reference plane.
+
+    For a cable, n . r_X = 0. On a beam along a coordinate axis it only fixes degrees of freedom.
+
+    Parameters
+    ----------
+    at
+        The end section, "left" or "right".
+    """
+
+    def __init__(self, at: Place, beam: WhichBeam = None, name: str | None = None) -> None:
+        self.at, self.beam, self.name = at, beam, require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        beam = layout.beam(self.beam)
+        node = node_of(beam.mesh, self.at)
+        t = beam.mesh.p_X[:, node]
+        direction, fixed = plane(beam, t)
+        self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
+        first = layout.offset(beam) + node * beam.nd
+        self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in fixed)
+        self.slopes = [Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0)
+                       for k in fixed]
+        self.found = gradients(*([(slope, self.direction)] for slope in self.slopes))
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.array([self.direction @ slope(u) for slope in self.slopes])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found

@@ -1,4 +1,4 @@
-"""Sliders: a point on the axis of a beam, or on a straight line of a rigid body."""
+"""Sliders: a point on a line, a circle, the axis of a beam, or a line of a rigid body."""
 
 from __future__ import annotations
 
@@ -12,14 +12,93 @@ from numpy.typing import ArrayLike
 from ...beam.beam import Beam
 from ...beam.layout import Layout, WhichBeam, WhichMember, select_beam
 from ...beam.rigid import RigidBody
-from ...core.caching import array_cache
 from ...core.errors import (InputError, require_direction, require_finite, require_flag,
-                            require_label, shown)
+                            require_label, require_positive, shown)
+from ...core.immutable import array_cache
 from ...core.types import Array
 from ...mesh.mapping import cross
-from ...mesh.reference_cell import hermite_basis
+from ...core.quadrature import hermite_basis
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from .base import Aligned, Joint, angle_to, gradients, rotation
+
+
+class OnLine(Joint):
+    """n . (r - p) = 0: a material point slides on a straight line.
+
+    Parameters
+    ----------
+    at
+        The material point (x, y) in the reference configuration.
+    direction
+        Direction of the line, shape (2,).
+    through
+        A point of the line, shape (2,); by default the material point's reference position.
+    """
+
+    equations = ("force normal to the line",)
+
+    def __init__(self, at: ArrayLike, direction: ArrayLike, beam: WhichBeam = None,
+                 through: ArrayLike | None = None, name: str | None = None) -> None:
+        d = require_direction("direction", direction)
+        self.normal = np.array([-d[1], d[0]]) / np.hypot(*d)
+        self.through = None if through is None else require_finite("through", through, (2,))
+        self.beam, self.at, self.name = beam, at, require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        self.r = point(layout, self.beam, self.at)
+        self.p = self.r.start if self.through is None else self.through
+        self.found = gradients([(self.r, self.normal)])
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.array([self.normal @ (self.r(u) - self.p)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found
+
+
+class OnCircle(Joint):
+    """``(|r - c|^2 - R^2) / (2 R) = 0``: a material point slides on a circle.
+
+    Parameters
+    ----------
+    at
+        The material point (x, y) in the reference configuration.
+    center
+        Centre of the circle, shape (2,).
+    radius
+        Its radius; by default the distance of the point in the reference configuration.
+    """
+
+    equations = ("force away from the centre",)
+    constant = False
+
+    def __init__(self, at: ArrayLike, center: ArrayLike, beam: WhichBeam = None,
+                 radius: float | None = None, name: str | None = None) -> None:
+        self.center = require_finite("center", center, (2,))
+        self.radius = None if radius is None else require_positive("radius", radius)
+        self.beam, self.at, self.name = beam, at, require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        self.r = point(layout, self.beam, self.at)
+        self.R = self.radius or require_positive(
+            "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
+        if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):
+            raise InputError(f"radius = {self.R!r} is negligible against the distance of the point "
+                             "from the centre")
+
+    def value(self, u: Array, t: float) -> Array:
+        d = self.r(u) - self.center
+        return np.array([(d @ d - self.R**2) / (2 * self.R)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients([(self.r, (self.r(u) - self.center) / self.R)])
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        w = self.r.weights
+        values = np.einsum("ik,il->ikl", w, w) * (multipliers[0] / self.R)
+        rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)
+        return rows.ravel(), rows.transpose(0, 2, 1).ravel(), values.ravel()
+
 
 # the axis of a beam as a curve, and the closest point on it
 

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...core.caching import cached_property
+from ...core.immutable import cached_property
 from ...core.errors import InputError
 from ...core.linear import first_order
 from ...core.quadrature import gauss

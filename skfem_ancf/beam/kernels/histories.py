@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ...core.caching import cached_property
+from ...core.immutable import cached_property
 from ...core.types import Array
 from .elements import Elements
 from .law import HISTORY, material_of

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.caching import cached_property
+from ...core.immutable import cached_property
 from ...core.errors import InputError
 from ...core.types import Array
 from ...elements.base import ElementBeam
