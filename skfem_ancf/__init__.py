@@ -46,7 +46,7 @@ from .scene.scene import Scene
 from .scene.stepper import Stepper
 from .sections import Section
 from .results.modes import Buckling, Modes
-from .sweeps.parameter_sweep import Sweep, sweep
+from .sweeps import Sweep, sweep
 from .visuals.explore import Explorer
 
 __version__ = "0.1.0"

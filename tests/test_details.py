@@ -26,7 +26,7 @@ from skfem_ancf.equations.evaluation import mean_stiffness
 from skfem_ancf.io import PvdWriter
 from skfem_ancf.mesh.mapping import PLACES, halved
 from skfem_ancf.solvers import newton
-from skfem_ancf.solvers.tracing import Tracer
+from skfem_ancf.solvers.continuation import Tracer
 
 STEEL = StVenantKirchhoff(1e6, 0.3, 1.0)
 

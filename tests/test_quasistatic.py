@@ -8,7 +8,7 @@ from skfem_ancf import (Beam, CallbackError, Circle, ConvergenceError, ElementBe
                         ElementBeamANCFCubic, ElementBeamCable, InputError, Line, MeshBeam,
                         ModelWarning, NameUnknown, Ramp, Scene, Section, StepHistory, Steps,
                         StVenantKirchhoff, SupportError)
-from skfem_ancf.solvers import quasistatic
+from skfem_ancf.scene import quasistatic
 from skfem_ancf.solvers.outcome import StepFailed
 
 SOFT = StVenantKirchhoff(2e8, 0.3, 7800)

@@ -20,8 +20,7 @@ from ..core.types import Array, Place, StrPath
 from ..equations.system import System
 from ..io.tables import to_xarray
 from ..recovery.resultants import Resultants, over_time
-from ..results.acting import SpringForces
-from ..results.state import MaterialPoints, Reaction, State
+from ..results.state import MaterialPoints, Reaction, SpringForces, State
 from ..visuals.animation import animate
 from ..visuals.pyvista import Series
 from .base import Motion, Scheme

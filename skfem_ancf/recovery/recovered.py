@@ -296,7 +296,7 @@ class Recovery:
         try:
             self.segments = self._solved()
         except NotRecovered as why:
-            self.failed = isinstance(why, NotFound)
+            self.failed = why.failed
             self.why = self.why or str(why)
 
     @cached_property

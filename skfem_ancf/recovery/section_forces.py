@@ -38,9 +38,18 @@ BALANCED = 1e-4
 class NotRecovered(AncfError):
     """Section forces or fields cannot be recovered; the message says why."""
 
+    failed = False
+
+    @property
+    def why(self) -> str:
+        """The message."""
+        return str(self)
+
 
 class NotFound(NotRecovered):
     """An iteration of the recovery failed, mostly because of too large a strain."""
+
+    failed = True
 
 
 class Sections:

@@ -83,9 +83,7 @@ class Path(MaterialPoints):
         self.negative = [p.negative for p in points]
         self.stable = [p.stable for p in points]
         self.iterations = sum(p.iterations for p in points)
-        self.critical_points = [
-            CriticalPoint(c.kind, c.load, c.arc, self._state(c, f"{c.kind} point"), c.mode,
-                          c.change, c) for c in critical]
+        self.critical_points = list(critical)
 
     def __len__(self):
         return len(self.points)
@@ -101,14 +99,10 @@ class Path(MaterialPoints):
 
         return path_html(self)
 
-    def _state(self, p, message, iterations=0):
-        return State(self.system, p.u, p.load, p.force, True, iterations, message, (),
-                     p.multipliers, memory=p.history)
-
     def state(self, k: int) -> State:
         """Point ``k`` as a State."""
-        p = self.points[require_index("k", k, len(self.points))]
-        return self._state(p, f"point {k}", p.iterations)
+        return self.points[require_index("k", k, len(self.points))].state.replace(
+            message=f"point {k}")
 
     @property
     def v(self) -> Array:  # type: ignore[override]
@@ -117,7 +111,7 @@ class Path(MaterialPoints):
 
     def limit_points(self) -> Array:
         """Load factors at limit points, in the order of the path."""
-        return self._loads("limit")
+        return np.array([c.load for c in self.critical_points if c.kind == "limit"])
 
     def bifurcation_points(self) -> Array:
         """Load factors at bifurcations, in the order of the path.
@@ -125,9 +119,6 @@ class Path(MaterialPoints):
         :attr:`critical_points` has their states and modes; ``scene.continuation(branch=...)`` with
         one of them follows the branch.
         """
-        return self._loads("bifurcation")
-
-    def _loads(self, kind):
-        return np.array([c.load for c in self.critical_points if c.kind == kind])
+        return np.array([c.load for c in self.critical_points if c.kind == "bifurcation"])
 
     plot = plot_path

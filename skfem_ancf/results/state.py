@@ -8,12 +8,16 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from ..actions.eigenstrain import EigenStrain
+from ..actions.forces.base import Unscaled
+from ..actions.forces.springs import spring_force, spring_of
 from ..actions.item import Item
 from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of
 from ..beam.beam import Beam
+from ..beam.distribution import Sampled, station_of_node, stations_of_vector
 from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
@@ -29,9 +33,8 @@ from ..io import tables, vtu
 from ..recovery.fields import Values, find_field
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import Resultants, resultants
-from ..recovery.section_forces import NotFound, NotRecovered
+from ..recovery.section_forces import NotRecovered, SectionForces
 from ..visuals import html, matplotlib, pyvista
-from .acting import SpringForces, recover, stations
 from .checks import Checks, check
 
 
@@ -98,6 +101,51 @@ class MaterialPoints(NearMisses):
         found = require_body(self.system, body)
         s = self.system.of(found)
         return found.angular_velocity(self.u[..., s], self.v[..., s])
+
+
+class SpringForces:
+    """The method of states and histories for forces in springs."""
+
+    system: Any
+    u: Any
+    v: Any
+    base: Any = None
+    memory: Any = None
+    _columns: Any
+
+    def spring_force(self, spring: Any = 0) -> Any:
+        """Tension of a spring, or moment of a torsional spring against its rotation.
+
+        The force of the dashpot is included. A history returns an array of all instants, (nt,).
+
+        Parameters
+        ----------
+        spring
+            One of ``scene.elements``, or its number among the springs and torsional springs of the
+            scene, in the order in which they were added.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5),
+        ...             StVenantKirchhoff(1e9, 0.3), width=0.1)
+        >>> scene = Scene(beam).pin("left").spring(100.0, ((1, 0), (1, 1)), length=0.9)
+        >>> state = scene.line_load((0, -20.0)).solve_static()
+        >>> round(state.spring_force(), 2)
+        10.0
+        """
+        forces, base = self.system.forces, self.base
+        found = spring_of(forces.elements, spring)
+
+        def at(u, v, memory, start=None):
+            with self.system.histories.lent(memory):
+                forces.recall()
+                return spring_force(found, u, v, start)
+
+        if self.u.ndim > 1:
+            memories = (one if one.size else None for one in self._columns["history"])
+            return np.array([at(*row) for row in zip(self.u, self.v, memories)])
+        return at(self.u, self.v, self.memory, None if base is None else base.u)
 
 
 logger = logging.getLogger(__name__)
@@ -426,18 +474,79 @@ class State(Immutable, MaterialPoints, SpringForces):
     def _recovery_of(self, k, fields=True):
         """:meth:`recovery` of beam ``k``; with ``fields=False`` section forces suffice."""
         if k not in self._recoveries:
-            mates = [one for one in self._mates if k not in one._recoveries]
-            for one, found in zip(mates, recover(mates, k)):
+            mates, known = [one for one in self._mates if k not in one._recoveries], []
+            for one in mates:
+                try:
+                    known.append((one, one._section_forces(k)))
+                except NotRecovered as failure:
+                    one._recoveries[k] = failure
+            with np.errstate(all="ignore"):
+                together = Recovery.together([forces for _, forces in known],
+                                             [one._places_of(k) for one, _ in known])
+            for (one, _), found in zip(known, together):
                 one._recoveries[k] = found
-                if why := one._why(k):
+            for one in mates:
+                if why := one._recoveries[k].why:
                     logger.info("%r: strain and stress are those of the elements: %s",
                                 self.beams[k], why)
         found = self._recoveries[k]
         return None if isinstance(found, NotRecovered) or fields and found.why else found
 
-    def _why(self, k):
-        found = self._recoveries[k]
-        return str(found) if isinstance(found, NotRecovered) else found.why
+    def _section_forces(self, number):
+        """The SectionForces of a beam; raises NotRecovered."""
+        beam, system, unit, base = self.beams[number], self.system, self._unit, self.base
+        if base is not None and not np.iscomplexobj(unit):
+            raise NotRecovered("it is linearised about a state that is not free of load, a mode of "
+                               "it: its strain and stress are those of the elements")
+        s = system.of(beam)
+        acting = [(unit * self.load, load, self.t) for load in system.loads]
+        acting += [(unit, e.load, self._time) for e in system.forces.elements
+                   if isinstance(e, Unscaled)]
+        loads: list[Any] = []
+        for scale, load, t in acting:
+            if load.beam is beam:
+                at_rest = base is not None and not load.first_order
+                factor, now = load.acting(t)
+                loads.append((scale * factor, now.distribution(
+                    (base if at_rest else self).u_of(number))))
+        sampled, places = self._distributed(beam)
+        acceleration = viscous = None
+        if self.acceleration is not None:
+            acceleration = unit * (self.acceleration + system.damping.mass * self.v
+                                   + system.modal_damping.acceleration(self.v))[s]
+        time = system.retardation[number]
+        if self.t is not None and time:
+            viscous = beam.kernel.viscous_forces(self.u[s], self.v[s], time)
+        with np.errstate(all="ignore"):
+            return SectionForces(self._with_history(beam), self._places_of(number), loads,
+                                 [*self._stations[number], *places], acceleration, sampled,
+                                 viscous)
+
+    def _distributed(self, beam):
+        """Densities of distributed force elements, and axial coordinates of concentrated ones."""
+        system, base = self.system, self.base
+        sampled: list[Sampled] = []
+        places: list[float] = []
+        elements = [e for e in system.forces.elements if e.distributed]
+        if not elements:
+            return sampled, places
+        tables = system.backend.tables.plain.forces
+        force = -(system.forces.part_forces(tables, self.u, self.v) if base is None else self._unit
+                  * system.forces.small_part_forces(tables, self.load, base.u, self.u - base.u))
+        for element in elements:
+            if element.along is None:
+                raise NotRecovered(f"the distribution of {element!r} along the beam is not known")
+            where, facets, at = element.along
+            if where is not beam:
+                continue
+            places += at
+            rows = system.forces.rows_of(element)
+            for group in facets:
+                w = np.linalg.solve(np.vander(group.xi, increasing=True).T,
+                                    1.0 / np.arange(1, len(group.xi) + 1))  # of its own rule
+                values = force[:, rows[len(w) * group.chosen[:, None] + np.arange(len(w))]] / w
+                sampled.append(Sampled(group.where, group.elements, group.xi, values))
+        return sampled, places
 
     @property
     def recovered(self) -> dict[Any, str]:
@@ -449,7 +558,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         out = {}
         for k, beam in enumerate(self.beams):
             self._recovery_of(k)
-            out[k if beam.name is None else beam.name] = self._why(k)
+            out[k if beam.name is None else beam.name] = self._recoveries[k].why
         return out
 
     @property
@@ -460,9 +569,8 @@ class State(Immutable, MaterialPoints, SpringForces):
         for k in range(len(self.beams)):
             self._recovery_of(k)
         return [f"strain and stress{'' if beam.name is None else f' of beam {beam.name!r}'} are "
-                f"those of the elements, recovery failed: {self._why(k)}"
-                for k, beam in enumerate(self.beams) if isinstance(self._recoveries[k], NotFound)
-                or getattr(self._recoveries[k], "failed", False)]
+                f"those of the elements, recovery failed: {self._recoveries[k].why}"
+                for k, beam in enumerate(self.beams) if self._recoveries[k].failed]
 
     @cached_property
     def _recoveries(self):
@@ -475,7 +583,28 @@ class State(Immutable, MaterialPoints, SpringForces):
 
     @cached_property
     def _stations(self):
-        return stations(self)
+        """Axial coordinates (element + xi) of supports and joints, a list for each beam."""
+        system = self.system
+        fixed = np.zeros(system.N, dtype=bool)
+        fixed[system.constraints.fixed] = True
+        acting = system.forces.acting_rows()
+        J = None
+        if system.constraints.m or len(acting):
+            J = sparse.vstack([system.constraints.sparse_jacobian(self._acted, self._time),
+                               acting]).tocsc()
+        out: list[list[float]] = []
+        for beam, s in zip(system.beams, system.slices):
+            nodes = np.nonzero(np.any(fixed[s].reshape(-1, beam.nd), axis=1))[0]
+            found = [station_of_node(beam.mesh, int(k)) for k in nodes]
+            here = None if J is None else J[:, s]
+            for row in () if here is None else here[np.unique(here.indices)].toarray():
+                if np.any(row):
+                    # an equation between neighbouring nodes: at both
+                    loaded = np.nonzero(np.any(row.reshape(-1, beam.nd) != 0, axis=1))[0]
+                    found += (stations_of_vector(beam, row)
+                              or [station_of_node(beam.mesh, int(k)) for k in loaded])
+            out.append(found)
+        return out
 
     def resultants(self, at: Any = None, beam: WhichBeam = None,
                    recover: bool = True, line: int | None = None) -> Resultants:

@@ -3,28 +3,50 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..actions.forces.springs import Turns
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, require_finite,
-                           require_flag, require_increasing, require_integer, require_positive,
-                           shown)
+from ..core.errors import (ConvergenceError, InputError, Interrupted, ModelWarning, NameUnknown,
+                           require_finite, require_flag, require_increasing, require_integer,
+                           require_positive, shown, warn)
 from ..core.immutable import Immutable
 from ..core.progress import progress_bar
 from ..core.types import Array
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
 from ..dynamics.sensors import Recorder, Sensor
+from ..equations.stability import largest_displacement
 from ..equations.system import System
-from .solve import displacement
 from ..results.state import State
+from ..solvers.increment import Increment, Options, Route
+from ..solvers.newton import Search
 from ..solvers.newton import Steps as Rules
 from ..solvers.outcome import StaticResult, StepFailed
-from ..solvers.quasistatic import JUMPED, Instant, first, follow
+from .solve import displacement
+
+logger = logging.getLogger(__name__)
+
+#: Fraction of the allowed iterations up to which the next increment grows; its growth; reduction
+#: after a failure.
+FEW, LARGER, CUT = 0.7, 1.5, 0.25
+FOLLOWED, JUMPED, AT_REST = "followed", "jumped", "at rest"
+#: Smallest increment from rest, relative to the largest, of scenes that only loads or obstacles
+#: support: smaller loads stabilise no better. Two smaller ones are tried if all strategies fail.
+CUTS_AT_REST, LAST_AT_REST = CUT**3, CUT**5
+#: Iterations of a descent in an increment.
+BOUNDED = 40
+#: Largest number of consecutive jumps.
+JUMPS = 3
+#: Increments below this fraction of those asked for are slow; number of slow ones in a row after
+#: which the strategies of statics take a whole increment.
+SLOW, PATIENCE = 1e-2, 30
+#: Largest displacement of a node in an increment: in the first one relative to the scene's size,
+#: then relative to that at the last rate, or to the size.
+FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
 
 
 # named steps of a quasi-static run
@@ -140,9 +162,6 @@ class Steps(Immutable):
         return np.minimum(np.searchsorted(self.ends, t - 1e-12 * self.ends[-1]), len(self) - 1)
 
 
-logger = logging.getLogger(__name__)
-
-
 class QuasiStatic(Scheme):
     """Scheme of the states of a :class:`StepHistory`; motions may start from them, at rest."""
 
@@ -198,7 +217,11 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
 
     ``sensors`` are names and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
     """
-    ends = _ends_of(steps)
+    if isinstance(steps, dict):
+        raise InputError(f"steps are given by name as Steps(**{shown(steps)}), got a dict")
+    one = not isinstance(steps, (list, tuple, Steps)) and np.ndim(steps) == 0
+    ends = steps.ends if isinstance(steps, Steps) else require_increasing(
+        "steps", [steps] if one else steps)
     increments = require_integer("increments", increments, 1, 100000)
     rules = Rules("auto", require_positive("tol", tol),
                   require_integer("max_iterations", max_iterations, 1, 10000), 1.0,
@@ -231,28 +254,140 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     return made.history()
 
 
-def _ends_of(steps):
-    """Times at which steps end, (n,)."""
-    if isinstance(steps, Steps):
-        return steps.ends
-    if isinstance(steps, dict):
-        raise InputError(f"steps are given by name as Steps(**{shown(steps)}), got a dict")
-    one = not isinstance(steps, (list, tuple)) and np.ndim(steps) == 0
-    return require_increasing("steps", [steps] if one else steps)
+class Instant(NamedTuple):
+    """An equilibrium at a time."""
+
+    t: float
+    result: StaticResult
+    way: str  # how it was found: the name of a strategy
+    rate: float | None = None  # largest displacement of a node over the last increment of time
 
 
 def _begin(system, t, start, u, rules, stable):
-    """The first instant: ``start`` if it belongs to a run of the scene, or computed from it."""
+    """The first instant: ``start`` if it belongs to a run of the scene, or computed from it.
+
+    The residual at its displacement is reduced to zero in load steps. A scene that only loads and
+    obstacles stabilise may be at rest before they act.
+    """
     memory = system.histories.of_state(start)
     motion = None if start is None else start._motion
-    if motion is None or start.system is not system or not isinstance(
-            start._origin[0], QuasiStatic):
-        begin = first(system, t, u, memory, rules, stable)
-    else:
-        begin = Instant(t, StaticResult(u, start.multipliers, 1.0, np.zeros(system.N), [], True,
-                                        "given", memory=memory), "given")
-    begin.result.rubbed = 0.0 if motion is None else motion.dissipated
-    return begin
+    if motion is not None and start.system is system and isinstance(start._origin[0], QuasiStatic):
+        given = StaticResult(u, start.multipliers, 1.0, np.zeros(system.N), [], True, "given",
+                             memory=memory, rubbed=motion.dissipated)
+        return Instant(t, given, "given")
+    if memory is None:
+        system.forces.contacts.require_clear(np.zeros(system.N) if u is None else u, t)
+    with system.stopped_at(t):
+        search = Search(system, u, memory, rules, stable, False)
+        result = None
+        if search.stabilised_by_loads:
+            try:
+                result, way = search.at_rest(), AT_REST
+            except StepFailed:
+                logger.debug("t = %.6g: not at rest", t)
+        if result is None:
+            result = search.find()
+            way = result.attempts[-1].strategy
+    result.rubbed = 0.0 if motion is None else motion.dissipated
+    return Instant(t, result, way)
+
+
+def follow(system: System, ends: Array, increments: int, begin: Instant, rules: Rules,
+           stable: bool) -> Iterator[Instant]:
+    """Yield equilibria from ``begin`` on.
+
+    Each follows from the one before, by the mixed iteration, then by Newton's method, or by a
+    descent if obstacles or only loads stabilise the scene. An increment that fails or moves the
+    scene far is cut, since several equilibria may be close. If the smallest one fails, because the
+    equilibrium becomes unstable, the strategies of :func:`~skfem_ancf.solvers.newton.solve_static`
+    look for another one under constant loads. If increments stay below a hundredth of those asked
+    for, they take the next one as a whole, with a ModelWarning, so that the work is bounded.
+
+    ``ends`` are increasing times; ``increments`` is the number of instants of a grid between two of
+    them. Increments end at each of these instants, also after cuts. Raises StepFailed or
+    ConvergenceError.
+    """
+    yield begin
+    jumps = slow = 0
+    for end in ends[ends > begin.t]:
+        grid = np.linspace(begin.t, end, increments + 1)[1:]
+        most = (end - begin.t) / increments
+        size, least = most, rules.min_step * most
+        while begin.t < end:
+            stalled = slow > PATIENCE
+            if stalled:
+                warn(f"from t = {begin.t:.6g} on only increments of {size:.3g} succeed, where "
+                     f"{most:.3g} was asked for: the next one is solved as solve_static does, "
+                     "whatever the path in between", ModelWarning)
+                size, slow = most, 0
+            target = grid[grid.searchsorted(begin.t, side="right")]
+            parts = np.ceil((target - begin.t) / size - 1e-3)
+            t = target if parts <= 1.0 else begin.t + (target - begin.t) / parts
+            if begin.way == AT_REST:
+                least = max(least, CUTS_AT_REST * most)
+            smallest = stalled or size <= least
+            try:
+                found = _next(system, begin, t, rules, stable, smallest)
+            except (StepFailed, ConvergenceError) as failure:
+                if smallest and (begin.way != AT_REST or size < 2.0 * LAST_AT_REST * most):
+                    raise
+                logger.info("t = %.6g failed (%s), increment cut", t, failure)
+                size *= CUT
+                continue
+            jumps = jumps + 1 if found.way.startswith(JUMPED) else 0
+            if jumps > JUMPS:
+                raise StepFailed(f"at t = {t:.6g} even the smallest increments do not lead from "
+                                 "one equilibrium to the next")
+            slow = slow + 1 if size < SLOW * most else 0
+            if found.result.iterations <= FEW * rules.max_iterations:
+                size = min(LARGER * size, most)
+            begin = found
+            yield begin
+
+
+def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
+          smallest: bool) -> Instant:
+    """The equilibrium at t; by all strategies if the increment is the smallest."""
+    route = Route(last.result.u, None, (1.0, 1.0), (last.t, t))
+    start = StaticResult(**vars(last.result) | {
+        "load": 0.0, "steps": [], "rejected": 0, "unstable": False, "doubt": "",
+        "diverging": False})
+    failed: Any = None
+    far = FAR * system.size
+    if last.rate is not None:
+        far = max(NEAR * system.size, FASTER * last.rate * (t - last.t))
+
+    with system.stopped_at(t), system.histories.lent(span=t - last.t):
+        search = Search(system, last.result.u, last.result.memory, rules, stable, False)
+        bounded = search.touches or search.stabilised_by_loads
+        for method in ("mixed", "descent" if bounded else "newton"):
+            try:
+                if method == "descent":
+                    result = search.descent("mixed", most=BOUNDED)
+                else:
+                    step = Increment(system, start, 1.0, Options(
+                        route, method, rules.tol, rules.max_iterations, method == "mixed", True))
+                    with np.errstate(all="ignore"):  # overflow shows in the residual
+                        result = step.reached(step.solve(stable))
+            except StepFailed as failure:
+                failed = failure
+                continue
+            moved = largest_displacement(system, result.u - last.result.u)
+            if moved > far and not smallest:
+                failed = StepFailed(f"a node moves by {moved:.3g}")
+                continue
+            if method == "descent":
+                result.rubbed += last.result.rubbed
+            way = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
+            return Instant(t, result, way, moved / (t - last.t))
+        if not smallest:
+            raise failed
+        logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
+        result = search.find()
+        result.rubbed += last.result.rubbed
+    moved = largest_displacement(system, result.u - last.result.u)
+    way = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
+    return Instant(t, result, way, moved / (t - last.t))
 
 
 class _Record:
@@ -284,7 +419,8 @@ class _Record:
     def history(self) -> StepHistory:
         empty = np.zeros((0, self.system.N))
         columns: dict[str, Any] = {name: np.array(
-            [_stored(getattr(y, name)) for y in self._motions]) for name in COLUMNS}
+            [np.zeros(0) if (x := getattr(y, name)) is None else x for y in self._motions])
+            for name in COLUMNS}
         if not self._motions:
             columns |= dict.fromkeys(("u", "v", "acceleration"), empty)
         results = [instant.result for instant in self._instants]
@@ -294,7 +430,3 @@ class _Record:
             iterations=sum(x.iterations for x in results), factorizations=0, plan=self.plan,
             found_by=[x.way for x in self._instants],
             iterations_at=np.array([x.iterations for x in results], dtype=int))
-
-
-def _stored(value):
-    return np.zeros(0) if value is None else value

@@ -36,7 +36,7 @@ from ..results.path import CriticalPoint, Path
 from ..results.response import FrequencyResponse
 from ..results.state import State
 from ..solvers import continuation, eigen, newton
-from ..solvers.tracing import Point
+from ..solvers.continuation import Point
 from ..visuals.explore import Explorer, explorer
 from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
@@ -45,7 +45,7 @@ from .linear_model import LinearModel
 from .model import Entry, Model
 from .plan import Plan, make_plan
 from .quasistatic import StepHistory, Steps, run
-from .solve import (configuration, critical_of, displacement, solve_linear, solve_static, system_of,
+from .solve import (configuration, displacement, solve_linear, solve_static, system_of,
                     velocity_of, warn_about)
 from .stepper import Held, Stepper
 
@@ -503,11 +503,17 @@ class Scene(Model):
             system.constraints.require_supports()
             system.forces.contacts.require_path()
             system.forces.contacts.require_clear(np.zeros(system.N), 0.0)
-            critical = None if branch is None else critical_of(branch, system)
+            if branch is not None:
+                if not isinstance(branch, CriticalPoint) or branch.kind != "bifurcation":
+                    raise InputError("branch must be a point of path.critical_points of kind "
+                                     f"'bifurcation', got {shown(branch)}")
+                if branch.state.system is not system:
+                    raise InputError("the branch point belongs to another scene, or to this one "
+                                     "before it was changed: follow its path again")
             try:
                 return Path(system, *continuation(
                     system, steps, ds, ds_max, max_load, until, tol, max_iterations, locate,
-                    critical, side, progress))
+                    branch, side, progress))
             except (ConvergenceError, Interrupted) as error:
                 raise type(error)(str(error), Path(system, *error.state)) from None
 

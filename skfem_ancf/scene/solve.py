@@ -16,13 +16,12 @@ from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..beam.masses import projected
 from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
-                           SupportError, ask_field, require_finite, shown, warn)
+                           SupportError, ask_field, require_finite, warn)
 from ..core.types import Array
 from ..equations.matrices import linear_external_force, linear_force
 from ..equations.system import System
 from ..materials.damping import Damping
 from ..results.checks import warn_of
-from ..results.path import CriticalPoint
 from ..results.state import State
 from ..solvers import eigen
 from ..solvers.outcome import StaticResult
@@ -191,14 +190,3 @@ def warn_about(state: State) -> None:
     if state.doubt:
         warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
     warn_of(state)
-
-
-def critical_of(point: CriticalPoint, system: System) -> Any:
-    """The solver's data of a CriticalPoint of this system."""
-    if not isinstance(point, CriticalPoint) or point.kind != "bifurcation":
-        raise InputError("branch must be a point of path.critical_points of kind 'bifurcation', "
-                         f"got {shown(point)}")
-    if point.state.system is not system:
-        raise InputError("the branch point belongs to another scene, or to this one before it was "
-                         "changed: follow its path again")
-    return point.critical

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
                            require_function, require_integer, require_positive, shown)
+from ..core.linalg import NO_FACTORS
 from ..core.progress import progress_bar
+from ..core.types import Array
+from ..equations.evaluation import invert
+from ..equations.stability import position_weights
 from ..equations.system import System
-from .critical import Critical, find_critical
-from .tracing import Failed, Point, Tracer
+from ..results.path import CriticalPoint
+from ..results.state import MaterialPoints, State
+from .increment import rules_of
+from .iteration import CLOSED
+from .outcome import StepFailed
 
 logger = logging.getLogger(__name__)
 #: Largest number of steps.
@@ -21,13 +30,59 @@ MAX_STEPS = 10**6
 TURN = 0.03
 #: Shortest step, relative to ds.
 SHORTEST = 1e-6
+#: Relative motion of the nodes below which the load counts in the arc length.
+STILL = 1e-3
+#: How often a step is halved to separate critical points.
+DEPTH = 12
+
+
+@dataclass(eq=False, repr=False)
+class Point(MaterialPoints):
+    """An equilibrium of a path.
+
+    ``displacement(point)`` and ``position(point)`` are as those of a State; ``state`` is one, with
+    strain, stress, section forces and reactions. ``u`` (N,), ``multipliers`` (m,), ``load`` and
+    ``force`` (N,) are its data; ``arc`` is the arc length from the start, ``error`` the last
+    correction in the energy norm relative to the work done, ``iterations`` the linear systems
+    solved. ``rate``, ``tangent`` (N,) and ``multiplier_rate`` (m,) are derivatives of load,
+    displacement and multipliers by the arc length; at a critical point they are the null vector.
+    ``negative`` is the number of negative eigenvalues of the tangent stiffness on the null space of
+    J, None if loads have no potential. ``history`` is what forces remember of the path before.
+    """
+
+    system: System
+    u: Array
+    multipliers: Array
+    load: float
+    force: Array
+    arc: float = 0.0
+    error: float = 0.0
+    iterations: int = 0
+    rate: Any = np.nan
+    tangent: Any = None
+    multiplier_rate: Any = None
+    negative: Any = None
+    history: Any = None
+
+    @property
+    def v(self) -> Array:  # type: ignore[override]
+        return np.zeros_like(self.u)
+
+    @property
+    def state(self) -> State:
+        return State(self.system, self.u, self.load, self.force, True, self.iterations,
+                     "a point of a path", (), self.multipliers, memory=self.history)
+
+    @property
+    def stable(self) -> bool | None:
+        return None if self.negative is None else self.negative == 0
 
 
 def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: float | None = None,
                  max_load: float | None = None, until: Callable[[Point], bool] | None = None,
                  tol: float = 1e-8, max_iterations: int = 15, locate: float | None = 1e-8,
-                 branch: Critical | None = None, side: int = 1,
-                 progress: bool | None = None) -> tuple[list[Point], list[Critical]]:
+                 branch: CriticalPoint | None = None, side: int = 1,
+                 progress: bool | None = None) -> tuple[list[Point], list[CriticalPoint]]:
     """Follow the equilibrium path from the reference configuration or from a bifurcation point.
 
     A step advances by ``ds`` along the tangent of the path, in the norm of the mean nodal
@@ -71,7 +126,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
 
     Returns
     -------
-    points, critical : list of Point, list of Critical
+    points, critical : list of Point, list of CriticalPoint
 
     References
     ----------
@@ -90,8 +145,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
         raise InputError("side must be 1 or -1, got 0")
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
-    critical: list[Critical] = []
-    with system.histories.lent(None if branch is None else branch.history), progress_bar(
+    critical: list[CriticalPoint] = []
+    with system.histories.lent(None if branch is None else branch.state.memory), progress_bar(
             progress, total=steps, desc="path") as bar:
         points, step = [_start(tracer, branch, side)], ds
         while len(points) <= steps:
@@ -99,13 +154,12 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
             try:
                 point, bend = _step(tracer, start, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
-                    raise Failed("the path turns")
+                    raise StepFailed("the path turns")
                 last = abs(point.load) >= limit
                 if last:
                     point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
-                found = find_critical(tracer, start, point, locate) if (
-                    locate is not None and straight) else []
-            except (Failed, ConvergenceError) as failure:  # that of a law
+                found = _between(tracer, start, point, locate) if locate and straight else []
+            except (StepFailed, ConvergenceError) as failure:  # that of a law
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
                 if step < SHORTEST * ds:
@@ -117,13 +171,19 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
             except KeyboardInterrupt:
                 raise Interrupted(f"stopped at the load {start.load:.6g}; the exception's state is "
                                   "the path up to there", (points, critical)) from None
-            for one in [*found, point]:
+            for kind, one, change in found:
                 one.history = system.histories.after(start, one)
+                critical.append(CriticalPoint(
+                    kind, one.load, one.arc, one.state.replace(message=f"{kind} point"),
+                    one.tangent, change, one))
+            point.history = system.histories.after(start, point)
             system.histories.put(point.history)
-            critical += found
             points.append(point)
             bar.update(1)
-            if last or (until is not None and _ends(until, point)):
+            ends = last or (until is not None and ask("until(point)", until, point))
+            if not isinstance(ends, (bool, np.bool_)):
+                raise CallbackError(f"until(point) must return True or False, got {shown(ends)}")
+            if ends:
                 break
             growth = np.sqrt(6.0 / max(point.iterations, 1))
             if straight and bend > 0:
@@ -132,26 +192,147 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     return points, critical
 
 
-def _ends(until, point):
-    """The checked result of the user's function."""
-    answer = ask("until(point)", until, point)
-    if not isinstance(answer, (bool, np.bool_)):
-        raise CallbackError(f"until(point) must return True or False, got {shown(answer)}")
-    return answer
+class Tracer:
+    """Corrector and tangent of the equilibrium path of a system."""
+
+    def __init__(self, system: System, tol: float, max_iterations: int) -> None:
+        self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
+        weights = position_weights(system)
+        self.weights = weights / (0.5 * weights.sum() * system.size**2)
+        self.unit = system.constraints.values(1.0) - system.constraints.values(0.0)
+        #: weight of the load in the arc length, if it hardly moves the nodes
+        self.of_load: float = 0.0
+
+    def norm(self, v: Array) -> float:
+        """Mean nodal displacement over the size of the scene."""
+        return np.sqrt(v @ (self.weights * v))
+
+    def _drive(self, external, u, load):
+        """Derivatives of residual and constraints by the load."""
+        system, phi = self.system, np.zeros(self.system.constraints.m)
+        if system.constraints.drives:
+            h = 1e-6 * max(1.0, abs(load))
+            after, before = (system.constraints.constraint(u, load + x) for x in (h, -h))
+            phi = (after - before) / (2.0 * h)
+        if np.any(self.unit):
+            du0 = np.zeros(system.N)
+            du0[system.constraints.fixed] = self.unit
+            external = external - system.solver.multiply(du0)
+            if system.constraints.joints:
+                phi = phi + system.constraints.full_jacobian(u, load) @ du0
+        return external, -phi
+
+    def factorize(self, point: Point) -> tuple[Array, Array]:
+        """Factorise the tangent stiffness at a point and count its negative eigenvalues."""
+        system = self.system
+        system.assemble(point.u, point.load)
+        drive = self._drive(system.external_force(point.u), point.u, point.load)
+        try:
+            system.solver.factorize(point.u, point.load, point.multipliers)
+            if system.symmetric:
+                point.negative = system.solver.inertia().negative
+        except NO_FACTORS:
+            raise StepFailed("the tangent is singular") from None
+        return drive
+
+    def set_tangent(self, point: Point, after: Point | None = None) -> Point:
+        """Set the tangent of the path at a point."""
+        drive, phi = self.factorize(point)
+        dF, mF = self.system.solver.solve(drive, phi)
+        dF[self.system.constraints.fixed] += self.unit
+        size = np.hypot(self.norm(dF), self.of_load)
+        if not size > 0 or not np.isfinite(size):
+            raise StepFailed("the loads move nothing" if size == 0 else "the tangent is singular")
+        if after is not None and (self.weights * dF) @ (point.u - after.u) + self.of_load**2 * (
+                point.load - after.load) < 0:
+            size = -size
+        point.rate, point.tangent, point.multiplier_rate = 1.0 / size, dF / size, mF / size
+        return point
+
+    def advance(self, start: Point, ds: float) -> Point:
+        """The next point at the distance ds."""
+        first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
+        plane, normal = self.weights * start.tangent, self.of_load**2 * start.rate
+
+        def increment(step, dl, dR, dF):  # the plane at distance ds
+            return (ds - plane @ (step + dR) - normal * dl) / (plane @ dF + normal)
+
+        return self.correct(start, first, increment, ds)
+
+    def _small(self, residual, *forces):
+        """True if a residual (N,) is within tolerance, as in statics; before K has factors."""
+        e, rules, weights = self.system.backend.tables.plain, self.rules, self.system.K.diagonal()
+        invert(weights, e.sizes)
+        norms = np.sqrt([x * x @ weights for x in (residual * e.free, *forces)])
+        return bool(norms[0] <= rules.tol * norms[1:].max() + rules.force_floor)
+
+    def correct(self, start: Point, first: tuple[Any, Any, Any], increment: Callable[..., float],
+                ds: float) -> Point:
+        """Iterate from ``start`` and first increments of u, multipliers and load.
+
+        ``increment`` gives the next one of the load.
+        """
+        system, weights = self.system, self.weights
+        u, m, load = start.u, start.multipliers, start.load
+        _, stresses = system.assemble(u, load)
+        du, dm, dl = first
+        step, work, rules = np.zeros(system.N), np.inf, self.rules
+        for k in range(1, rules.iterations + 1):
+            independent = system.linearised_stress(u, stresses, du)
+            u, m, load, step = u + du, m + dm, load + dl, step + du
+            with np.errstate(over="ignore", invalid="ignore"):
+                force, stresses = system.assemble(u, load, independent)
+                external = system.external_force(u)
+            if not np.all(np.isfinite(force)):
+                raise StepFailed("the strain is not finite")
+            residual, phi = load * external - force, system.constraints.constraint(u, load)
+            if system.constraints.joints:
+                residual = residual - m @ system.constraints.jacobian(u, load)
+            closed = np.all(np.abs(phi) <= CLOSED * system.backend.tables.plain.joints.sizes)
+            reference = np.sqrt(max(abs(force @ u), abs(load * (external @ u)),
+                                    abs(external @ step * dl)))
+            if closed and work <= rules.tol * reference + rules.floor and self._small(
+                    residual, force, load * external):
+                return Point(self.system, u, m, load, force, start.arc + ds,
+                             work / reference if reference > 0 else 0.0, k)
+            drive, gap = self._drive(external, u, load)
+            try:
+                system.solver.factorize(u, load, m)
+                dR, mR = system.solver.solve(residual, -phi)
+                dF, mF = system.solver.solve(drive, gap)
+            except NO_FACTORS:
+                raise StepFailed("the tangent is singular") from None
+            dF[system.constraints.fixed] += self.unit
+            dl = increment(step, load - start.load, dR, dF)
+            du, dm = dR + dl * dF, mR + dl * mF
+            if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
+                raise StepFailed("the iteration leaves the path")
+            work = np.sqrt(abs((residual * system.constraints.free) @ du) + abs(phi @ dm)
+                           + abs(dl * (external @ du)))
+        raise StepFailed(f"no convergence in {rules.iterations} iterations")
 
 
 def _start(tracer, branch, side):
     """The first point of a path."""
-    if branch is None:
-        point = tracer.stress_free()
-        try:
-            return tracer.begin(point)
-        except Failed as failure:
-            raise ConvergenceError(f"the path cannot begin: {failure}", ([point], [])) from None
-    point = Point(tracer.system, branch.u, branch.multipliers, branch.load, branch.force, 0.0,
-                  branch.error, 0)
-    point.tangent, point.multiplier_rate = side * branch.mode, side * branch.multiplier_mode
-    point.rate, point.negative, point.history = 0.0, branch.negative, branch.history
+    if branch is not None:
+        point = branch.critical
+        return replace(point, arc=0.0, tangent=side * point.tangent,
+                       multiplier_rate=side * point.multiplier_rate)
+    system = tracer.system
+    zero = np.zeros(system.N)
+    point = Point(system, zero, np.zeros(system.constraints.m), 0.0, zero)
+    # loads that move no node count with the strain that their forces could cause
+    forces = float(np.abs(system.external_force(zero)) @ system.constraints.coordinate_sizes)
+    tracer.of_load = forces / system.scales.energy_of_strains if forces > 0 else 0.0
+    try:
+        tracer.set_tangent(point)
+    except StepFailed as failure:
+        raise ConvergenceError(f"the path cannot begin: {failure}", ([point], [])) from None
+    motion = tracer.norm(point.tangent)
+    if motion > STILL * tracer.of_load * point.rate:
+        tracer.of_load = 0.0
+        point.rate, point.tangent = point.rate / motion, point.tangent / motion
+        point.multiplier_rate = point.multiplier_rate / motion
     return point
 
 
@@ -170,22 +351,108 @@ def _step(tracer, start, ds):
 def _land(tracer, start, point, load):
     """The point between two at which the load is reached."""
     h, low, high, x = point.arc - start.arc, 0.0, 1.0, 1.0
-    for _ in range(60):  # bisection of the cubic interpolation of the load
+    # cubic interpolation of the load, by the fraction of the arc length
+    b, gap = h * start.rate, point.load - start.load
+    c, d = 3 * gap - 2 * b - h * point.rate, -2 * gap + b + h * point.rate
+    for _ in range(60):  # bisection
         x = 0.5 * (low + high)
-        low, high = (x, high) if abs(load_between(start, point, x)) < abs(load) else (low, x)
+        below = abs(start.load + x * (b + x * (c + x * d))) < abs(load)
+        low, high = (x, high) if below else (low, x)
     near = point
     if x < 1.0 - 1e-9:
         near = tracer.set_tangent(tracer.advance(start, x * h), start)
     ds = (load - near.load) / near.rate
-    landed = tracer.at_load(near, load, (ds * near.tangent, ds * near.multiplier_rate))
+    first = ds * near.tangent, ds * near.multiplier_rate, load - near.load
+    landed = tracer.correct(near, first, lambda step, dl, dR, dF: 0.0, np.inf)
     landed.load, landed.arc = load, near.arc + ds
     return tracer.set_tangent(landed, start)
 
 
-def load_between(p: Point, q: Point, x: float) -> float:
-    """Cubic interpolation of the load at a fraction x of the arc length between two points."""
-    h = q.arc - p.arc
-    a, b = p.load, h * p.rate
-    c = 3 * (q.load - a) - 2 * b - h * q.rate
-    d = -2 * (q.load - a) + b + h * q.rate
-    return a + x * (b + x * (c + x * d))
+def _between(tracer, p, q, tol):
+    """The critical points between two points with tangents, in order: kind, Point, change."""
+    out, stack = [], [(p, q, 0)]
+    while stack:
+        a, b, depth = stack.pop()
+        turns = a.rate * b.rate < 0
+        change: Any = None if a.negative is None else b.negative - a.negative
+        if not turns and not change:
+            continue
+        single = change is None or (abs(change) == 1) if turns else abs(change) == 1
+        if single or depth == DEPTH:
+            if turns and change == 0:
+                continue  # a limit point changes the number: these rates are round-off
+            if turns:
+                out.append(("limit", _limit(tracer, p, a, b, tol), change))
+            if not turns or (not single and abs(change) != 1):
+                out.append(("bifurcation", _bifurcation(tracer, p, a, b, tol), change))
+            continue
+        middle = _at(tracer, p, 0.5 * (a.arc + b.arc), b)
+        stack += [(middle, b, depth + 1), (a, middle, depth + 1)]
+    return out
+
+
+def _at(tracer, p, arc, b):
+    """The point at an arc length after p, or b."""
+    return b if arc >= b.arc else tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
+
+
+def _limit(tracer, p, a, b, tol):
+    """The limit point between a and b, by the Illinois method for the rate of the load."""
+    end = tol * (b.arc - p.arc)
+    low, high, f, g, best = a, b, a.rate, b.rate, b
+    for _ in range(100):
+        x = (low.arc * g - high.arc * f) / (g - f)
+        best = _at(tracer, p, min(max(x, low.arc + 0.01 * end), high.arc - 0.01 * end), b)
+        # parabola of the load, with the second derivative from the rates at both ends
+        gap = 0.5 * best.rate**2 * (b.arc - a.arc) / abs(b.rate - a.rate)
+        if gap <= 0.1 * tol * abs(best.load):
+            break
+        if f * best.rate > 0:
+            moved, low, f, g = best.arc - low.arc, best, best.rate, 0.5 * g
+        else:
+            moved, high, g, f = high.arc - best.arc, best, best.rate, 0.5 * f
+        if min(moved, high.arc - low.arc) <= end:
+            break
+    return replace(best, iterations=0, negative=a.negative)
+
+
+def _bifurcation(tracer, p, a, b, tol):
+    """Where the count of negative eigenvalues changes: bisection, and secants of the smallest."""
+    end = tol * (b.arc - p.arc)
+    mode, values = None, {}
+    low, high, best = a, b, b
+    for _ in range(100):
+        x = 0.5 * (low.arc + high.arc)
+        f, g = values.get(low.arc), values.get(high.arc)
+        if f is not None and g is not None and f * g < 0:
+            guess = (low.arc * g - high.arc * f) / (g - f)
+            # overshoot slightly, so that both ends converge
+            guess += np.sign(x - guess) * 0.1 * min(guess - low.arc, high.arc - guess)
+            x = guess
+        best = _at(tracer, p, x, b)
+        mode, value = _smallest(tracer, best, mode)
+        values[best.arc] = value
+        low, high = (best, high) if best.negative == a.negative else (low, best)
+        if high.arc - low.arc <= end:
+            break
+    v, m = mode
+    return replace(best, iterations=0, rate=0.0, tangent=v / tracer.norm(v),
+                   multiplier_rate=m / tracer.norm(v), negative=a.negative)
+
+
+def _smallest(tracer, point, start=None):
+    """The eigenvalue closest to zero of the tangent stiffness over its diagonal, and its vector.
+
+    By the inverse power method from ``start``, a vector (N,) and multipliers (m,).
+    """
+    system = tracer.system
+    tracer.factorize(point)
+    D, none = np.abs(system.K.diagonal()) * system.constraints.mask, np.zeros(system.constraints.m)
+    x = np.random.default_rng(0).standard_normal(system.N) if start is None else start[0]
+    x, value = x * system.constraints.mask, np.nan
+    for _ in range(12 if start is None else 4):
+        x = x / np.sqrt(x @ (D * x))
+        y, m = system.solver.solve(D * x, none)
+        value = 1.0 / (x @ (D * y))
+        x = y
+    return (x, m), value

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import (CallError, CallbackError, InputError, Interrupted, MissingExtra,
+from .core.errors import (CallError, CallbackError, InputError, Interrupted, MissingExtra,
                            NameUnknown, PickleError, SweepWarning, require_function,
                            require_integer, require_like, shown, warn)
-from ..core.progress import progress_bar
-from ..core.types import Array, ArrayLike
+from .core.progress import progress_bar
+from .core.types import Array, ArrayLike
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -318,3 +318,6 @@ def _column(values):
         column = np.empty(len(values), dtype=object)
         column[:] = values
         return column
+
+
+__all__ = ["Failure", "Sweep", "sweep"]

@@ -1,5 +1,0 @@
-"""Parameter sweeps over scenes."""
-
-from .parameter_sweep import Failure, Sweep, sweep
-
-__all__ = ["Failure", "Sweep", "sweep"]
