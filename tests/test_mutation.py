@@ -37,8 +37,8 @@ def test_files_without_a_choice(mutation):
     assert {"beam/beam.py", "elements/ancf.py", "beam/kernels/section.py"} <= set(found)
     assert not [name for name in found
                 if name.startswith(("visuals/", "io/", "core/loops", "core/jit"))]
-    every = mutation.mutants("actions/axial.py")
-    assert len(every) > 10 and every == mutation.mutants("actions/axial.py")
+    every = mutation.mutants("actions/point_force.py")
+    assert len(every) > 10 and every == mutation.mutants("actions/point_force.py")
 
 
 def test_a_name_that_is_no_file(mutation):
