@@ -7,7 +7,7 @@ the formulation does with E. For other laws see :mod:`skfem_ancf.actions.eigenst
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, ClassVar, cast
 
@@ -29,6 +29,7 @@ from ..formulations import COMPONENTS
 from ..sections import Layer
 from .item import Item, takes_time
 from .loads import Amplitude, Load
+from .symbols import Symbol, middle
 
 # eigenstrains of nonlinear laws
 
@@ -285,6 +286,15 @@ class EigenStrain(Load):
         layers = self.beam.across.layers
         return self.beam.across.of_layers(
             X, E0, lambda k: layers[k].material.axial_modulus * E0, e)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        for name in self.given:
+            given, what = getattr(self, name), "ΔT" if name == "change" else f"eps_{name}"
+            if callable(given):
+                yield Symbol("eigenstrain", (middle(layout, self.beam),), text=f"{what}(x, y)")
+            elif given is not None:
+                yield Symbol("eigenstrain", (middle(layout, self.beam),), show=True,
+                             text=f"{what} = ", value=given)
 
 
 class Temperature(EigenStrain):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import urandom
 from typing import TYPE_CHECKING, Any
 
@@ -106,6 +106,32 @@ class Item(Immutable):
         Do not change ``self``, which is bound to other meshes later.
         """
         return self._thawed()
+
+    def symbols(self, layout: Layout) -> Iterable[Any]:
+        """What a picture shows of it, with its beam by number; nothing by default.
+
+        Returns
+        -------
+        list of :class:`skfem_ancf.actions.symbols.Symbol`
+
+        Examples
+        --------
+        A user-defined item, drawn as a mass:
+
+        >>> from skfem_ancf import Beam, ElementBeamCable, Item, MeshBeam, Scene, StVenantKirchhoff
+        >>> from skfem_ancf.actions.places import point
+        >>> from skfem_ancf.actions.symbols import Symbol
+        >>> class Magnet(Item):
+        ...     def energy(self, u, t):
+        ...         return 1e-3 * u[-4]**2
+        ...     def symbols(self, layout):
+        ...         return [Symbol("mass", (point(layout, 0, "right"),), text="magnet ", value=7.0)]
+        >>> beam = Beam(MeshBeam.init_line([0, 1, 2], height=0.1), ElementBeamCable(3),
+        ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+        >>> [text.get_text() for text in Scene(beam).clamp("left").add(Magnet()).plot().texts]
+        ['magnet 7']
+        """
+        return ()
 
     def same(self, other: Any) -> bool:
         """True if both are copies of one item, bound or not."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
 from typing import Any, cast
 
@@ -29,7 +29,9 @@ from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .item import Item, beside, require_entries
-from .places import members_at, nearest_of
+from .places import Vector, members_at, nearest_of, section
+from .symbols import (ARROWS, Symbol, arrows_along, at_node, faces_of, force_symbol, inside,
+                      values_at)
 
 #: Warn of a traction on a cable if its neglected moment exceeds these parts of force times length,
 #: and of force times height (round-off).
@@ -190,6 +192,15 @@ class Load(Item):
         stations = stations_of_vector(self.beam, self.force(u))
         return None if stations is None else Distribution(stations=stations)
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        beam = layout.beam(self.beam)  # user-defined loads and forms: nodal forces
+        if isinstance(beam, Beam):
+            given = self if isinstance(self, DeadLoad) else self.bind(beam)
+            force = given.force(np.zeros(beam.N)).reshape(-1, beam.nd)[:, :2]
+            loaded = np.flatnonzero(np.hypot(*force.T) > 1e-9 * np.abs(force).max())
+            some = loaded[::1 + len(loaded) // (2 * ARROWS)]
+            yield force_symbol((at_node(layout, beam, k) for k in some), force[some], show=False)
+
     def __repr__(self):
         return f"<{type(self).__name__} on {self.beam!r}>"
 
@@ -301,6 +312,9 @@ class Weight(Load):
         distribution = Distribution(gravity=self.g) if isinstance(beam, Beam) else None
         return DeadLoad(beam, beam.weight(self.g), self.amplitude, distribution, self.g)
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield force_symbol([Vector(np.zeros(2))], self.g)._replace(kind="weight", text="g = ")
+
 
 def number_at(layout: Layout, at: Any, beam: Any) -> int:
     """The number of a beam or body; if none is named, of the one that has a point."""
@@ -349,6 +363,10 @@ class Traction(Load):
             _warn_of_lever(beam, found, forces)
         return DeadLoad(beam, vector, self.amplitude, on_facets(
             beam.mesh, np.concatenate([one.facets for one in found]), traction=t))
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        for at, _, _ in faces_of(layout, layout.beam(self.beam), self.boundary):
+            yield force_symbol(at, values_at(self.t, at))
 
 
 def _warn_of_lever(beam, surfaces, forces):
@@ -477,6 +495,10 @@ class Pressure(Load):
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         return self.matrix.row, self.matrix.col, self.matrix.data
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        for at, normals, turns in faces_of(layout, layout.beam(self.beam), self.boundary):
+            yield force_symbol(at, -self.p * normals, turns)._replace(text="p = ")
+
 
 class EndMoment(Load):
     """A moment M on a section, with the potential -M times the angle of the section.
@@ -567,6 +589,10 @@ class EndMoment(Load):
     def potential(self, u: Array) -> float:
         return -self.M * self.angle(u)
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield Symbol("moment", (section(layout, self.beam, self.boundary)[0],), value=self.M,
+                     show=True)
+
 
 # loads that depend on time
 
@@ -626,6 +652,18 @@ class TimedLoad(Load):
             return self.acting(None)[1].distribution(u)
         return self._distribution
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        beam = layout.beam(self.beam)
+        for t in (0.0, 1.0) if self._time is None else (self._time,):
+            try:
+                places = self.bind(beam).places(t)
+            except AncfError:  # beyond the end of the beam
+                continue
+            yield from (force_symbol([inside(layout, beam, e, *X)], force)
+                        for force, e, X in places)
+            if places:
+                return
+
 
 class LineLoad(Load):
     """A dead force per length of the reference axis.
@@ -641,6 +679,8 @@ class LineLoad(Load):
 
     #: Numbers of the loaded chains of elements, shape (k,); None for all.
     chains: Any = None
+    #: Of one in a picture: the time at which it is drawn.
+    _time: float | None = None
 
     def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -653,6 +693,19 @@ class LineLoad(Load):
             return LineLoadInTime(beam, self.chains, given, self.amplitude)
         vector, distribution = _along_axis(beam, self.chains, given, "force(x)")
         return DeadLoad(beam, vector, self.amplitude, distribution)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        beam = layout.beam(self.beam)
+        given: Any = self.per_length
+        chains = np.unique(beam.mesh.chains) if self.chains is None else self.chains
+        times = (0.0, 1.0) if self._time is None else (self._time,)
+        functions = [given] if not of_place_and_time(given) else [
+            lambda x, t=t: given(x, t) for t in times]
+        for k, chain in enumerate(chains):
+            at = [inside(layout, beam, *place) for place in arrows_along(
+                np.flatnonzero(beam.mesh.chains == chain), len(chains))]
+            found = [values_at(function, at) for function in functions]
+            yield force_symbol(at, next(filter(np.any, found), found[0]), show=k == 0)
 
 
 def _along_axis(beam, chains, given, name):

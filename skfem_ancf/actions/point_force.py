@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -21,6 +21,8 @@ from ..core.errors import (InputError, ask, require_direction, require_finite,
 from ..core.types import Array, TimeFunction
 from ..mesh.places import as_point
 from .item import Item
+from .places import point, section
+from .symbols import Symbol, force_symbol, inside
 from .loads import DeadLoad, Load, TimedLoad, number_at
 
 # a dead force on a point of a cable beside its axis: a force on the axis and a couple
@@ -141,11 +143,8 @@ class PointForce(Load):
         vector, distribution = on_points(beam, [(self.total, e, X)])
         return DeadLoad(beam, vector, self.amplitude, distribution)
 
-
-
-
-
-
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield force_symbol([_place(self, layout)], self.total)
 
 
 class MovingForce(TimedLoad):
@@ -356,3 +355,16 @@ class FollowerForce(Load):
             return Distribution()
         e, xi = self._place
         return Distribution(stations=(e + xi,), points=((e, xi, self._force(u).T),))
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield force_symbol([_place(self, layout)], self.total,
+                           [section(layout, self.beam, self.at)[1]])
+
+
+def _place(load, layout):
+    """Position of a force, in a picture."""
+    beam = layout.beam(load.beam)
+    if not isinstance(beam, Beam):
+        return point(layout, load.beam, load.at)
+    e, X = locate(beam, load.at)
+    return inside(layout, beam, e, *X)

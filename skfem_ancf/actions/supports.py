@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..core.errors import InputError, SupportError, require_finite_scalar, requi
 from ..core.types import Place
 from ..mesh.places import is_point, node_of
 from .item import Item
+from .symbols import Symbol, supports_of
 from .joints.weld import Hinge
 from .joints.prescribed import PlaneSection, PrescribedDisplacement
 
@@ -69,6 +70,9 @@ class Support(Item):
                 node, k = divmod(d - first, beam.nd)
                 raise SupportError(f"degree of freedom {beam.dofnames[k]} of node {node} is fixed "
                                    f"twice, with displacements {fixed[d]!r} and {value!r}")
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        return supports_of(layout, self.beam, self.boundary, self.names)
 
     def __repr__(self) -> str:
         names = "all" if self.names is None else self.names

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,10 @@ from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
 from ..actions.loads import DeadLoad, EndMoment, LineLoad, Load, number_at
 from ..actions.places import members_at
-from ..actions.symbols import Symbol, at_node, force_symbol, symbols
+from ..actions.symbols import Symbol, at_node, force_symbol
 from ..beam.beam import Beam
 from ..beam.kinematics import direction
-from ..beam.layout import WhichBeam, WhichMember
+from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody
 from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
                            require_integer, require_names, require_option, require_options,
@@ -57,6 +57,11 @@ class NodeForce(Load):
         vector.reshape(-1, beam.nd)[chain_ends(beam).ravel()[self.ends], :2] = self.value
         return DeadLoad(beam, vector, self.amplitude)
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        beam = layout.beam(self.beam)
+        for node in chain_ends(beam).ravel()[self.ends].tolist():
+            yield force_symbol([at_node(layout, beam, node)], self.value)
+
 
 class NodeMoment(EndMoment):
     """A moment on the section at an end, with the angle in (-pi, pi]."""
@@ -75,19 +80,10 @@ class NodeMoment(EndMoment):
         start = self.beam.q0_local[self.dofs] @ self.c @ [1.0, 1.0j]
         return float(np.angle(self.direction(u) @ [1.0, 1.0j] / start))
 
-
-@symbols.register(NodeForce)
-def _(load, layout):
-    beam = layout.beam(load.beam)
-    for node in chain_ends(beam).ravel()[load.ends].tolist():
-        yield force_symbol([at_node(layout, beam, node)], load.value)
-
-
-@symbols.register(NodeMoment)
-def _(load, layout):
-    beam = layout.beam(load.beam)
-    node = int(chain_ends(beam).ravel()[load.end])
-    yield Symbol("moment", (at_node(layout, beam, node),), value=load.M, show=True)
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        beam = layout.beam(self.beam)
+        node = int(chain_ends(beam).ravel()[self.end])
+        yield Symbol("moment", (at_node(layout, beam, node),), value=self.M, show=True)
 
 
 class Frame(Scene):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from ..actions.loads import LineLoad, Load, TimedLoad
 from ..actions.places import Vector
-from ..actions.symbols import LOADS, Symbol, all_symbols
+from ..actions.symbols import LOADS, Symbol
 from ..beam.layout import Layout
 from ..core.errors import InputError
 from ..core.types import Array
@@ -25,7 +27,8 @@ NOTES = "eigenstrain", "drag"
 def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> list[Symbol]:
     """Symbols of the loads, and of all other items, of the scene of a state.
 
-    With ``start`` loads have their full values, as before the solution.
+    With ``start`` loads have their full values, as before the solution; those that move or depend
+    on time are those at time 0, or at 1 if they vanish there.
     """
     if not (loads or supports):
         return []
@@ -33,8 +36,15 @@ def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> 
     if getattr(system, "items", None) is None:
         raise InputError("this state does not know the items of its scene, as it comes from another"
                          " process or a file: draw them by scene.plot()")
-    found = all_symbols(system.items, Layout(*system.members),
-                        1.0 if start else state.load, state.t, start)
+    layout, found, t = Layout(*system.members), list[Symbol](), state.t
+    for item in chain.from_iterable(one.expand(layout) for one in system.items):
+        factor = 1.0
+        if isinstance(item, (TimedLoad, LineLoad)) and not start:
+            item = item._with(_time=1.0 if t is None else t)
+        if isinstance(item, Load):
+            factor = item.factor(t) * (state.load if item.scaled and not start else 1.0)
+        found += [s._replace(value=s.value * factor) if s.kind in LOADS else s
+                  for s in item.symbols(layout)]
     return [s for s in found if (loads if s.kind in LOADS else supports)]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from ...core.errors import (InputError, ask_array, ask_number, require_function,
 from ...core.types import Array
 from ...mesh.places import is_point
 from ..places import GROUND, Vector, is_ground, named_place, point, section
+from ..symbols import Symbol
 from .base import ForceElement, differences
 from .kernels import turned, turning
 
@@ -182,6 +183,9 @@ class Control(ForceElement):
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         return differences(lambda w: self.force(x, w, t), v)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield Symbol("control", (self._point(layout, self.at),), text=f"{self.kind}(t, ...)")
 
     def __repr__(self) -> str:
         how = "" if self.dt is None else f", sampled every {self.dt:g}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from ...core.errors import (InputError, require_finite, require_finite_scalar, r
 from ...core.types import Array
 from ..item import Item
 from ..places import Vector, point, section
+from ..symbols import Symbol
 from .base import ForceElement, KernelElement
 
 
@@ -62,6 +63,10 @@ class PointMass(ForceElement):
                 columns.append(np.tile(dofs, len(dofs)))
                 values.append(size * np.outer(weights, weights).ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield Symbol("mass", (point(layout, self.beam, self.at),), text="m = ", value=self.mass,
+                     show=True)
 
     def __repr__(self) -> str:
         return f"<PointMass {self.mass:g} at {shown(self.at)}>"

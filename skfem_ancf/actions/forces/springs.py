@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +23,7 @@ from ...mesh.places import points_of_rows
 from ..item import Item
 from ..loads import EndMoment
 from ..places import GROUND, Vector, both_of, named_place, point, section
+from ..symbols import Symbol, faces_of, middle
 from .base import ForceElement, KernelElement
 from .kernels import DRAG, FOUNDATION, SPRING, TINY, TORSION, turned, turning
 
@@ -168,6 +169,10 @@ class Turns:
 STILL = 1e-3
 
 
+def _stiffness(k):
+    return f"k = {float(k):.6g}" if isinstance(k, float) else "k(s)"
+
+
 def end_of(layout: Layout, place: Any) -> Vector:
     """The Vector of a material point or a fixed point."""
     which, at = named_place(layout, place, GROUND)
@@ -260,6 +265,10 @@ class Spring(ForceElement):
         _, n = self._along(x)
         c = self.damping.slope(float(v[0] @ n), STILL)
         return -c * np.outer(n, n).reshape(1, 2, 1, 2)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield Symbol("spring", tuple(end_of(layout, place) for place in self.between),
+                     text=_stiffness(self.k))
 
     def __repr__(self) -> str:
         return f"<Spring {self.k!r} between {shown(self.between)}>"
@@ -366,6 +375,10 @@ class TorsionalSpring(ForceElement):
         c = self.damping.slope(float(np.sum(g * v)), STILL)
         return -c * np.multiply.outer(g, g)
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield Symbol("torsional spring", (section(layout, self.beam, self.at)[0],),
+                     text=_stiffness(self.k))
+
     def __repr__(self) -> str:
         return f"<TorsionalSpring {self.k!r} at {shown(self.at)}>"
 
@@ -443,6 +456,12 @@ class Foundation(ForceElement):
                               (self.k * area, self.damping * area, n[0], n[1], one))
                 for place, area, n in self._at]
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        for at, normals, _ in faces_of(layout, layout.beam(self.beam), self.side):
+            for k, (place, normal) in enumerate(zip(at, normals)):
+                yield Symbol("foundation", (place,), (normal,),
+                             text=_stiffness(self.k) if k == len(at) // 2 else "")
+
     def __repr__(self) -> str:
         return f"<Foundation {self.k:g} at {self.side!r}>"
 
@@ -506,6 +525,9 @@ class Drag(ForceElement):
         return [KernelElement(DRAG, place, slope,
                               (q * self.normal * ds, q * self.tangential * ds, 0.0, 0.0, 0.0))
                 for place, slope, ds in self._at]
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        yield Symbol("drag", (middle(layout, self.beam),), text="drag")
 
     def __repr__(self) -> str:
         return f"<Drag {self.normal:g}, {self.tangential:g}>"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
 from typing import Any
 
@@ -16,6 +16,8 @@ from ...beam.layout import Layout
 from ...core.errors import MeshError, sample
 from ...core.types import Array
 from ...mesh.frame_graph import FrameGraph
+from ..places import Vector
+from ..symbols import Symbol, support
 from .base import Joint
 
 # prescribed displacements and rotations of the nodes of a frame
@@ -330,6 +332,26 @@ class Nodes(Joint):
         if len(first) == 1:
             return [""]
         return [f" of the part with line {self.lines[k]}" for k in first]
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        bound, several = self._thawed(), np.bincount(self.nodes) > 1
+        bound.bind(layout)
+
+        def place(end: Any) -> Vector:
+            return Vector(self.graph.points[:, bound.nodes[end]], bound.positions[end][:, None],
+                          np.ones(1))
+
+        points = self.graph.points[:, self.nodes]
+        for end in bound.leaders:
+            fixed = [name for name, one in zip(COMPONENTS, bound.fixed[bound.nodes[end]]) if one]
+            if fixed:  # away from the lines that meet
+                meet = np.flatnonzero(bound.nodes == bound.nodes[end])
+                away = np.sum(points[:, meet] - points[:, meet ^ 1], axis=1)
+                size = np.hypot(*away)
+                yield support([place(end)], " ".join(fixed),
+                              away / size if size > 1e-9 * self.graph.size else (0.0, -1.0))
+        for end in np.flatnonzero(bound.hinged & several[bound.nodes]):
+            yield Symbol("joint", (place(end),), text="hinge")
 
     def __repr__(self) -> str:
         return f"<Nodes of {len(self.leaders)} nodes>"

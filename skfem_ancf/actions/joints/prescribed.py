@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ...mesh.places import node_of
 from ..item import Item
 from ..loads import EndMoment
 from ..places import Vector, both_of, point, section
+from ..symbols import Symbol, support_of, supports_of
 from .base import Aligned, Joint, angle_to, gradients, rotation
 
 #: Largest number of intervals of an integral over time.
@@ -60,6 +61,10 @@ class PrescribedPosition(Joint):
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = point(layout, self.beam, self.at)
+        return (support_of(layout, self.beam, at, "x y"),)
+
 
 class PrescribedDisplacement(Joint):
     """Degrees of freedom of a place follow a function of time: ``u[dofs] = displacement(t)``.
@@ -99,6 +104,9 @@ class PrescribedDisplacement(Joint):
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         n = len(self.dofs)
         return np.arange(n), self.dofs, np.ones(n)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        return supports_of(layout, self.beam, self.at, self.names)
 
 
 class PrescribedAngle(Joint):
@@ -147,6 +155,12 @@ class PrescribedAngle(Joint):
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         values, columns = self._normals(times)[:, :, None] * self.d.weights, self.d.dofs.ravel()
         return 0 * columns, columns, values.reshape(len(times), -1)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = section(layout, self.beam, self.at)[0]
+        if any(self.angle(t) for t in (0.5, 1.0)):
+            return (Symbol("motor", (at,), value=float(self.angle(1.0)) or 1.0),)
+        return (support_of(layout, self.beam, at, "angle"),)
 
 
 class Turned:
@@ -204,6 +218,10 @@ class PrescribedTurn(Joint):
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         return self._turned(t).second(multipliers[0])
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = section(layout, *self.at)[0]
+        return (Symbol("motor", (at,), value=float(self.angle(1.0)) or 1.0),)
 
 
 # a motor rotates a section or a rigid body
@@ -286,3 +304,9 @@ class PlaneSection(Joint):
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = section(layout, self.beam, self.at)[0]
+        return (support_of(layout, self.beam, at, "angle"),)
+
+

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import factorial, floor
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from ...core.types import Array
 from ...mesh.mapping import cross
 from ...core.quadrature import hermite_basis
 from ..places import GROUND, Vector, is_ground, named_place, point, section
+from ..symbols import Symbol, tangent_at
 from .base import Aligned, Joint, angle_to, gradients, rotation
 
 
@@ -54,6 +55,11 @@ class OnLine(Joint):
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = point(layout, self.beam, self.at)
+        x, y = self.normal
+        return (Symbol("slider", (at,), (np.array([-y, x]) / np.hypot(x, y),)),)
 
 
 class OnCircle(Joint):
@@ -98,6 +104,11 @@ class OnCircle(Joint):
         values = np.einsum("ik,il->ikl", w, w) * (multipliers[0] / self.R)
         rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)
         return rows.ravel(), rows.transpose(0, 2, 1).ravel(), values.ravel()
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = point(layout, self.beam, self.at)
+        x, y = at.start - self.center
+        return (Symbol("slider", (at,), (np.array([-y, x]) / np.hypot(x, y),)),)
 
 
 # the axis of a beam as a curve, and the closest point on it
@@ -509,6 +520,11 @@ class Sleeve(Joint):
         at = span.columns
         return np.bincount(at, span.force(multipliers, v0[at], v1[at]), len(u0))
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at, beam = point(layout, *named_place(layout, self.at)), layout.beam(self.on)
+        e, X, *_ = beam.finder.find(at.start[:, None])
+        return (Symbol("slider", (at,), (tangent_at(beam, int(e[0]), float(X[0, 0])),)),)
+
 
 class Slot(Joint):
     """A material point slides along a straight line of a rigid body, or of the ground.
@@ -575,6 +591,10 @@ class Slot(Joint):
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         i, j, v = zip(*(turned.second(m) for turned, m in zip(self.pairs, multipliers)))
         return np.concatenate(i), np.concatenate(j), np.concatenate(v)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = point(layout, *named_place(layout, self.at))
+        return (Symbol("slider", (at,), (self.direction,)),)
 
 
 def slider(layout: Layout, at: Any, on: WhichMember, direction: ArrayLike | None = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,8 @@ from ...core.errors import InputError, MeshError, require_flag, require_label, s
 from ...core.types import Array
 from ...mesh.places import facets_of, is_point
 from ..item import Item
-from ..places import each, is_ground, point, section, several
+from ..places import Vector, each, is_ground, point, section, several
+from ..symbols import Symbol, boundary_of, support_of
 from .base import Aligned, Joint, angle_to, equations_of, gradients, rotation
 
 
@@ -56,6 +57,9 @@ class Hinge(Joint):
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        return symbol_of(self, layout, "hinge", "x y", point)
 
 
 # bond between a boundary of a domain and another member (mortar method)
@@ -152,6 +156,10 @@ class Glue(Joint):
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
 
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        at = boundary_of(layout, layout.beam(self.domain), self.boundary)
+        return (Symbol("joint", (at,), text="weld"),)
+
 
 def _of_beam(beam: Beam, x: Array, place: Any) -> tuple[Array, Array]:
     """:meth:`Glue._surface` for a beam with sections."""
@@ -234,3 +242,16 @@ class Weld(Joint):
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         i, j, v = zip(*(turned.second(m) for (_, turned), m in zip(self.pairs, multipliers[2::3])))
         return np.concatenate(i), np.concatenate(j), np.concatenate(v)
+
+    def symbols(self, layout: Layout) -> Iterable[Symbol]:
+        return symbol_of(self, layout, "weld", "x y angle",
+                         lambda layout, beam, at: section(layout, beam, at)[0])
+
+
+def symbol_of(joint: Any, layout: Layout, text: str, fixed: str,
+              place: Callable[..., Vector]) -> Iterable[Symbol]:
+    """The symbol of a hinge or a weld: on the ground a support with its fixed motions."""
+    beam, at = next((b, a) for b, a in zip(joint.beams, joint.at) if not is_ground(b))
+    if any(map(is_ground, joint.beams)):
+        return (support_of(layout, beam, place(layout, beam, at), fixed),)
+    return (Symbol("joint", (place(layout, beam, at),), text=text),)
