@@ -276,6 +276,9 @@ class Recovery:
             "stiffnesses; State.resultants() has the section forces")
         if remembers(beam):
             self.why = "the stress of its material depends on the path of the strain"
+        if forces.pressed:
+            self.why = ("an obstacle touches it, at points: pressure between them is not known; "
+                        "State.resultants() has the section forces")
         self.intervals = Intervals(layers, beam.element.order)
         laws = [layer.material.law(layer.shear) for layer in layers]
         if forces.small or not beam.has_sections:  # linearised laws; a cable has no others
@@ -291,7 +294,7 @@ class Recovery:
                            and not isinstance(beam.formulation, EnhancedContinuum))
         self.segments: list[Segment] = []
         self.failed = False
-        if remembers(beam):
+        if remembers(beam) or forces.pressed:
             return
         try:
             self.segments = self._solved()

@@ -39,6 +39,10 @@ class Resultants:
         Arc length along the reference axis, shape (n,).
     x
         Section positions on the reference axis, shape (2, n).
+    normal
+        Unit normals of the reference axis, its tangent turned by +90 degrees, shape (2, n).
+    chain
+        Number of the chain of elements in the beam, in a frame of the line in its group, (n,).
     N
         Normal force along the deformed axis, positive in tension.
     Q
@@ -61,12 +65,14 @@ class Resultants:
         True if they follow from equilibrium. Otherwise they follow from the stress of the elements,
         and Q of a cable is NaN.
 
-    In a motion all but ``s`` and ``x`` have the instants as first axis; for a single section there
+    In a motion all but the first four have the instants as first axis; for a single section there
     is no axis n.
     """
 
     s: Array
     x: Array
+    normal: Array
+    chain: Array
     N: Array
     Q: Array
     M: Array
@@ -137,20 +143,21 @@ def over_time(instants: list[Resultants]) -> Resultants:
     first = instants[0]
     values: dict[str, Any] = {f.name: np.array([getattr(r, f.name) for r in instants])
                               for f in fields(first)}
-    return Resultants(**{**values, "s": first.s, "x": first.x,
-                         "recovered": all(r.recovered for r in instants)})
+    still = {name: getattr(first, name) for name in ("s", "x", "normal", "chain")}
+    return Resultants(**values | still | {"recovered": all(r.recovered for r in instants)})
 
 
 def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
                eigen: Sequence[tuple[Any, Any]] = (), at: tuple[Array, Array] | None = None,
-               chain: int | None = None) -> Resultants:
+               chain: int | None = None, sections: int = ALONG_ELEMENT) -> Resultants:
     """The Resultants of a beam for a displacement ``u`` (N,) or a complex step.
 
     They follow from the recovery, or from the stress of the elements; ``eigen`` are factors and
-    loads of eigenstrains. Sections are elements and xi ``at``, or all of the beam or one chain.
+    loads of eigenstrains. Sections are elements and xi ``at``, or all of the beam or one chain,
+    ``sections`` in each element.
     """
     if at is None:
-        e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts)
+        e, xi, after = _everywhere(beam, [] if recovery is None else recovery.forces.cuts, sections)
         if chain is not None:
             on = beam.mesh.chains[e] == chain
             e, xi, after = e[on], xi[on], after[on]
@@ -184,9 +191,11 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
         Q = (a - b) / (np.hypot(*J) * stretch * (near[1] - near[0]))
         t = np.array([np.cos(angle), np.sin(angle)])
         values = dict(_result(N * t + Q * np.array([-t[1], t[0]]), M, *strains), N=N, Q=Q)
-    x = beam.mesh.mapping().F(_on_axis(xi), e)[..., 0]
+    mapping = beam.mesh.mapping()
+    x, (a, b) = mapping.F(_on_axis(xi), e)[..., 0], mapping.DF(_on_axis(xi), e)[:, 0, :, 0]
     arc = ArcLength(beam) if recovery is None else recovery.arc
-    return Resultants(arc.at(e, xi), x, recovered=recovery is not None, **{
+    return Resultants(arc.at(e, xi), x, np.array([-b, a]) / np.hypot(a, b), beam.mesh.chains[e],
+                      recovered=recovery is not None, **{
         name: first_order(value) for name, value in values.items()})
 
 
@@ -195,13 +204,13 @@ def _on_axis(xi):
     return np.array([xi, 0.5 + 0.0 * xi])[:, :, None]
 
 
-def _everywhere(beam, cuts):
-    """Sections of all elements, with both sides of interior cuts."""
+def _everywhere(beam, cuts, n):
+    """``n`` sections of all elements, with both sides of interior cuts."""
     ne = beam.mesh.nelements
     inside = np.array([cut for cut in cuts if cut % 1.0])
-    e = np.append(np.repeat(np.arange(ne), ALONG_ELEMENT), np.repeat(inside.astype(int), 2))
-    xi = np.append(np.tile(np.linspace(0.0, 1.0, ALONG_ELEMENT), ne), np.repeat(inside % 1.0, 2))
-    after = np.append(np.zeros(ne * ALONG_ELEMENT, dtype=bool),
+    e = np.append(np.repeat(np.arange(ne), n), np.repeat(inside.astype(int), 2))
+    xi = np.append(np.tile(np.linspace(0.0, 1.0, n), ne), np.repeat(inside % 1.0, 2))
+    after = np.append(np.zeros(ne * n, dtype=bool),
                       np.tile([False, True], len(inside)))
     order = np.lexsort((after, xi, e))
     return e[order], xi[order], after[order]

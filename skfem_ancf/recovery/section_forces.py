@@ -116,14 +116,16 @@ class SectionForces:
     ``u``, the load factors and the results are complex steps
     (:func:`~skfem_ancf.core.linear.step`). ``loads`` are pairs of a factor and a Distribution (or
     None), ``stations`` the axial coordinates of supports and joints, ``sampled`` further force
-    densities, ``viscous`` the viscous element forces (ne, nb, 2). Raises NotRecovered if the state
-    is not an equilibrium.
+    densities, ``viscous`` the viscous element forces (ne, nb, 2); ``pressed`` is True if obstacles
+    touch the beam. Raises NotRecovered if the state is not an equilibrium.
     """
 
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
                  stations: Sequence[float] = (), acceleration: Array | None = None,
-                 sampled: Sequence[Sampled] = (), viscous: Array | None = None) -> None:
+                 sampled: Sequence[Sampled] = (), viscous: Array | None = None,
+                 pressed: bool = False) -> None:
         self.beam, self.small, self.viscous = beam, np.iscomplexobj(u), viscous
+        self.pressed = pressed
         if any(load is None for _, load in loads):
             raise NotRecovered("a load has only a force on the degrees of freedom: its "
                                "distribution across the section is unknown")
@@ -362,7 +364,7 @@ class Together:
         self.instants, first = instants, instants[0]
         self.beam, self.small, self.lifted, self.cuts = (
             first.beam, first.small, first.lifted, first.cuts)
-        self.viscous = first.viscous
+        self.viscous, self.pressed = first.viscous, any(one.pressed for one in instants)
         self.sides = sorted({side for one in instants for side in one.sides})
 
     def _all(self, ask: Callable[[SectionForces], Any], like: Any = 0.0) -> Array:

@@ -15,14 +15,15 @@ from ..actions.forces.base import Unscaled
 from ..actions.forces.springs import spring_force, spring_of
 from ..actions.item import Item
 from ..actions.joints.base import Joint
-from ..actions.obstacles.contact import Contact, contact_of
+from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
 from ..beam.beam import Beam
-from ..beam.distribution import Sampled, station_of_node, stations_of_vector
+from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector
 from ..beam.domain import Domain
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
 from ..beam.rigid import RigidBody
-from ..core.errors import InputError, NameUnknown, NearMisses, require_flag, shown
+from ..core.errors import (InputError, NameUnknown, NearMisses, require_flag, require_integer,
+                           shown)
 from ..core.immutable import Immutable, cached_property
 from ..core.linear import first_order, step
 from ..core.types import Array, Place
@@ -32,9 +33,9 @@ from ..equations.system import System
 from ..io import tables, vtu
 from ..recovery.fields import Values, find_field
 from ..recovery.recovered import Recovery
-from ..recovery.resultants import Resultants, resultants
+from ..recovery.resultants import ALONG_ELEMENT, Resultants, resultants
 from ..recovery.section_forces import NotRecovered, SectionForces
-from ..visuals import html, matplotlib, pyvista
+from ..visuals import diagrams, html, matplotlib, pyvista
 from .checks import Checks, check
 
 
@@ -509,6 +510,12 @@ class State(Immutable, MaterialPoints, SpringForces):
                 factor, now = load.acting(t)
                 loads.append((scale * factor, now.distribution(
                     (base if at_rest else self).u_of(number))))
+        points: list[Any] = []
+        if base is None and system.forces.contacts.groups:
+            with self._history():
+                points = loads_of_contact(self, s)
+            loads.append((1.0, Distribution(stations=tuple(e + xi for e, xi, _ in points),
+                                            points=tuple(points))))
         sampled, places = self._distributed(beam)
         acceleration = viscous = None
         if self.acceleration is not None:
@@ -520,14 +527,17 @@ class State(Immutable, MaterialPoints, SpringForces):
         with np.errstate(all="ignore"):
             return SectionForces(self._with_history(beam), self._places_of(number), loads,
                                  [*self._stations[number], *places], acceleration, sampled,
-                                 viscous)
+                                 viscous, len(points) > 0)
 
     def _distributed(self, beam):
         """Densities of distributed force elements, and axial coordinates of concentrated ones."""
         system, base = self.system, self.base
         sampled: list[Sampled] = []
         places: list[float] = []
-        elements = [e for e in system.forces.elements if e.distributed]
+        free = [element for element, found in system.forces.looks(np.array(self.u), self._time)
+                if not np.any(found[2])]  # members that do not touch each other
+        elements = [e for e in system.forces.elements
+                    if e.distributed and not e.groups and e not in free]
         if not elements:
             return sampled, places
         tables = system.backend.tables.plain.forces
@@ -606,18 +616,20 @@ class State(Immutable, MaterialPoints, SpringForces):
             out.append(found)
         return out
 
-    def resultants(self, at: Any = None, beam: WhichBeam = None,
-                   recover: bool = True, line: int | None = None) -> Resultants:
+    def resultants(self, at: Any = None, beam: WhichBeam = None, recover: bool = True,
+                   line: int | None = None, sections: int = ALONG_ELEMENT) -> Resultants:
         """Normal force, shear force and bending moment along a beam, with the strains of its axis.
 
         Parameters
         ----------
         at
-            Points on the sections: one, shape (2,), or many, shape (2, n) or a list; None for nine
+            Points on the sections: one, shape (2,), or many, shape (2, n) or a list; None for some
             sections in each element, and both sides of forces between nodes.
         recover
             From the equilibrium of the body, to the accuracy of the solution, if possible
             (:attr:`recovered`); False to integrate the stress of the elements.
+        sections
+            Number of sections in each element without ``at``, its ends included.
 
         Raises
         ------
@@ -635,6 +647,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         [-1.0, -0.5]
         """
         recover, chain, places, one = require_flag("recover", recover), None, None, False
+        sections = require_integer("sections", sections, 2, 10000)
         if at is not None:
             found = self.system.points.find(at, beam, line, ask=True)
             if len(found.parts) != 1:
@@ -649,7 +662,7 @@ class State(Immutable, MaterialPoints, SpringForces):
         of = self.beams[k]
         values = resultants(self._with_history(of), self._places_of(of),
                             self._recovery_of(k, fields=False) if recover else None,
-                            self._eigenstrains(of), places, chain)
+                            self._eigenstrains(of), places, chain, sections)
         return values.first() if one else values
 
     # of the whole
@@ -765,4 +778,4 @@ class State(Immutable, MaterialPoints, SpringForces):
     to_pyvista = pyvista.to_pyvista
     view = pyvista.view
     plot = matplotlib.plot_state
-    plot_resultants = matplotlib.plot_resultants
+    plot_resultants = diagrams.plot_resultants

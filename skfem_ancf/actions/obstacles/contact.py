@@ -123,6 +123,35 @@ def _of_bodies(state, known, member):
         yield *(value[..., here] for value in both), float(np.min(both[3][here], initial=np.inf))
 
 
+def loads_of_contact(state: Any, dofs: slice) -> list[tuple[int, float, Array]]:
+    """Forces of obstacles on the beam with some DOFs: element, xi, and nodal force (nb, 2)."""
+    contacts, u = state.system.forces.contacts, np.array(state.u)
+    t, out = state.load if state.t is None else state.t, []
+    v = None if state.t is None else np.array(state.v)
+    for (_, group), (_, _, force, _, _) in zip(contacts.groups, contacts.pushes(u, v, t)):
+        if not dofs.start <= group.first[0] < dofs.stop:
+            continue
+        m, ne, xi = group.points, group.elements - 2, _along_elements(group)
+        for k in np.flatnonzero(np.any(force, axis=0)).tolist():
+            e, F = k // m, force[:, k]
+            e, at = (e, xi[k]) if e < ne else (0, 0.0) if e == ne else (ne - 1, 1.0)
+            nodal = np.outer(group.weights[:, k], F)
+            if len(group.slopes):  # beside the axis of a cable, by the rotation of its tangent
+                q = u[group.first[k] + np.arange(2 * len(nodal))].reshape(-1, 2)
+                x, y = slope = group.starts[2:, k] + group.slopes[:, k] @ q
+                nodal -= group.offsets[k] * (F @ slope) / (slope @ slope) ** 1.5 * np.outer(
+                    group.slopes[:, k], [-y, x])
+            out.append((e, float(at), nodal))
+    return out
+
+
+def _along_elements(group):
+    """Position xi (n,) of points along their elements, of ends along the height."""
+    x = group.starts[:2].reshape(2, 2 * group.elements, -1)
+    way = np.cumsum(np.hypot(*np.diff(x, axis=2, prepend=x[..., :1])), axis=1)
+    return (way / np.maximum(way[:, -1:], 1e-300)).ravel()
+
+
 def _balanced(group, pressure):
     """The nodal pressure (n,) in equilibrium with the forces of points; zero at free points.
 
@@ -151,9 +180,7 @@ def _balanced(group, pressure):
     force, area = (np.bincount(nodes.ravel(), (shares * factor).ravel())
                    for factor in (pressure, closed))
     mean = (force / np.where(area > 0.0, area, 1.0))[nodes]
-    x = group.starts[:2].reshape(2, 2 * n, m // 2)
-    way = np.cumsum(np.hypot(*np.diff(x, axis=2, prepend=x[..., :1])), axis=1)
-    xi = (way / np.maximum(way[:, -1:], 1e-300)).ravel()
+    xi = _along_elements(group)
     xi[moved[0]] = xi[moved[1]]
     return np.where(touching, (1.0 - xi) * mean[0] + xi * mean[1], 0.0)
 
