@@ -1,5 +1,7 @@
 """Domains: stock bases of scikit-fem with their forms in one scene with beams."""
 
+import pickle
+
 import meshio
 import numpy as np
 import pytest
@@ -12,9 +14,9 @@ from skfem import (Basis, BilinearForm, ElementQuad1, ElementQuad2, ElementQuadP
 from skfem.helpers import (ddot, det, dot, eye, grad, identity, inv, mul, sym_grad, trace,
                            transpose)
 
-from skfem_ancf import (Beam, CallbackError, Domain, ElementBeamANCF, ElementBeamCable, InputError,
-                        MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
-                        SupportError)
+from skfem_ancf import (Beam, CallbackError, Domain, ElasticPlastic, ElementBeamANCF,
+                        ElementBeamCable, InputError, MeshBeam, MeshError, NameUnknown, NeoHookean,
+                        RigidBody, Scene, StVenantKirchhoff, SupportError)
 
 E, NU, RHO, WIDTH, H = 1e6, 0.3, 780.0, 0.1, 0.1
 
@@ -445,6 +447,137 @@ def test_rubber_on_a_graded_mesh():
     assert_allclose(state.strain_energy, energy + 0.5 * lam * np.log(1.5 * across)**2, rtol=1e-8)
 
 
+# domains of materials
+
+
+LAWS = {"stress": StVenantKirchhoff(E, 0.3, RHO), "strain": StVenantKirchhoff(
+    E, 0.3, RHO, plane="strain"), "rubber": NeoHookean(E, 0.4, RHO), "rubber strain": NeoHookean(
+        E, 0.4, RHO, plane="strain")}
+
+
+def solid_of(mesh, law, element=None, **options):
+    return Domain.solid(Basis(mesh, ElementVector(element or ElementQuad2())), law, WIDTH,
+                        **options)
+
+
+def laterals(name, s):
+    """Stretches across the pull and out of the plane, with no stress across, in closed form."""
+    law = LAWS[name]
+    lam, mu = law.lame, law.G
+    if name == "stress":
+        return 2 * [np.sqrt(1 - law.nu * (s**2 - 1))]
+    if name == "strain":
+        return np.sqrt(1 - law.nu / (1 - law.nu) * (s**2 - 1)), 1.0
+    power = 2 if name == "rubber" else 1  # mu (a^2 - 1) + lam ln J = 0
+    a = brentq(lambda a: mu * (a * a - 1) + lam * np.log(s * a**power), 0.3, 1.0)
+    return a, a if power == 2 else 1.0
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_strip_of_a_material_in_uniaxial_stress(name, tmp_path):
+    """Force, energy, stress at points, in files and in pictures, all in closed form."""
+    law, s = LAWS[name], 1.3
+    strip_ = solid_of(strip(0, 2, 4, y0=H / 2), law, ElementQuad1(), name="strip")
+    scene = Scene(strip_).fix("left", "u^1").fix("bottom", "u^2").fix("right", "u^1", 2 * (s - 1))
+    state = scene.solve_static()
+    a, t = laterals(name, s)
+    lam, mu, J = law.lame, law.G, s * a * t
+    if "rubber" in name:
+        S, S_zz = mu * (1 - 1 / s**2) + lam * np.log(J) / s**2, lam * np.log(J) * (t == 1.0)
+        energy = 0.5 * mu * (s**2 + a**2 + t**2 - 3) - mu * np.log(J) + 0.5 * lam * np.log(J)**2
+    else:
+        modulus = E if name == "stress" else E / (1 - law.nu**2)
+        S = modulus * 0.5 * (s**2 - 1)
+        S_zz, energy = law.nu * S * (name == "strain"), 0.25 * S * (s**2 - 1)
+    sigma, sigma_zz = s**2 * S / J, t**2 * S_zz / J
+    mises = np.sqrt(sigma**2 - sigma * sigma_zz + sigma_zz**2)
+    assert_allclose(state.reactions("right").force, (s * S * H * WIDTH, 0.0),
+                    rtol=1e-9, atol=1e-6)
+    assert_allclose(state.strain_energy, energy * 2 * H * WIDTH, rtol=1e-9)
+    assert_allclose(state.displacement((2, H))[1], H * (a - 1), rtol=1e-9)
+    for at in ((0.7, 0.03), [(0.7, 0.03), (1.9, 0.08)]):
+        one = np.ones(np.shape(at)[:-1])
+        assert_allclose(state.stress(at, strip_), [S * one, 0 * one, 0 * one], atol=1e-8 * S)
+        assert_allclose(state.field("von_mises", at, strip_), mises * one, rtol=1e-9)
+        assert_allclose(state.field("energy", at, "strip"), energy * one, rtol=1e-9)
+        assert_allclose(state.strain(at, strip_)[1], 0.5 * (a**2 - 1) * one, rtol=1e-9)
+    mesh = meshio.read(state.save(tmp_path / "strip.vtu"))
+    assert_allclose(mesh.point_data["stress"], np.outer(
+        np.ones(len(mesh.points)), [S, 0, S_zz, 0, 0, 0]), atol=1e-8 * S)
+    assert_allclose(mesh.point_data["cauchy_stress"][:, [0, 2]], np.outer(
+        np.ones(len(mesh.points)), [sigma, sigma_zz]), rtol=1e-8, atol=1e-8 * S)
+    assert_allclose(mesh.point_data["von_mises"], mises, rtol=1e-8)
+    drawn = [c.get_array() for c in state.plot("von_mises").collections
+             if c.get_array() is not None]
+    assert_allclose(drawn[0], mises, rtol=1e-8)
+
+
+def test_rubber_in_simple_shear():
+    """sigma = mu (gamma^2, gamma), without a volume change; the principal axes of the strain."""
+    law, g = LAWS["rubber strain"], 0.7
+    block = solid_of(strip(0, 1, 3, height=1.0), law)
+    u = block.velocity_of(lambda x: np.array([g * x[1], 0 * x[1]]))  # a field of the element
+    state = Scene(block).state(u)
+    inside = np.setdiff1d(np.arange(block.N), block.numbers(block.basis.get_dofs().all()))
+    assert_allclose(block.force(u)[inside], 0.0, atol=1e-9 * E)
+    found = state.field("cauchy_stress", (0.4, 0.1), block)
+    assert_allclose(found, law.G * np.array([g * g, 0.0, g]), atol=1e-9 * E)
+    C = np.array([[1, g], [g, 1 + g * g]])
+    assert_allclose([state.field(f"eps_{k}", (0.4, 0.1), block) for k in (2, 1)],
+                    0.5 * (np.linalg.eigvalsh(C) - 1), atol=1e-10)
+
+
+def test_a_material_gives_what_its_forms_give():
+    mesh = strip(0, 2, 16)
+    solid = solid_of(mesh, LAWS["stress"])
+    state = Scene(solid).clamp("left").load(pull, "right").solve_static()
+    assert_allclose(state.displacement((2, 0)), cantilever(16), rtol=1e-8)
+    u, other = state.u_of(solid), domain_of(mesh)
+    assert_allclose(solid.energy(u), other.energy(u), rtol=1e-10)
+    assert_allclose(solid.total_mass, 2 * H * WIDTH * RHO, rtol=1e-12)
+    assert_allclose(solid.matrix(u).toarray(), other.matrix(u).toarray(), atol=1e-9 * E)
+    copy = pickle.loads(pickle.dumps(solid))
+    assert np.array_equal(copy.force(u), solid.force(u)) and copy.material.E == E
+
+
+def test_a_modulus_and_a_density_that_vary():
+    """A bar with E = E0 / (1 + x): elongation F L (1 + L / 2) / (E0 A); and its mass."""
+    law = StVenantKirchhoff(lambda x, y: E / (1 + x), 0.0, density=lambda x, y: RHO * (1 + y))
+    bar = solid_of(strip(0, 1, 16, y0=H / 2), law)
+    scene = Scene(bar).fix("left", "u^1").fix("bottom", "u^2")
+    state = scene.load(LinearForm(lambda v, w: v[0] / H), "right").solve_linear()
+    assert_allclose(state.displacement((1, 0.05))[0], 1.5 / (E * H * WIDTH), rtol=1e-4)
+    assert_allclose(state.stress((0.75, 0.02), bar)[0], 1.0 / (H * WIDTH), rtol=1e-3)
+    assert_allclose(bar.total_mass, RHO * WIDTH * H * (1 + H / 2), rtol=1e-12)
+
+
+def test_stress_goes_on_from_a_domain_to_a_beam(tmp_path):
+    solid, beam = solid_of(strip(0, 1, 16), LAWS["stress"], name="root"), beam_of(1, 2)
+    scene = Scene(beam, solid).clamp("left", solid).point_force((0, -1), at=(2, 0), beam=beam)
+    scene.weld((solid, "right"), (beam, "left"))
+    state = scene.solve_static()
+    for x, member in ((0.5, solid), (1.5, beam)):
+        M = 2.0 - x  # of a force of 1, small deflections
+        assert_allclose(state.stress((x, H / 2), member)[0], 6 * M / (WIDTH * H**2), rtol=2e-2)
+    mesh = meshio.read(state.save(tmp_path / "both.vtu"))
+    assert np.isfinite(mesh.point_data["von_mises"]).all()
+    drawn = [c for c in state.plot("S_xx").collections if c.get_array() is not None]
+    assert sum(len(c.get_array()) for c in drawn) > 32 * 9 + 16 * 9
+
+
+def test_domains_whose_stress_is_not_known():
+    with pytest.raises(InputError, match="history"):
+        solid_of(strip(0, 1, 2), ElasticPlastic(E, 0.3, yield_stress=1e3))
+    with pytest.raises(InputError, match="E\\(x, y\\).*positive.*-"):
+        solid_of(strip(0, 1, 2), StVenantKirchhoff(lambda x, y: x - 0.5, 0.3))
+    with pytest.raises(InputError, match="material"):
+        solid_of(strip(0, 1, 2), 2e11)
+    state = Scene(domain_of(strip(0, 1, 2))).clamp("left").state()
+    assert_allclose(state.strain((0.5, 0.0), 0), np.zeros(3))
+    with pytest.raises(InputError, match="Domain.solid"):
+        state.stress((0.5, 0.0), 0)
+
+
 # what is refused
 
 
@@ -481,8 +614,8 @@ def test_places_and_loads_that_are_not_of_a_domain():
         scene.pressure("right", 1.0, solid)
     with pytest.raises(MeshError, match="outside"):
         scene.state().displacement((1.5, 0), solid)
-    with pytest.raises(InputError, match="depend on its forms"):
-        scene.state().strain((0.5, 0), solid)
+    with pytest.raises(InputError, match="depends on its forms"):
+        scene.state().stress((0.5, 0), solid)
     with pytest.raises(InputError, match="has no mass"):
         Scene(Domain(solid.basis, *forms())).clamp("left").gravity((0, -9.81))
 

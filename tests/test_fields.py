@@ -137,3 +137,15 @@ def test_wrong_fields():
     for bad in (dict(name=""), dict(name=3), dict(function=3), dict(components=4)):
         with pytest.raises(InputError):
             Field(**{"name": "a", "function": len, **bad})
+
+
+@pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])
+def test_energy_density_of_a_modulus_that_varies(law):
+    """Its integral is the strain energy."""
+    beam = Beam(MESH, ElementBeamANCF(3), law(lambda x, y: E * (1 + x), NU), 0.3, "continuum")
+    state = affine(beam, GRADIENTS[1])
+    uniform = affine(beam.replace(material=law(E, NU)), GRADIENTS[1])
+    for at in ((0.4 * 0.92106, 0.4 * 0.38942), (2.0 * 0.92106, 2.0 * 0.38942)):
+        x = np.hypot(*at)
+        assert state.field("energy", at) == pytest.approx(
+            (1 + x) * uniform.field("energy", at), rel=1e-4)

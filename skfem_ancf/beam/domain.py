@@ -18,7 +18,9 @@ from ..core.errors import (CallbackError, InputError, MeshError, NameUnknown, ex
 from ..core.immutable import Immutable, read_only
 from ..core.quadrature import gauss
 from ..core.types import Array
+from ..materials import Material
 from ..mesh.places import as_point, is_point
+from .solid import SolidForms, grade_at
 
 #: Gauss points for the work of the residual from the reference configuration, and in a time step.
 WORK, STEP = 6, 3
@@ -57,8 +59,8 @@ class Domain(Immutable):
     In the scene the DOFs are renumbered to reduce the bandwidth; :meth:`of_basis` restores the
     order of the basis.
 
-    The energy is the work of the residual along a straight path from the reference configuration,
-    by Gauss quadrature; it is exact for polynomials, as of St. Venant-Kirchhoff. The
+    The energy of user-defined forms is the work of the residual along a straight path from the
+    reference configuration, by Gauss quadrature; it is exact for polynomials. The
     energy-momentum scheme uses the mean of the residual over a step (averaged vector field): it
     conserves energy and linear momentum; the error of the angular momentum is of second order. It
     rejects domains with an unsymmetric tangent, which have no energy.
@@ -70,7 +72,8 @@ class Domain(Immutable):
 
     Examples
     --------
-    A cantilever of linear elasticity with a beam at its end:
+    A cantilever of forms of linear elasticity with a beam at its end; :meth:`solid` has the forms
+    of a material:
 
     >>> import numpy as np
     >>> from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, MeshQuad
@@ -93,6 +96,7 @@ class Domain(Immutable):
     """
 
     nd = 2
+    _solid: SolidForms | None = None
 
     def __init__(self, basis: Basis, residual: LinearForm, tangent: BilinearForm,
                  mass: BilinearForm | None = None, name: str | None = None) -> None:
@@ -118,6 +122,56 @@ class Domain(Immutable):
         self._order = (2 * order[:, None] + np.arange(2)).ravel()
         self._rank = np.argsort(self._order)
         self._require_derivatives()
+
+    @classmethod
+    def solid(cls, basis: Basis, material: Material, width: float = 1.0,
+              name: str | None = None) -> Domain:
+        """A domain of a material of the package or a user-defined one, with stress in results.
+
+        Parameters
+        ----------
+        basis
+            As for :class:`Domain`.
+        material
+            As :class:`~skfem_ancf.StVenantKirchhoff` or :class:`~skfem_ancf.NeoHookean`, in plane
+            stress or plane strain, without a history. Its ``E`` and ``density`` may be functions of
+            global coordinates (x, y). Without a density the domain has no mass.
+        width
+            Thickness out of the plane, positive.
+        name
+            Name in messages.
+
+        Raises
+        ------
+        InputError
+            If the material has a history.
+
+        Examples
+        --------
+        A strip in uniaxial stress:
+
+        >>> import numpy as np
+        >>> from skfem import Basis, ElementQuad2, ElementVector, MeshQuad
+        >>> from skfem_ancf import Domain, Scene, StVenantKirchhoff
+        >>> mesh = MeshQuad.init_tensor(np.linspace(0, 2, 5), np.linspace(0, 1, 3)).with_defaults()
+        >>> strip = Domain.solid(Basis(mesh, ElementVector(ElementQuad2())),
+        ...                      StVenantKirchhoff(E=100.0, nu=0.3), width=0.1)
+        >>> scene = Scene(strip).fix("left", "u^1").fix("bottom", "u^2").fix("right", "u^1", 0.2)
+        >>> scene.solve_static().stress((1, 0.5), strip).round(9).tolist()  # E (1.1^2 - 1) / 2
+        [10.5, 0.0, 0.0]
+        """
+        forms = SolidForms(material, width)
+        domain = cls(basis, forms.residual, forms.tangent, forms.mass, name)
+        domain._solid = forms
+        return domain
+
+    @property
+    def material(self) -> Material:
+        """The material; InputError if the forms are user-defined."""
+        if self._solid is None:
+            raise InputError(f"the stress of {self!r} depends on its forms, which are user-defined:"
+                             " a Domain.solid(basis, material) knows its stress")
+        return self._solid.material
 
     def __repr__(self):
         who = "" if self.name is None else f"{self.name} "
@@ -188,7 +242,10 @@ class Domain(Immutable):
         return sparse.csr_array((values, self.pattern), shape=(self.N, self.N))
 
     def energy(self, u: Array) -> float:
-        """Work of the residual from rest to a displacement (N,)."""
+        """Strain energy at a displacement (N,): the work of the residual from rest."""
+        if self._solid is not None:
+            return float(self._ask("energy", self._solid.energy.assemble, self.basis,
+                                   **self._with(u)))
         return float(sum(w * (self.force(s * u) @ u) for s, w in zip(*gauss(WORK))))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
@@ -388,7 +445,7 @@ class Domain(Immutable):
         """A point (x, y) as an array (2,)."""
         return as_point(at)
 
-    def locate(self, x: Array) -> tuple[Array, Array]:
+    def _locate(self, x: Array) -> tuple[Array, Array]:
         """Cells (n,), -1 if outside, and local coordinates (2, n) of points (2, n)."""
         mesh, mapping = self.basis.mesh, self.basis.mapping
         nodes = mesh.p[:, mesh.t] if mesh.doflocs.shape[1] == mesh.p.shape[1] else (
@@ -411,7 +468,7 @@ class Domain(Immutable):
 
     def contains(self, x: ArrayLike) -> Array:
         """Whether points (2, n) of the reference configuration are in the domain, shape (n,)."""
-        return self.locate(require_finite("x", x, (2, None)))[0] >= 0
+        return self._locate(require_finite("x", x, (2, None)))[0] >= 0
 
     def probe(self, at: Any) -> tuple[Array, Array]:
         """Numbers and weights (2, k) of the DOFs in the displacement of a point."""
@@ -420,7 +477,7 @@ class Domain(Immutable):
 
     def probes(self, x: Array) -> tuple[Array, Array]:
         """Numbers (2, k, n) and weights (k, n) of the DOFs in the displacement of points (2, n)."""
-        cells, X = self.locate(x)
+        cells, X = self._locate(x)
         if np.any(cells < 0):
             k = int(np.argmax(cells < 0))
             raise MeshError(f"the point ({x[0, k]:.6g}, {x[1, k]:.6g}) is outside of {self!r}")
@@ -429,37 +486,16 @@ class Domain(Immutable):
 
     def _functions(self, X, cells=None):
         """Scalar shape functions (k, n, points) at points of the reference cell."""
+        return np.array([np.asarray(field)[0] for field in self._fields(X, cells)])
+
+    def _gradients(self, X, cells=None):
+        """Their gradients (k, 2, n, points)."""
+        return np.array([np.asarray(field.grad)[0] for field in self._fields(X, cells)])
+
+    def _fields(self, X, cells):
         basis = self.basis
-        return np.array([np.asarray(basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0])[0]
-                         for k in range(0, basis.Nbfun, 2)])
-
-    def drawn(self, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:
-        """Points and cells for plots.
-
-        Parameters
-        ----------
-        u
-            Displacement, shape (N,).
-        parts
-            Number of refinements of each cell.
-
-        Returns
-        -------
-        x, moved, gradient, cells
-            Points, (2, n), their displacement and its gradient, (2, 2, n), and triangles or quads
-            as rows of point numbers.
-        """
-        mesh, basis = self.basis.mesh, self.basis
-        cell = mesh.init_refdom().refined(parts)
-        x = np.asarray(basis.mapping.F(cell.p))
-        dofs = self.numbers(basis.element_dofs).reshape(-1, 2, mesh.nelements)
-        grads = np.array([np.asarray(basis.elem.gbasis(basis.mapping, cell.p, k)[0].grad)[0]
-                          for k in range(0, basis.Nbfun, 2)])
-        moved = np.einsum("kep,kce->cep", self._functions(cell.p), u[dofs])
-        gradient = np.einsum("kjep,kce->cjep", grads, u[dofs])
-        first = cell.p.shape[1] * np.arange(mesh.nelements)
-        cells = (first[:, None, None] + cell.t.T).reshape(-1, len(cell.t))
-        return x.reshape(2, -1), moved.reshape(2, -1), gradient.reshape(2, 2, -1), cells
+        return [basis.elem.gbasis(basis.mapping, X, k, tind=cells)[0]
+                for k in range(0, basis.Nbfun, 2)]
 
 
 class DomainPoints:
@@ -479,11 +515,46 @@ class DomainPoints:
         """Velocities (..., 2, n) for DOFs and their rates, (..., N)."""
         return self.displacement(v)
 
-    @property
-    def number(self) -> int:
-        """Raises InputError: fields of a domain follow from its basis."""
-        raise InputError(f"the strain and stress of {self.body!r} depend on its forms: "
-                         "basis.interpolate(domain.of_basis(state.u_of(domain))) has the gradient")
+    def fields(self, u: Array) -> tuple[Array, Array]:
+        """Displacement (2, n) and its gradient (2, 2, n) for DOFs ``u`` (N,) of the scene."""
+        cells, X = self.body._locate(self.start)
+        slopes = self.body._gradients(X[:, :, None], cells)[..., 0]
+        return self.displacement(u), np.einsum("kjn,ikn->ijn", slopes, u[self.slice][self._dofs])
+
+
+def grade_of(domain: Domain, x: Array) -> Any:
+    """Modulus at points (2, n) of a domain over that of ``material.reference()``."""
+    return grade_at(domain._solid.grade, x, "E(x, y)") if domain._solid else 1.0
+
+
+def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:
+    """Points and cells for plots.
+
+    Parameters
+    ----------
+    domain
+        The Domain.
+    u
+        Displacement, shape (N,).
+    parts
+        Number of refinements of each cell.
+
+    Returns
+    -------
+    x, moved, gradient, cells
+        Points, (2, n), their displacement and its gradient, (2, 2, n), and triangles or quads
+        as rows of point numbers.
+    """
+    mesh, basis = domain.basis.mesh, domain.basis
+    cell = mesh.init_refdom().refined(parts)
+    x = np.asarray(basis.mapping.F(cell.p))
+    dofs = domain.numbers(basis.element_dofs).reshape(-1, 2, mesh.nelements)
+    grads = domain._gradients(cell.p)
+    moved = np.einsum("kep,kce->cep", domain._functions(cell.p), u[dofs])
+    gradient = np.einsum("kjep,kce->cjep", grads, u[dofs])
+    first = cell.p.shape[1] * np.arange(mesh.nelements)
+    cells = (first[:, None, None] + cell.t.T).reshape(-1, len(cell.t))
+    return x.reshape(2, -1), moved.reshape(2, -1), gradient.reshape(2, 2, -1), cells
 
 
 def _require_plane(basis):

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
-from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 from skfem.helpers import dot
 
 from ..actions.energy import Energy, points_of
 from ..beam.kinematics import element_dofs
+from ..beam.solid import PiolaForm, PiolaTangent, moduli_at, scattered, tensor
 from ..core.errors import InputError, ask_field, require_finite, require_like, require_positive
 from ..core.types import Array
 from ..formulations import get_formulation
@@ -55,15 +55,6 @@ def strain_variation(F: Array, dF: Array) -> Array:
                      dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
 
 
-def _tensor(S):
-    return np.array([[S[0], S[2]], [S[2], S[1]]])
-
-
-def _voigt_to_tensor(D):
-    k = np.array([[0, 2], [2, 1]])
-    return D[k][:, :, k]
-
-
 def _law(material, k_s):
     require_like("material", material, "Material", "law")
     return material.law(require_positive("k_s", k_s))
@@ -79,7 +70,7 @@ def piola(law: Any, F: Array, frame: Array) -> Array:
     F, frame
         Deformation gradient in the beam's frame, and the frame, (2, 2, ...).
     """
-    return np.einsum("iJ...,JK...,jK...->ij...", F, _tensor(law.stress(green_lagrange(F))), frame)
+    return np.einsum("iJ...,JK...,jK...->ij...", F, tensor(law.stress(green_lagrange(F))), frame)
 
 
 def moduli_of(law: Any, F: Array, frame: Array) -> Array:
@@ -90,11 +81,8 @@ def moduli_of(law: Any, F: Array, frame: Array) -> Array:
     law, F, frame
         As for :func:`piola`.
     """
-    eps = green_lagrange(F)
-    D, S = _voigt_to_tensor(law.moduli(eps)), _tensor(law.stress(eps))
-    A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)
-    A = A + np.einsum("ik,JL...->iJkL...", np.eye(2), S)
-    return np.einsum("jJ...,iJkL...,lL...->ijkl...", frame, A, frame, optimize=True)
+    return np.einsum("jJ...,iJkL...,lL...->ijkl...", frame, moduli_at(law, F, green_lagrange(F)),
+                     frame, optimize=True)
 
 
 # textbook forms
@@ -180,10 +168,6 @@ class _BeamFrame:
         frame = basis.mapping.frame(points, tind)
         return {**Form._normalize_asm_kwargs(w, basis), "frame": frame}
 
-    def _parameters(self, basis, kwargs):
-        return FormExtraParams({**basis.default_parameters(),
-                                **self._normalize_asm_kwargs(kwargs, basis)})
-
 
 class EnergyForm(_BeamFrame, Functional):
     """A functional with the beam's frame as ``w.frame``."""
@@ -197,7 +181,7 @@ class BeamBilinearForm(_BeamFrame, BilinearForm):
     """A bilinear form with the beam's frame as ``w.frame``."""
 
 
-class StressForm(BeamLinearForm):
+class StressForm(BeamLinearForm, PiolaForm):
     """A linear form ``int P : grad v`` defined by the first Piola-Kirchhoff stress P.
 
     The decorated function takes ``w``, with fields as in scikit-fem's ``LinearForm`` and the beam's
@@ -205,43 +189,13 @@ class StressForm(BeamLinearForm):
     at once by a matrix product.
     """
 
-    def _assemble(self, ubasis, vbasis=None, **kwargs):
-        P = self.form(self._parameters(ubasis, kwargs)) * ubasis.dx
-        nq, ne = ubasis.Nbfun, ubasis.nelems
-        B = _gradient_table(ubasis).reshape(ne, nq, -1)
-        P = np.moveaxis(P, (2, 3), (0, 1)).reshape(ne, -1, 1)
-        data = (B @ P)[..., 0].T
-        return np.array([ubasis.element_dofs.ravel()]), data.ravel(), (ubasis.N,), (nq,)
 
-
-class ModuliForm(BeamBilinearForm):
+class ModuliForm(BeamBilinearForm, PiolaTangent):
     """A bilinear form ``int grad v : A : grad u`` defined by the moduli A = dP / dF.
 
     The decorated function takes ``w`` and returns A (2, 2, 2, 2, nelements, npoints). All pairs of
     local functions are contracted at once by matrix products.
     """
-
-    def _assemble(self, ubasis, vbasis=None, **kwargs):
-        A = self.form(self._parameters(ubasis, kwargs)) * ubasis.dx
-        nq, ne = ubasis.Nbfun, ubasis.nelems
-        B = _gradient_table(ubasis).reshape(ne, nq, -1, 4)
-        A = np.moveaxis(A.reshape(4, 4, ne, -1), (2, 3), (0, 1))
-        AB = A @ B.transpose(0, 2, 3, 1)  # (ne, np, 4, nq)
-        K = B.reshape(ne, nq, -1) @ AB.reshape(ne, -1, nq)  # rows v, columns u
-        return scattered(K, ubasis)
-
-
-def _gradient_table(basis):
-    return np.ascontiguousarray(np.moveaxis(np.array([b[0].grad for b in basis.basis]),
-                                            (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
-
-
-def scattered(K: Array, basis: Any) -> tuple[Any, Array, tuple[int, int], tuple[int, int]]:
-    """Element matrices (ne, nq, nq), rows v and columns u, as COO data of scikit-fem."""
-    nq, dofs = basis.Nbfun, basis.element_dofs
-    rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
-    return (np.array([rows.ravel(), cols.ravel()]), K.transpose(2, 1, 0).ravel(),
-            (basis.N, basis.N), (nq, nq))
 
 
 # the same for all local functions at once, and mass and loads

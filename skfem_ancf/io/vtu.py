@@ -104,8 +104,9 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     load factor, the time, the version and the numbers of named members; ``UNITS_LABEL`` contains
     units (:meth:`Scene.units <skfem_ancf.Scene.units>`). ``beam`` and ``element``, on cells, are
     their numbers. A rigid body is the polygon of its outline, numbered after the beams, with NaN
-    for strain and stress. A domain has its cells, halved, and its strain in global axes. Outlines
-    of obstacles are lines in a second file, ``name_obstacles``, with numbers ``obstacle``.
+    for strain and stress. A domain has its cells, halved, with strain and stress in global axes;
+    the stress of user-defined forms is NaN. Outlines of obstacles are lines in a second file,
+    ``name_obstacles``, with numbers ``obstacle``.
 
     Parameters
     ----------

@@ -16,12 +16,14 @@ import numpy as np
 
 from ..beam import kinematics
 from ..beam.beam import Beam
+from ..beam.domain import Domain, grade_of
 from ..beam.points import BeamPoints
 from ..beam.remembered import by_history, remembers
+from ..beam.solid import displacement_strain
 from ..beam.strains import stress_at, stretched
 from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                            require_flag, require_integer, require_label, require_text, shown)
-from ..core.linear import first_order, step
+from ..core.linear import first_order, step, stress_of
 from ..core.types import Array
 from ..materials import LinearLaw
 from .recovered import Recovery
@@ -185,7 +187,22 @@ class Values(Mapping):
 
     @cached_property
     def strain(self) -> Array:
-        return first_order(self._part.strain(self._u, self._recovery))
+        return first_order(self._strain if self._recovery is None else
+                           self._part.strain(self._u, self._recovery))
+
+    @property
+    def _strain(self):
+        """Strain of the elements."""
+        return self._part.strain(self._u)
+
+    @property
+    def _remembers(self):
+        return remembers(self.beam)
+
+    @property
+    def cable(self) -> bool:
+        """The member is a cable."""
+        return not self.beam.has_sections
 
     @cached_property
     def S(self) -> Array:
@@ -217,7 +234,7 @@ class Values(Mapping):
 
     @property
     def _stored(self):
-        if self.beam.has_sections:
+        if not self.cable:
             return self._by_history(lambda law, history: law.energy(self.strain, history), np.nan)
         longer = stretched(self.strain[0])[1]
         return self._by_history(lambda law, history: law.axial_energy(longer, history), np.nan)
@@ -232,9 +249,9 @@ class Values(Mapping):
         other
             Value where a material does not have it.
         """
-        if not remembers(self.beam):
+        if not self._remembers:
             return np.full(self.n, other)
-        S = self.S if self.beam.has_sections else stretched(self.strain[0])[0] * self.S
+        S = stretched(self.strain[0])[0] * self.S if self.cable else self.S
         return self._by_history(lambda law, history: law.outputs(
             self.strain, history, S).get(name, np.full(self.n, other)), other)
 
@@ -248,7 +265,7 @@ class Values(Mapping):
             :class:`~skfem_ancf.materials.HistoryMaterial`.
         """
         def of(k):
-            return np.zeros(self.n) if not remembers(self.beam) else self._by_history(
+            return np.zeros(self.n) if not self._remembers else self._by_history(
                 lambda law, history: history[law.rows(name)][k] if name in law.variables else
                 np.zeros(self.n), 0.0)
 
@@ -298,7 +315,7 @@ class Values(Mapping):
     def _volume_of(self, F, elastic):
         with np.errstate(invalid="ignore"):
             return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.of_materials(
-                lambda law: law.thickness_stretch(elastic)) if not remembers(self.beam) else (
+                lambda law: law.thickness_stretch(elastic)) if not self._remembers else (
                 F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * np.sqrt(1.0 + 2.0 * self._by_history(
                     lambda law, history: law.out_of_plane(self.strain, history, self.S)[0], 0.0))
 
@@ -308,7 +325,7 @@ class Values(Mapping):
         F, S, volume = (self.frame if self._small else self.F), self.S, self._volume
         if np.iscomplexobj(self._u) and not self._small:
             F, S = self._gradient, self._stress
-            volume = self._volume_of(F, self._part.strain(self._u) - self._eigenstrain)
+            volume = self._volume_of(F, self._strain - self._eigenstrain)
         with np.errstate(invalid="ignore", divide="ignore"):
             A = np.array([[S[0], S[2]], [S[2], S[1]]])
             sigma = np.einsum("iJn,JKn,jKn->ijn", F, A, F, optimize=True) / volume
@@ -319,10 +336,10 @@ class Values(Mapping):
         """Out-of-plane Cauchy stress, (n,); zero in plane stress."""
         if self.beam.material.plane == "stress":
             return np.zeros(self.n)
-        if remembers(self.beam):
+        if self._remembers:
             return self._by_history(lambda law, history: law.out_of_plane(
                 self.strain, history, self.S)[1], 0.0) / self._volume
-        if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
+        if self.cable:  # eps_zz = 0 and S_yy = 0
             return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
         with np.errstate(invalid="ignore", divide="ignore"):
             strain = step(0.0, self.elastic) if self._small else self.elastic
@@ -332,19 +349,21 @@ class Values(Mapping):
     @cached_property
     def energy(self) -> Array:
         """Strain energy per reference volume, (n,); of materials with a history what is stored."""
-        if remembers(self.beam) and not np.iscomplexobj(self._u):
+        if self._remembers and not np.iscomplexobj(self._u):
             return self._stored
-        if not self.beam.has_sections and not self._small:
+        if self.cable and not self._small:
             # cable: half of the nominal stress times the elastic stretch - 1
             stretch, longer = stretched(self.strain[0])
             longer = longer - (self._eigenstrain + 0.0 * self.strain)[0]
             return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
 
+        grade = self.of_materials(lambda material: np.ones(self.n), True)
+
         def of(material):
             law = material.law()
             if self._small or isinstance(law, LinearLaw):
                 return 0.5 * np.sum(self.elastic * self.S, axis=0)
-            return law.energy(self.elastic)
+            return law.energy(self.elastic) * grade
 
         return self.of_materials(of)
 
@@ -500,29 +519,60 @@ def find_fields(fields: Any) -> list[Field]:
     return found
 
 
-class DomainValues:
-    """Displacement, strain (3, n) and deformation gradient (2, 2, n) at points of a domain.
+class DomainValues(Values):
+    """Fields at points of a domain; components are in global axes.
 
-    Components are in global axes. Arguments are reference positions and displacements, (2, n), and
-    the displacement gradient, (2, 2, n).
+    Those of the stress need a domain with a material, see :meth:`skfem_ancf.Domain.solid`.
+
+    Parameters
+    ----------
+    domain
+        The :class:`~skfem_ancf.Domain`.
+    x, u, gradient
+        Reference positions and displacements, (2, n), and the displacement gradient, (2, 2, n); for
+        a linear solution the :func:`~skfem_ancf.core.linear.step` from its base.
     """
 
-    _small = False
+    cable = False
 
-    def __init__(self, x: Array, u: Array, gradient: Array) -> None:
-        self.x, self.u, self.n = x, u, x.shape[1]
-        self.F = gradient + np.eye(2)[..., None]
-        C = np.einsum("kin,kjn->ijn", self.F, self.F)
-        self.strain = self.elastic = np.array(
-            [0.5 * (C[0, 0] - 1.0), 0.5 * (C[1, 1] - 1.0), C[0, 1]])
+    def __init__(self, domain: Domain, x: Array, u: Array, gradient: Array) -> None:
+        self.beam: Any = domain
+        self._start, self._u, self._H = x, u, gradient
+        self._find, self._eigen, self._known, self.n = None, (), {}, x.shape[1]
+        self._small = np.iscomplexobj(u) and not gradient.real.any()
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        raise InputError(f"{name.lstrip('_')} of a domain depends on its forms")
+    @property
+    def x(self) -> Array:
+        return self._start
 
-    def __getitem__(self, name: str) -> Array:
-        return find_field(name).of(self)  # type: ignore[arg-type]
+    @cached_property
+    def u(self) -> Array:
+        return first_order(self._u)
+
+    @property
+    def _strain(self):
+        return displacement_strain(self._H)
+
+    @property
+    def _gradient(self):
+        return self._H + self.frame
+
+    @property
+    def _stress(self):
+        law = self.beam.material.reference()[0].law()
+        return stress_of(law, self._strain) * grade_of(self.beam, self._start)
+
+    @property
+    def _remembers(self):
+        return self.beam.material is None  # raises for user-defined forms
+
+    @property
+    def frame(self) -> Array:
+        return np.broadcast_to(np.eye(2)[..., None], (2, 2, self.n))
+
+    def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
+        found = ask(self.beam.material.reference()[0])
+        return found * grade_of(self.beam, self._start) if graded else found
 
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:

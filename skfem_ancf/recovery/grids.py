@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..beam.beam import Beam
+from ..beam.domain import drawn
 from ..core.errors import InputError, require_flag, require_integer, require_like, shown
 from ..core.quadrature import tensor
 from ..core.types import Array
@@ -83,12 +84,13 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
                         body.outline_at(state.u_of(body)) - x, "polygon",
                         np.arange(x.shape[1])[None], np.zeros(1, dtype=int), 1, None))
     for k, domain in enumerate(getattr(getattr(state, "system", None), "domains", ())):
-        x, u, gradient, cells = domain.drawn(state.u_of(domain))
+        x, u, gradient, cells = drawn(domain, state._places_of(domain))
         number = domain.basis.mesh.nelements
-        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, x, u,
+        values = DomainValues(domain, x, u, gradient)
+        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, x, values.u,
                         "triangle" if cells.shape[1] == 3 else "quad", cells,
                         np.repeat(np.arange(number), len(cells) // number), 1,
-                        DomainValues(x, u, gradient)))
+                        values))
     return out
 
 
@@ -248,7 +250,7 @@ def _array(field, grid, lenient):
 def _normal(field, values):
     """The out-of-plane component of a tensor, (n,); NaN if the law does not define it."""
     try:
-        strain, cable = values.elastic, not values.beam.has_sections
+        strain, cable = values.elastic, values.cable
         if field.name == "strain":
             return values.of_materials(lambda law: 0.5 * (law.thickness_stretch(strain)**2 - 1.0))
         if field.name == "stress":

@@ -18,7 +18,7 @@ from ..actions.joints.base import Joint
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
 from ..beam.beam import Beam
 from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector
-from ..beam.domain import Domain
+from ..beam.domain import Domain, DomainPoints
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
 from ..beam.rigid import RigidBody
@@ -31,7 +31,7 @@ from ..equations.matrices import linear_energy, linear_external_force, linear_fo
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System
 from ..io import tables, vtu
-from ..recovery.fields import Values, find_field
+from ..recovery.fields import DomainValues, Values, find_field
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import ALONG_ELEMENT, Resultants, resultants
 from ..recovery.section_forces import NotRecovered, SectionForces
@@ -398,18 +398,14 @@ class State(Immutable, MaterialPoints, SpringForces):
                line: int | None = None) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
-        For a linear solution the linear strain.
+        In a domain the components are in global axes. For a linear solution the linear strain.
 
         Raises
         ------
         InputError
             If several lines or beams are equally near to a point, as at a node.
         """
-        at, numbers = self._find(point, beam, recover, line)
-        values = at.gather([part.strain(self._places, self._recovery_of(k) if recover else None)
-                            for k, part in zip(numbers, at.parts)])
-        if np.iscomplexobj(values):
-            values = first_order(values)
+        values = self._at_points(lambda v: v.strain, point, beam, recover, line)
         return (values.T * [1.0, 1.0, 0.5]).T
 
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
@@ -434,16 +430,16 @@ class State(Immutable, MaterialPoints, SpringForces):
         return self._at_points(find_field(field).of, point, beam, recover, line)
 
     def _at_points(self, ask, point, beam, recover, line):
-        at, numbers = self._find(point, beam, recover, line)
-        return at.gather([ask(Values(part, self._places, partial(self._recovery_of, k) if recover
-                                     else None, self._eigenstrains(part.beam),
-                                     self._with_history(part.beam)))
-                          for k, part in zip(numbers, at.parts)])
-
-    def _find(self, point, beam, recover, line):
         require_flag("recover", recover)
         at = self.system.points.find(point, beam, line, ask=True)
-        return at, [part.number for part in at.parts]
+        return at.gather([ask(self._values(part, recover)) for part in at.parts])
+
+    def _values(self, part, recover):
+        """Fields at points of a member, for DOFs of the scene."""
+        if isinstance(part, DomainPoints):
+            return DomainValues(part.body, part.start, *part.fields(self._places))
+        return Values(part, self._places, partial(self._recovery_of, part.number) if recover else
+                      None, self._eigenstrains(part.beam), self._with_history(part.beam))
 
     def values_of(self, beam: Beam, part: BeamPoints, recover: bool = True) -> Values:
         """All fields at points of one beam, for pictures and files.
