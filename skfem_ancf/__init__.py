@@ -39,6 +39,7 @@ from .results.path import CriticalPoint, Path
 from .results.response import FrequencyResponse
 from .results.state import Reaction, State
 from .scene.design import Design
+from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
 from .scene.frame import Frame
 from .scene.plan import Plan
 from .scene.linear_model import LinearModel, StateSpace
@@ -57,6 +58,7 @@ __all__ = [
     "Beam",
     "BodyContact",
     "Buckling",
+    "BucklingLoad",
     "CallError",
     "CallbackError",
     "CheckpointError",
@@ -66,6 +68,7 @@ __all__ = [
     "Contact",
     "Control",
     "ConvergenceError",
+    "CriticalLoad",
     "CriticalPoint",
     "DeadLoad",
     "Design",
@@ -90,6 +93,7 @@ __all__ = [
     "Formulation",
     "Foundation",
     "Frame",
+    "Frequency",
     "FrequencyResponse",
     "Gauss",
     "GeneralizedAlpha",

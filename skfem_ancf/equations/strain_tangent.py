@@ -111,7 +111,7 @@ class StrainTangent:
     def _responding(self, rest, du, gap=None):
         x, multipliers = Inverse(self).solve_both(rest[:, None], gap)
         du[self.free] = x[:, 0]
-        return du, self._rows[1] @ du, multipliers[:, 0]
+        return du, self.stresses(du), multipliers[:, 0]
 
     def balance(self, M: csr_matrix, shift: float) -> None:
         """Replace the stress by one in equilibrium, if the state is an equilibrium to round-off.
@@ -163,6 +163,10 @@ class StrainTangent:
         R = scipy.linalg.qr(self.J.toarray().T, mode="r")[0]
         if np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)):
             raise SupportError("the joints are dependent in this state")
+
+    def stresses(self, du: Array) -> Array:
+        """Stresses (k,) of a displacement du (N,) to first order."""
+        return self._rows[1] @ du
 
     def internal(self, stress: Array) -> Array:
         """The internal force of stresses, shape (N,)."""

@@ -15,6 +15,7 @@ from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
 from ..results.state import State
+from .eigen_readings import EigenReading, residual
 from .linear_model import Bordered, rows_of
 
 #: Step of the parameters, relative to their size, and a stencil of fourth order.
@@ -23,7 +24,7 @@ STEP = 1e-3
 TOUCHING = 1e-6
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 #: Relative change of an equation that is no round-off.
-CHANGED = 1e-10
+CHANGED = 1e-9
 #: Relative difference of a change by all parameters from the sum of those by each.
 AGREE = 1e-3
 #: Step of displacements for readings that are functions, relative to the size of the scene.
@@ -47,7 +48,9 @@ class Design:
         user-defined energies may depend on them, but not the number of degrees of freedom.
     readings
         Names of sensors of that scene, or functions of the State that return a number or an array.
-        Functions are derived by differences by each degree of freedom: for small scenes.
+        Functions are derived by differences by each degree of freedom: for small scenes. Or a
+        :class:`~skfem_ancf.Frequency`, :class:`~skfem_ancf.BucklingLoad` or
+        :class:`~skfem_ancf.CriticalLoad`.
     sizes
         Typical sizes of the parameters, (n,), by default their absolute values.
 
@@ -91,6 +94,8 @@ class Design:
         self._values: Any = None
         self._J: Any = None
         self._groups: list[tuple[Array, Array]] | None = None
+        self._static = not all(isinstance(one, EigenReading) and not one.loaded
+                               for one in self.readings)
         self.state: State | None = None
 
     def __call__(self, p: ArrayLike) -> tuple[Array, Array]:
@@ -126,13 +131,15 @@ class Design:
     # the state
 
     def _solve(self, p):
-        """Find the state at p, unless it is the last one."""
+        """Find the readings at p, unless it is the last one."""
         p = np.atleast_1d(require_finite("p", p)).astype(float)
         if self._p is not None and np.array_equal(self._p, p):
             return
         scene = self._scene(p)
-        state = self._solved(scene)
+        state = self._solved(scene) if self._static else None
         self._p, self._built, self.state, self._J = p, scene, state, None
+        self._found = [(one, *one._find(scene, state if one.loaded else None))
+                       for one in self.readings if isinstance(one, EigenReading)]
         self._values = self._read(scene, state)
 
     def _scene(self, p):
@@ -157,27 +164,46 @@ class Design:
             yield scene.sensors[one] if isinstance(one, str) else one
 
     def _read(self, scene, state):
-        found = [np.zeros(0)]
+        """Values of the readings; those of eigenvalues are the ones found."""
+        values, self._places, at = [np.zeros(0)], [], 0
         for one in self._sensors(scene):
-            value = ask_array("a reading", None, one, state) if not isinstance(one, Sensor) else (
-                read(one, locate(one, state.system), state))
-            found.append(np.ravel(value))
-        return np.concatenate(found)
+            if isinstance(one, EigenReading):
+                value = self._found[len(self._places)][1]
+                self._places.append(at)
+            elif isinstance(one, Sensor):
+                value = read(one, locate(one, state.system), state)
+            else:
+                value = ask_array("a reading", None, one, state)
+            values.append(np.ravel(value))
+            at += len(values[-1])
+        return np.concatenate(values)
 
     # derivatives
 
     def _jacobian(self, p, scene, state):
-        if state.system.histories.dissipates:
+        if state is not None and state.system.histories.dissipates:
             raise InputError("forces of this scene depend on the path (friction, plasticity): the "
                              "derivative of a reading depends on the direction, and is not defined")
-        adjoint = self._adjoint(scene, state)
-        r, n = len(adjoint), state.system.N + state.system.constraints.m
-        out = np.zeros((r, len(p)))
+        self._frozen = [one._freeze(scene, found) for one, _, found in self._found]
+        c, first = scene.system.constraints, len(self._values)
+        # the readings, then the rows of eigenvalues and those of their checks
+        owners = [one for k, frozen in enumerate(self._frozen) for one in (
+            self._places[k], first + k)[:1 if frozen.check is None else 2]]
+        self._owners = np.concatenate([np.arange(first), np.repeat(owners, c.N + c.m)]).astype(int)
         numbers, at, change = self._changes(p, state)
-        of_z = at < n
-        np.add.at(out.T, numbers[of_z], -(adjoint[:, at[of_z]] * change[of_z]).T)
-        np.add.at(out, (at[~of_z] - n, numbers[~of_z]), change[~of_z])
-        return out
+        found = np.zeros((len(self._values) + len(self._frozen), len(p)))
+        if state is not None:
+            adjoint = self._adjoint(scene, state)
+            n = adjoint.shape[1]
+            own = at < n
+            np.add.at(found[:len(self._values)].T, numbers[own],
+                      -(adjoint[:, at[own]] * change[own]).T)
+            numbers, at, change = numbers[~own], at[~own] - n, change[~own]
+        np.add.at(found, (self._owners[at], numbers), change)
+        for frozen, work in zip(self._frozen, found[len(self._values):]):
+            if frozen.check is not None:
+                frozen.check(work)
+        return found[:len(self._values)]
 
     def _adjoint(self, scene, state):
         """The adjoint of each reading, (r, N + m)."""
@@ -187,28 +213,34 @@ class Design:
 
     def _by_state(self, scene, state):
         """Derivatives of the readings by displacements and multipliers, (r, N + m)."""
-        found = [np.zeros((0, state.system.N + state.system.constraints.m))]
+        n = state.system.N + state.system.constraints.m
+        rows, frozen = [np.zeros((0, n))], iter(self._frozen)
         for one in self._sensors(scene):
-            if isinstance(one, Sensor) and not callable(one.what):
+            if isinstance(one, EigenReading):
+                own = next(frozen).by_state
+                rows.append(np.zeros((1, n)) if own is None else own[None])
+            elif isinstance(one, Sensor) and not callable(one.what):
                 row = rows_of(state.system, state, one)
-                found.append(np.hstack([row.u, row.multipliers]))
+                rows.append(np.hstack([row.u, row.multipliers]))
             else:
                 function = one.what if isinstance(one, Sensor) else one
-                found.append(_differences(function, state))
-        return np.concatenate(found)
+                rows.append(_differences(function, state))
+        return np.concatenate(rows)
 
     def _changes(self, p, state):
         """Derivatives of equations and readings by parameters: numbers, places, values."""
         sizes = np.abs(p) if self._sizes is None else self._sizes
-        h = (TOUCHING if state.system.forces.contacts.obstacles else STEP) * np.where(
+        touching = state is not None and state.system.forces.contacts.obstacles
+        h = (TOUCHING if touching else STEP) * np.where(
             sizes > 0.0, sizes, sizes.max() or 1.0)
-        noise = CHANGED * self._magnitudes(state)
+        before = self._equations(p, state)
+        noise = CHANGED * self._magnitudes(state, before)
         if self._groups is not None:
             found = self._of_groups(p, h, state)
             if self._agree(found, p, h, state, noise):
                 return found
         # parameters act elsewhere than they did at the last groups: contact, say
-        self._groups = self._grouped(p, h, state, noise)
+        self._groups = self._grouped(p, h, state, before, noise)
         return self._of_groups(p, h, state)
 
     def _of_groups(self, p, h, state):
@@ -230,9 +262,9 @@ class Design:
         return np.all(np.abs(change - sums) <= AGREE * (sizes + np.abs(change))
                       + 10.0 * noise)
 
-    def _grouped(self, p, h, state, noise):
+    def _grouped(self, p, h, state, before, noise):
         """Parameters that change different equations, with the parameter of each equation."""
-        before, groups = self._equations(p, state), []
+        groups = []
         for k in range(len(p)):
             moved = p.copy()
             moved[k] += h[k]
@@ -248,29 +280,38 @@ class Design:
         return groups
 
     def _equations(self, p, state):
-        """The equations at the displacements and multipliers of a state, and the readings."""
-        scene = self._scene(p)
-        system, u, load = scene.system, np.array(state.u), state.load
-        if system.N != state.system.N or system.constraints.m != state.system.constraints.m:
-            raise InputError("the parameters change the number of degrees of freedom or of joint "
-                             f"equations, from {state.system.N} and {state.system.constraints.m} "
-                             f"to {system.N} and {system.constraints.m}")
-        c, l = system.constraints, state.multipliers
-        with system.histories.lent(state.memory):
-            force = system.internal_force(u, None, load)
-        rest = force - load * system.external_force(u) + c.sparse_jacobian(u, load).T @ l
-        rest[c.fixed] = u[c.fixed] - c.values(load)
-        seen = self._read(scene, State(system, u, load, multipliers=l, memory=state.memory))
-        return np.concatenate([rest, c.constraint(u, load), seen])
+        """The equations at the displacements and multipliers of a state, and the readings.
 
-    def _magnitudes(self, state):
-        """Typical magnitudes of the terms in the equations, and of the readings."""
-        system, seen = state.system, np.abs(self._values)
-        s, c = system.constraints.coordinate_sizes, system.constraints
+        An eigenvalue has rows whose sum it is.
+        """
+        scene = self._scene(p)
+        system, old = scene.system, self._built.system
+        if system.N != old.N or system.constraints.m != old.constraints.m:
+            raise InputError("the parameters change the number of degrees of freedom or of joint "
+                             f"equations, from {old.N} and {old.constraints.m} "
+                             f"to {system.N} and {system.constraints.m}")
+        parts, seen = [np.zeros(0)], self._values
+        if state is not None:
+            u, l = np.array(state.u), state.multipliers
+            parts.append(residual(system, u, l, state.load, state.memory))
+            seen = self._read(scene, State(system, u, state.load, multipliers=l,
+                                           memory=state.memory))
+        return np.concatenate([*parts, seen, *(frozen.rows(scene) for frozen in self._frozen)])
+
+    def _magnitudes(self, state, before):
+        """Typical magnitudes of the terms in the equations, of the readings and their rows."""
+        c, own = self._built.system.constraints, np.abs(before[-len(self._owners):])
+        first = len(self._values)
+        rows = own[first:].reshape(-1, c.N + c.m)
+        largest = np.append(np.full(first, own[:first].max(initial=0.0)),
+                            np.repeat(rows.max(axis=1, initial=0.0), c.N + c.m))
+        if state is None:
+            return largest
+        system, s = state.system, c.coordinate_sizes
         with system.histories.lent(state.memory):
             work = np.abs(system.internal_force(np.array(state.u), None, state.load) * s).max()
         return np.concatenate([np.where(c.free, work / s, s), np.full(c.m, system.size),
-                               np.full(len(seen), seen.max(initial=0.0))])
+                               largest])
 
 
 def _differences(function, state):
