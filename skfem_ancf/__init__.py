@@ -37,6 +37,7 @@ from .recovery.resultants import Resultants
 from .results.checks import Checks
 from .results.path import CriticalPoint, Path
 from .results.response import FrequencyResponse
+from .results.output import Extreme
 from .results.state import Reaction, State
 from .scene.design import Design
 from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
@@ -86,6 +87,7 @@ __all__ = [
     "Energy",
     "EnergyMomentum",
     "Explorer",
+    "Extreme",
     "FileError",
     "FollowerForce",
     "ForceElement",

@@ -21,7 +21,8 @@ LARGER = {
 }
 
 LARGER.update(dict.fromkeys((
-    "actions/obstacles/obstacle.py::Obstacle.__init__", "scene/frame.py::Frame.from_lines",
+    "actions/obstacles/obstacle.py::Obstacle.__init__",
+    "materials/elastic_plastic.py::ElasticPlastic.__init__", "scene/frame.py::Frame.from_lines",
     "scene/frame.py::Frame.from_meshio", "scene/scene.py::Scene.continuation",
     "dynamics/history.py::History.plot", "scene/scene.py::Scene.integrate",
     "scene/scene.py::Scene.solve_static"),

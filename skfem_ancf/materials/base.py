@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
-                           require_positive, require_slope, shown)
+from ..core.errors import (InputError, require_finite, require_finite_scalar, require_like,
+                           require_option, require_positive, require_slope, shown)
 from ..core.immutable import Immutable, is_builtin, rebuilt
 from ..core.quadrature import gauss
 from ..core.types import Array, HasShear, Law
@@ -54,6 +54,10 @@ class Material(Immutable):
         positive number.
     thermal_expansion
         Strain per degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.
+    strength
+        Stress that the material bears, for the field "utilisation" and :meth:`State.extremes
+        <skfem_ancf.State.extremes>`: a positive number, with which the von Mises stress is
+        compared, or a pair for the principal stresses in tension and compression (force per area).
 
     Raises
     ------
@@ -64,7 +68,8 @@ class Material(Immutable):
     """
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
-                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
+                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
+                 strength: float | tuple[float, float] | None = None) -> None:
         self.E = _number_or_function("E", E)
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else _number_or_function("density", density)
@@ -78,6 +83,13 @@ class Material(Immutable):
             if isinstance(shear_correction, str) else
             require_positive("shear_correction", shear_correction))
         self.thermal_expansion = require_finite_scalar("thermal_expansion", thermal_expansion)
+        self.strength: float | tuple[float, float] | None = strength
+        if np.ndim(strength) > 0:  # type: ignore[arg-type]
+            tension, compression = require_finite("strength", strength, (2,))
+            self.strength = (require_positive("strength", tension),
+                             require_positive("strength", compression))
+        elif strength is not None:
+            self.strength = require_positive("strength", strength)
 
     @property
     def graded(self) -> bool:
@@ -131,7 +143,7 @@ class Material(Immutable):
         2.0
         """
         return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction",
-                                       "thermal_expansion"))
+                                       "thermal_expansion", "strength"))
 
     def law(self, k_s: float = 1.0) -> Law:
         """The law with corrected shear, as a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""

@@ -61,7 +61,7 @@ class ElasticPlastic(HistoryMaterial):
 
     Parameters
     ----------
-    E, nu, density, plane, shear_correction, thermal_expansion
+    E, nu, density, plane, shear_correction, thermal_expansion, strength
         Those of :class:`~skfem_ancf.materials.base.Material`; E is a number.
     yield_stress
         Positive.
@@ -102,8 +102,10 @@ class ElasticPlastic(HistoryMaterial):
                  hardening: float | Voce | ArrayLike = 0.0, kinematic: float = 0.0,
                  density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
-                 points: int = ACROSS) -> None:
-        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, points)
+                 points: int = ACROSS,
+                 strength: float | tuple[float, float] | None = None) -> None:
+        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, points,
+                         strength)
         if self.nu == 0.5:
             raise InputError("ElasticPlastic needs nu below 0.5, got 0.5: use 0.49")
         self.yield_stress = require_positive("yield_stress", yield_stress)

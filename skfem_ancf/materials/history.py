@@ -53,7 +53,7 @@ class HistoryMaterial(Material):
     points
         Number of points across a section or layer. The default of 14 gives the moment of an ideally
         plastic rectangle to 1 %, 20 to 0.4 %.
-    E, nu, density, plane, shear_correction, thermal_expansion
+    E, nu, density, plane, shear_correction, thermal_expansion, strength
         Those of :class:`~skfem_ancf.materials.base.Material`; E is a number.
 
     Other Parameters
@@ -90,16 +90,17 @@ class HistoryMaterial(Material):
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
-                 points: int = ACROSS) -> None:
+                 points: int = ACROSS,
+                 strength: float | tuple[float, float] | None = None) -> None:
         if callable(E):
             raise InputError(f"{type(self).__name__} has a history, and takes a number for E: give "
                              "layers of other materials by Section.layers")
-        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion)
+        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, strength)
         self.points = require_integer("points", points, 2, 200)
 
     def replace(self, **changes: Any) -> Material:
         return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction",
-                                       "thermal_expansion", "points"))
+                                       "thermal_expansion", "points", "strength"))
 
     @property
     def number(self) -> int:

@@ -94,8 +94,9 @@ class NeoHookean(PointwiseMaterial):
     point = staticmethod(neo_hookean)
 
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
-                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
-        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion)
+                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
+                 strength: float | tuple[float, float] | None = None) -> None:
+        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion, strength)
         if self.nu == 0.5:
             raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
 

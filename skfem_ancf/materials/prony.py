@@ -58,7 +58,8 @@ class Prony(HistoryMaterial):
             raise InputError("material must be an elastic one, such as StVenantKirchhoff(E, nu), "
                              f"got {shown(material)}")
         super().__init__(material.E, material.nu, material.density, material.plane,
-                         material.shear_correction, material.thermal_expansion, points)
+                         material.shear_correction, material.thermal_expansion, points,
+                         material.strength)
         self.material, self._law = material, material.law()
         self.shares = np.ravel(require_finite("shares", np.atleast_1d(shares), (None,)))
         self.times = np.ravel(require_finite("times", np.atleast_1d(times), self.shares.shape))

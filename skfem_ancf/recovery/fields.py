@@ -398,6 +398,21 @@ def _tresca(v):
     return np.maximum(high, v.sigma_zz) - np.minimum(low, v.sigma_zz)
 
 
+def _utilisation(v):
+    """Stress over strength; NaN where the material has none."""
+    def of(law):
+        strength = law.strength
+        if strength is None:
+            return np.full(v.n, np.nan)
+        if not isinstance(strength, tuple):
+            return _von_mises(v) / strength
+        high, low = v.principal_stress[0]
+        return np.maximum(np.maximum(high, v.sigma_zz) / strength[0],
+                          -np.minimum(low, v.sigma_zz) / strength[1])
+
+    return v.of_materials(of)
+
+
 def _stretch(v):
     if v._small:
         return 1.0 + v.strain[0]
@@ -429,6 +444,7 @@ def _table():
     for k in (0, 1):
         yield Field(f"sigma_{k + 1}", lambda v, k=k: v.principal_stress[0][k],
                     rf"principal Cauchy stress $\sigma_{k + 1}$", area)
+    yield Field("utilisation", _utilisation, "utilisation: stress over strength", one, False)
     yield Field("energy", lambda v: v.energy, "strain energy density", "energy / volume", False)
     yield Field("plastic_strain", lambda v: v.output("plastic_strain"),
                 "accumulated plastic strain", one, False)
@@ -502,6 +518,13 @@ def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, .
         name = getattr(field, "__name__", type(field).__name__).strip("<>")
         return Field(name, field)
     raise NameUnknown("field", field, tuple(FIELDS) if known is None else known)
+
+
+def no_value(field: Field) -> InputError:
+    """The error for a field that is NaN all over a scene."""
+    return InputError(f"the field {field.name!r} has no value anywhere in this scene" + (
+        ": give a material its strength, as StVenantKirchhoff(..., strength=235e6)"
+        if field.name == "utilisation" else ""))
 
 
 def find_fields(fields: Any) -> list[Field]:

@@ -1,5 +1,6 @@
 """Results: states, modes and paths."""
 
+from .output import Extreme
 from .state import Reaction, State
 
-__all__ = ["Reaction", "State"]
+__all__ = ["Extreme", "Reaction", "State"]

@@ -50,6 +50,9 @@ class Checks:
         outermost fibres.
     turning
         Largest rotation of the axis over one element, in radians, from the reference configuration.
+    utilisation : Extreme or None
+        The largest stress over strength, see :meth:`State.extremes
+        <skfem_ancf.State.extremes>`; None if no material has a strength.
     findings : tuple of str
         Violations of the range of the law or the mesh.
 
@@ -61,10 +64,13 @@ class Checks:
     largest_stretch: float
     turning: float
     findings: tuple = ()
+    utilisation: Any = None
 
     def __str__(self):
         lines = [f"det F from {self.smallest_det:.4g}, stretch from {self.smallest_stretch:.4g} to "
                  f"{self.largest_stretch:.4g}, turning {self.turning:.3g} rad an element"]
+        if self.utilisation is not None:
+            lines.append(f"largest utilisation {self.utilisation}")
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
@@ -80,13 +86,20 @@ def check(state: Any) -> Checks:
                   + _strained(state, beam, *values[-1][1:3]) if base is None else
                   _linear_findings(beam, u, base))
     found += pushed_points(state.system) + state._not_recovered
+    worst = None
+    if any(layer.material.strength is not None for b in state.beams for layer in b.across.layers):
+        worst = state.extremes(count=1)[0]
+        if worst.value > 1.0:
+            found.append(f"the stress at {worst.point.round(6).tolist()} of beam {worst.beam!r} is "
+                         f"{worst.value:.3g} times the strength of the material: it yields or "
+                         "breaks there. Use a larger section, a stronger material or less load")
     if state.base is None:
         found += _yields(state)
     if state.t is None and state.base is None:
         found += _slips(state)
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
-                  tuple(found))
+                  tuple(found), worst)
 
 
 def _yields(state):

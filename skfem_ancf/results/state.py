@@ -30,13 +30,12 @@ from ..core.types import Array, Place
 from ..equations.matrices import linear_energy, linear_external_force, linear_force
 from ..equations.stability import Verdict, verdict
 from ..equations.system import System
-from ..io import tables, vtu
 from ..recovery.fields import DomainValues, Values, find_field
 from ..recovery.recovered import Recovery
 from ..recovery.resultants import ALONG_ELEMENT, Resultants, resultants
 from ..recovery.section_forces import NotRecovered, SectionForces
-from ..visuals import diagrams, html, matplotlib, pyvista
 from .checks import Checks, check
+from .output import Output
 
 
 # displacement, position and velocity of material points, for states, motions and paths
@@ -171,7 +170,7 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State(Immutable, MaterialPoints, SpringForces):
+class State(Immutable, MaterialPoints, SpringForces, Output):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters
@@ -763,15 +762,3 @@ class State(Immutable, MaterialPoints, SpringForces):
         """Force of a joint on its first beam, in the order of ``joint.equations``; (m,)."""
         return self.system.constraints.joint_force(
             joint, self.multipliers, self._support_force(), self._acted, self._time)
-
-    # files and pictures
-
-    def _repr_html_(self) -> str:
-        return html.state_html(self)
-
-    save = vtu.save_vtu
-    to_xarray = tables.to_xarray
-    to_pyvista = pyvista.to_pyvista
-    view = pyvista.view
-    plot = matplotlib.plot_state
-    plot_resultants = diagrams.plot_resultants

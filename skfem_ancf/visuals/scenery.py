@@ -12,7 +12,7 @@ from ..actions.obstacles.outlines import AROUND, around, outlines
 from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
                            require_positive, require_unmasked, shown)
 from ..core.types import Array
-from ..recovery.fields import (DRAWN, Field, find_field, unit_of, units_of,
+from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,
                                values_on_grid)
 from ..recovery.grids import Grid, grids, in_space, layout
 
@@ -193,6 +193,8 @@ class Scenery:
         self.beams = [body for frame in self.frames for body in frame]
         self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
         self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
+        if self.found.size and not np.any(np.isfinite(self.found)):
+            raise no_value(self.field)
         self.low, self.high = _limits(limits, self.found, self.field)
         self._states, self._grids = states, every
 
