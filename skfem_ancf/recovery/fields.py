@@ -293,7 +293,11 @@ class Values(Mapping):
     def F(self) -> Array:
         if self._recovery is not None and not self._small:
             with np.errstate(invalid="ignore"):
-                return self._recovery.gradient(self.strain, self._recovered(slice(6, 7))[0])
+                angle, strain = self._recovered(slice(6, 7))[0], self.strain
+                lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
+                across = angle + np.arccos(strain[2] / (lam_x * lam_y))
+                return np.array([[lam_x * np.cos(angle), lam_y * np.cos(across)],
+                                 [lam_x * np.sin(angle), lam_y * np.sin(across)]])
         return first_order(self._gradient)
 
     @property

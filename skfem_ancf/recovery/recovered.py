@@ -25,26 +25,25 @@ import copy
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebint, chebvander
+import scipy
+from scipy.linalg.lapack import dgttrf, dgttrs, dpttrf, dpttrs
 
-from ..beam.beam import Beam
-from ..beam.distribution import SNAP
+from ..beam.distribution import AXIS, SNAP
 from ..beam.remembered import remembers
 from ..beam.strains import on_grid, stress_at
 from ..core.immutable import cached_property
-from ..core.linear import largest
-from ..core.quadrature import gauss
+from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array, Law
 from ..formulations.base import EnhancedContinuum
 from ..materials import LinearLaw
+from ..mesh.mapping import cross
 from ..mesh.numbering import by_element
-from ..sections import Layer
-from ..sections.across import EDGE
-from .section_forces import ALONG, NotFound, NotRecovered, SectionForces, Together
-from .segments import EACH, Segment
+from ..sections.across import SIDE, beside
+from .section_forces import (AcrossPoints, ArcLength, Intervals, NotFound, NotRecovered,
+                             SectionForces, Sections, Together)
 
 #: Largest relative change of the strain in the last round, and strain that is round-off.
 UNSETTLED, TINY = 0.01, 1e-12
@@ -52,175 +51,397 @@ UNSETTLED, TINY = 0.01, 1e-12
 #: Sections closer to a cut than this fraction of an element are at the cut.
 AT_CUT = 1e-8
 
-#: Least points of the only interval of a section; additional points (to the order N) and least
-#: points of one of several; points of an interval of variable width.
-ACROSS, MORE, FEW, ROUND = 7, 2, 5, 17
+#: Rounds of steps 2 and 3, and their tolerance; largest number and tolerance if they converge
+#: slowly.
+ROUNDS, SETTLED = 6, 1e-7
+MOST, SLOWLY = 30, 1e-4
+
+#: The axes of sections and points across, behind that of several instants.
+EACH = (-2, -1)
+
+#: Fraction of an element next to a load or joint that has no sections. If it is the whole segment,
+#: the sections are those of the whole element.
+CLOSE = 0.02
+
+#: Iterations of the balance of a section in a round, and after the last one.
+BALANCE, BALANCE_AT_END = 2, 10
+
+#: Distance from the ends in heights up to which the element stress is used, and beyond which it is
+#: not; element lengths in heights up to which it is used fully, and beyond which it is not.
+INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 
-class ArcLength:
-    """Arc length along the reference axis; ``nodes`` (ne + 1,) at ends of elements."""
+class SectionsAlong:
+    """Operators on values at n >= 3 sections of arc lengths s (n,), for values (..., n, m).
 
-    def __init__(self, beam: Beam) -> None:
-        x, w = gauss(ALONG)
-        speed = np.hypot(*beam.mesh.mapping().DF(np.array([x, 0.5 + 0.0 * x]))[:, 0])
-        series = np.linalg.solve(chebvander(2.0 * x - 1.0, ALONG - 1), speed.T)
-        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T
-        self.nodes = np.append(0.0, np.cumsum(speed @ w))
-
-    def at(self, e: Array, xi: Array) -> Array:
-        """Arc length at xi of elements e, both of shape (n,)."""
-        return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
-            2.0 * xi - 1.0, ALONG), self._inside[e])
-
-
-class Interval(NamedTuple):
-    """Part of a section from ``low`` to ``high`` (eta), with nodes of a coordinate s in [0, 1].
-
-    Fields are polynomials in s. If ``curved``, ``eta = middle - half cos(pi s)``, which smooths
-    widths with square roots at the ends; otherwise eta is linear in s.
+    Derivative and integral are those of the cubic spline through the values, whose third derivative
+    is continuous at the second section and at the last but one (de Boor, "A Practical Guide to
+    Splines", chapter 4); of the parabola through three values.
     """
 
-    low: float
-    high: float
-    curved: bool
-    nodes: Array
-    inverse: Array  # (n, n) from values at the nodes to coefficients of Chebyshev polynomials
+    def __init__(self, s: Array, smoothing: float) -> None:
+        self.d = d = np.diff(s)
+        if len(d) == 2:
+            low, middle, high = d[1:], np.array([1.0, 2.0 * (d[0] + d[1]), 1.0]), d[:1]
+            low, high = np.append(low, 1.0), np.append(1.0, high)
+        else:
+            middle = np.concatenate([d[1:2], 2.0 * (d[:-1] + d[1:]), d[-2:-1]])
+            low = np.append(d[1:], d[-1] + d[-2])
+            high = np.append(d[0] + d[1], d[:-1])
+        self._slopes = dgttrf(low, middle, high)[:-1]
+        # f - smoothing^2 f'' = values, with f' = 0 at both ends
+        c = smoothing**2 / d
+        self._w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
+        self._smooth = dpttrf(self._w + np.append(c, 0.0) + np.append(0.0, c), -c)[:-1]
 
-    @property
-    def eta(self) -> Array:
-        """Eta of the nodes."""
-        s = 0.5 - 0.5 * np.cos(np.pi * self.nodes) if self.curved else self.nodes
-        return self.low + (self.high - self.low) * s
+    def d_ds(self, values: Array) -> Array:
+        """Axial derivative."""
+        d, y = self.d[:, None], _rows(values)
+        b, slope = np.empty_like(y), (y[1:] - y[:-1]) / d
+        b[1:-1] = 3.0 * (d[1:] * slope[:-1] + d[:-1] * slope[1:])
+        if len(d) == 2:
+            b[0], b[-1] = 2.0 * slope
+        else:
+            for end, first, second in ((0, 0, 1), (-1, -1, -2)):
+                both = d[first] + d[second]
+                b[end] = ((d[first] + 2.0 * both) * d[second] * slope[first]
+                          + d[first]**2 * slope[second]) / both
+        return _back(dgttrs(*self._slopes, b)[0], values)
 
-    def local(self, eta: Array) -> Array:
-        """s of points eta."""
-        s = (eta - self.low) / (self.high - self.low)
-        return np.arccos(np.clip(1.0 - 2.0 * s, -1.0, 1.0)) / np.pi if self.curved else s
-
-    def weights(self, s: Array) -> Array:
-        """Interpolation weights from the nodes to points s (...), shape (..., n)."""
-        return chebvander(2.0 * s - 1.0, len(self.nodes) - 1) @ self.inverse
-
-    def integrals(self, ends: Array) -> Array:
-        """Weights (k, n) of the integrals over eta from s = 0 to ends (k,)."""
-        x, w = gauss(len(self.nodes) * (2 if self.curved else 1))
-        s = ends[:, None] * x
-        slope = 0.5 * np.pi * np.sin(np.pi * s) if self.curved else 1.0 + 0.0 * s
-        return (self.high - self.low) * np.einsum("kg,kgn->kn", ends[:, None] * w * slope,
-                                                  self.weights(s))
-
-
-class AcrossPoints(NamedTuple):
-    """AcrossPoints across sections: arrays (n, m), or (m,) if all sections are equal.
-
-    ``eta`` are the points, ``stretch`` the relative length of their interval; ``drift`` and
-    ``swell`` the derivatives of eta and log(stretch) by the height. ``axis`` and ``till_axis`` are
-    weights for the value on the axis, and for the integral from the bottom to the axis.
-    """
-
-    eta: Array
-    stretch: Any
-    drift: Any
-    swell: Any
-    axis: Array
-    till_axis: Array
-
-
-class Intervals:
-    """AcrossPoints ``eta`` (m,) across a section of layers, with weights of integrals and values.
-
-    In some tapered sections the relative intervals vary along the axis; ``eta`` then belongs to the
-    highest section, and :meth:`points` gives others. ``layers`` are the columns of each layer,
-    ``width`` (m,) its relative width. ``from_bottom`` (m, m) and ``whole`` (m,) are weights of
-    integrals over eta; ``bottom`` and ``top`` of the values at the ends.
-    """
-
-    def __init__(self, layers: Sequence[Layer], order: int) -> None:
-        self._measures = [layer.measure for layer in layers]
-        pieces = [(piece, m.mean) for m in self._measures for piece in m.pieces]
-        self._intervals = [_interval(low, high, callable(b), order, len(pieces) == 1)
-                           for (low, high, b), _ in pieces]
-        ends = np.cumsum([0] + [len(i.nodes) for i in self._intervals])
-        self._columns = [slice(a, b) for a, b in pairwise(ends.tolist())]
-        counts = np.cumsum([0] + [len(m.pieces) for m in self._measures])
-        self.layers = [slice(ends[a], ends[b]) for a, b in pairwise(counts)]
-        self.eta = np.concatenate([i.eta for i in self._intervals])
-        self.width = np.concatenate([
-            (b(i.eta) if callable(b) else b) / mean + 0.0 * i.eta
-            for i, ((_, _, b), mean) in zip(self._intervals, pieces)])
-        self._low, self._high = (np.array([getattr(i, end) for i in self._intervals])
-                                 for end in ("low", "high"))
-        self.moves = self._measures[0].moves
-        self.from_bottom, self.whole = self._integrals(self.eta), np.zeros(ends[-1])
-        for i, columns in zip(self._intervals, self._columns):
-            self.whole[columns] = i.integrals(np.ones(1))
-        self.bottom, self.top = self.weights(np.array([self._low[0], self._high[-1]]))
-
-    def _which(self, eta):
-        """The interval of each point; the upper one at an interface."""
-        return np.searchsorted(self._high[:-1] - EDGE, eta, side="right")
-
-    def weights(self, eta: Array) -> Array:
-        """Weights (k, m) of the values at points eta (k,)."""
-        which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
-        for k in np.unique(which):
-            i, on = self._intervals[k], np.flatnonzero(which == k)
-            out[on, self._columns[k]] = i.weights(i.local(eta[on]))
+    def integral(self, values: Array) -> Array:
+        """Integral from the first section, of values (..., n)."""
+        slope, d = self.d_ds(values[..., None])[..., 0], self.d
+        parts = 0.5 * d * (values[..., :-1] + values[..., 1:]) + d * d / 12.0 * (
+            slope[..., :-1] - slope[..., 1:])
+        out = np.zeros_like(values)
+        np.cumsum(parts, axis=-1, out=out[..., 1:])
         return out
 
-    def _integrals(self, eta):
-        """Weights (k, m) of the integrals from the bottom to eta."""
-        which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
-        for k, (i, columns) in enumerate(zip(self._intervals, self._columns)):
-            s = np.where(which > k, 1.0, i.local(np.clip(eta, i.low, i.high)))
-            out[:, columns] = np.where(which[:, None] < k, 0.0, i.integrals(s))
-        return out
-
-    def _ends_at(self, h):
-        """Lower and upper ends of the intervals at heights (n,), shape (nintervals, n) both."""
-        ends = [m.ends(h) for m in self._measures]
-        return (np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]))
-
-    def points(self, h: Array) -> AcrossPoints:
-        """The points of sections of heights h (n,)."""
-        middle = np.array([0.5])
-        if not self.moves:
-            return AcrossPoints(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
-                          self._integrals(middle)[0])
-        of = np.repeat(np.arange(len(self._low)), [len(i.nodes) for i in self._intervals])
-        size = (self._high - self._low)[of]
-        z = (self.eta - self._low[of]) / size
-        (low, high), (low2, high2) = ((end[of].T for end in self._ends_at(k * h))
-                                      for k in (1.0, 2.0))
-        # ends are a + b / h: their derivative is 2 (end(2 h) - end(h)) / h
-        low_rate, high_rate = (2.0 * (b - a) / h[:, None] for a, b in ((low, low2), (high, high2)))
-        at = self.place(0.5 + 0.0 * h, h)
-        return AcrossPoints(low + (high - low) * z, (high - low) / size,
-                      low_rate + (high_rate - low_rate) * z, (high_rate - low_rate) / (high - low),
-                      self.weights(at), self._integrals(at))
-
-    def place(self, eta: Array, h: Array) -> Array:
-        """Map eta (n,) in sections of heights h (n,) to the highest section."""
-        if not self.moves:
-            return eta
-        low, high = self._ends_at(h)
-        which = np.sum(eta >= high[:-1], axis=0)
-        low, high = (np.take_along_axis(x, which[None], 0)[0] for x in (low, high))
-        starts, ends = self._low[which], self._high[which]
-        return starts + (ends - starts) * (eta - low) / (high - low)
+    def smoothed(self, values: Array) -> Array:
+        """Solution f of ``f - smoothing^2 f'' = values`` with f' = 0 at both ends."""
+        return _back(dpttrs(*self._smooth, self._w[:, None] * _rows(values))[0], values)
 
 
-def _interval(low, high, curved, order, alone):
-    """An Interval; the nodes of a single smooth one include its ends."""
-    if alone and not curved:
-        n = max(ACROSS, 2 * order + 1)
-        nodes = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, n))
-        nodes[n // 2] = 0.5
-    else:
-        n = ROUND if curved else max(FEW, order + MORE)
-        nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
-    return Interval(low, high, curved, nodes,
-                    np.linalg.inv(chebvander(2.0 * nodes - 1.0, n - 1)))
+def _rows(values: Array) -> Array:
+    """Values (..., n, m) as floats, one row for each section."""
+    rows = np.ascontiguousarray(values.swapaxes(0, -2))
+    return rows.reshape(values.shape[-2], -1).view(float)
+
+
+def _back(rows: Array, like: Any) -> Array:
+    """The values of :func:`_rows`."""
+    shape = like.swapaxes(0, -2).shape
+    return np.ascontiguousarray(rows).view(like.dtype).reshape(shape).swapaxes(0, -2)
+
+
+class Segment:
+    """The fields between two cuts, at n sections (ends and middles of elements) of m points.
+
+    The sections have arc lengths ``s`` (n,) and turn at the ``rate`` (n,). ``strain`` and
+    ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the axial fibres, ``change`` the
+    last change of the stretch. Of several instants together, the fields have an axis of the
+    instants before n; :meth:`part` is one of them.
+    """
+
+    def __init__(self, recovery: Any, start: float, end: float) -> None:
+        self.recovery, self.forces = recovery, recovery.forces
+        self.beam, self.height = recovery.beam, recovery.beam.mesh.height
+        #: Sections of cables keep their height when the axis is stretched.
+        self.rigid = not self.beam.has_sections
+        e = np.arange(int(np.floor(start)), int(np.ceil(end)))
+        a, b = np.maximum(start - e, 0.0), np.minimum(end - e, 1.0)
+        far = b - a > CLOSE
+        if far.any():  # derivatives between close sections are round-off
+            e, a, b = e[far], a[far], b[far]
+        else:  # whole elements, with the section force of this part
+            a, b = 0.0 * a, 0.0 * b + 1.0
+        whole = (a == 0) & (b == 1)
+        self.elements = e[whole] if whole.any() else e
+        self.e = np.append(np.repeat(e, 2), e[-1])
+        xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
+        self._geometry(self.e, xi)
+        self.R, self.M = self.forces.at(self.e, xi, np.full(len(xi), start))
+        if self.forces.viscous is not None:
+            self.Rv, self.Mv = (self._between(x[..., self.elements], np.array([0.5]))
+                                for x in self.forces.viscous_middles())
+            self.R, self.M = self.R - self.Rv, self.M - self.Mv
+        self._solve()
+
+    def part(self, k: int) -> Segment:
+        """The segment at instant k of several."""
+        one = copy.copy(self)
+        vars(one).pop("result", None)
+        one.strain, one.stress = self.strain[:, k], self.stress[:, k]
+        for name in ("angle", "stretch", "rate", "change"):
+            setattr(one, name, getattr(self, name)[k])
+        return one
+
+    def _between(self, values, xi):
+        """Spline at the sections through values (..., k) at xi (p,) of the elements, k = n p."""
+        e = self.elements
+        s = self.recovery.arc.at(np.repeat(e, len(xi)), np.tile(xi, len(e)))
+        if len(s) == 1:
+            return values + np.zeros(len(self.s))
+        return scipy.interpolate.CubicSpline(s, values, axis=-1)(self.s)
+
+    def _geometry(self, e, xi):
+        """Set points, stiffness and loads of the sections."""
+        r, across, mapping = self.recovery, self.beam.across, self.beam.mesh.mapping()
+        self.s = r.arc.at(e, xi)
+        moved = np.zeros(len(xi))  # loads may jump at ends inside elements
+        moved[0], moved[-1] = SIDE, -SIDE
+        xi = xi + moved * ((xi > 0.0) & (xi < 1.0))
+        self.points = at = r.points(e, xi)
+        sections = Sections(self.beam, e, xi, at.eta, self.forces.lifted, r.geometry)
+        axis = Sections(self.beam, e, xi, mapping=r.geometry)
+        X, speed = beside(sections.X), np.hypot(*axis.J[:, 0, :, 0])
+        h, slope = mapping.height(sections.X[0], e)
+        slope = slope / speed[:, None]
+        self.Y, self.span = h * (at.eta - 0.5), h * at.stretch
+        self.lean = slope * (at.eta - 0.5 + h * at.drift)
+        self.swell = slope * (1.0 / h + at.swell)
+        self.width = r.of_layers(across.width, X, e) if r.intervals.moves else (
+            r.intervals.width * (r.of_layers(across.breadth, X, e) + 0.0 * X[0]))
+        self.grade = r.of_layers(across.grade, X, e)
+        self.g = sections.volume / (speed[:, None] * h)
+        self.E0 = self.forces.eigenstrain(X, e)
+        area = self.integral(1.0)[:, None]
+        self.below = self.from_bottom(self.width) / area
+        self.body = self.g * (self.forces.body(sections)
+                              + self.forces.sampled(axis, AXIS) / (area * speed[:, None]))
+        self.faces = [self.forces.face(k, e, xi)[1][..., 0] / speed if k in self.forces.sides
+                      else np.zeros((2, len(e))) for k in (0, 1)]
+        self.axis_angle = unwrapped(angle_of(*self.forces.tangent(axis)))
+        # Jourawski's shear stress up to a factor: first moment of E dA over the width
+        E = self.grade * r.modulus(np.zeros((3,) + self.g.shape))
+        centre = (self.integral(E * self.Y) / self.integral(E))[:, None]
+        self.jourawski = self.from_bottom(self.width * E * (centre - self.Y)) / self.width
+        #: Derivatives along the segment; ``smoothed`` removes short waves, which would grow.
+        self.along = SectionsAlong(self.s, 0.5 * self.height)
+        s = self.s - self.s.mean()
+        #: Symmetric matrix of the least-squares line through values (n,).
+        self._line = s[:, None] * s / (s @ s) + 1.0 / len(s)
+
+    # along the axis and across
+
+    def spline(self, values: Array) -> Any:
+        """Cubic spline through values (n, ...) at the sections."""
+        return scipy.interpolate.make_interp_spline(self.s, values, min(3, len(self.s) - 1),
+                                                    check_finite=False)
+
+    def across(self, values: Any) -> Array:
+        """Integral over the height of values (..., n, m)."""
+        return (self.span * values) @ self.recovery.intervals.whole
+
+    def integral(self, values: Any) -> Array:
+        """Integral over the area of values (..., n, m)."""
+        return self.across(self.width * values)
+
+    def from_bottom(self, values: Array) -> Array:
+        """Integral from the bottom to each point of values (..., n, m)."""
+        return (self.span * values) @ self.recovery.intervals.from_bottom.T
+
+    def from_axis(self, values: Array) -> Array:
+        """Integral from the axis to each point of values (..., n, m)."""
+        till_axis = (self.span * values * self.points.till_axis).sum(axis=-1)
+        return self.from_bottom(values) - till_axis[..., None]
+
+    def at_axis(self, values: Array) -> Array:
+        """Values (..., n, m) on the axis, (..., n)."""
+        return (values * self.points.axis).sum(axis=-1)
+
+    def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
+        """Integral from the axis of the axial derivative at constant distance from it.
+
+        Values (..., n, m) and ``d_ds`` belong to points at constant relative positions.
+        """
+        lean = self.lean * values
+        return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
+
+    # step 2
+
+    def _fibres(self, S):
+        """Strain of a cable's fibres and S_xx = P / stretch, with P = E (stretch - 1)."""
+        r, longer = self.recovery, self.stretch - 1.0
+        eps = r.strain_of(S, np.array([longer, 0.0 * longer, 0.0 * longer]) - self.E0, (1, 2))
+        P = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
+        eps = eps + self.E0
+        size = 1.0 + 0.5 * longer  # Green-Lagrange strain over (stretch - 1)
+        thin = r.by_law(lambda law, xx: law.D[1, 0] / law.D[1, 1] * xx,
+                        size * (longer - self.E0[0]))
+        self.thinner = np.sqrt(1.0 - 2.0 * self.at_axis(thin))
+        return np.array([size * longer, size * eps[1], eps[2]]), P / self.stretch
+
+    def _section(self):
+        """Set the strain, r_X, r_Y and the stress P on sections, along t and n; (2, n, m) each.
+
+        The strain follows from S_yy, S_xy and the stretch, or S_xx if the stress is given.
+        """
+        r = self.recovery
+        if self.stress_given:
+            eps = self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
+        elif self.rigid:
+            eps, self.S[0] = self._fibres(self._fed)
+        else:
+            self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
+            eps = r.strain_of(self._fed, self.eps - self.E0, (1, 2))
+            self.S[0] = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
+            eps = eps + self.E0
+        self.eps, lam_y = eps, np.sqrt(1.0 + 2.0 * eps[1])
+        if self.rigid:  # sections of a cable keep their height
+            lam_y = lam_y / self.thinner[..., None]
+        lean = self.alpha - _arcsin(eps[2] / (self.stretch * lam_y))
+        self.rY = np.array([-lam_y * np.sin(lean), lam_y * np.cos(lean)])
+        self.rX = np.array([self.stretch * np.cos(self.alpha), self.stretch * np.sin(self.alpha)])
+        self.P = self.rX * self.S[0] + self.rY * self.S[2]
+
+    def _balance(self, times=BALANCE_AT_END):
+        """Change S_xx linearly in Y until normal force and moment are balanced."""
+        # S_yy has second derivatives of S_xx: short waves would grow
+        self._fed = np.concatenate([0.0 * self.S[:1], self.along.smoothed(self.S[1:])]) / self.grade
+        N, self.Q = _turned(self.R, self.phi)
+        for _ in range(times):
+            self._section()
+            E = self.grade * self.recovery.modulus(self.eps - self.E0)
+            x, y = self.from_axis(self.rY)
+            z = y / self.height
+            force = (E if self.rigid else self.S[0] + E * self.stretch**2) / self.g
+            # force and moment, and their derivatives by stretch 1 / g and bending z / g
+            found, moment, one, two, three = self.integral(np.array([
+                self.P[0], x * self.P[1] - y * self.P[0], force, z * force, z * z * force]))
+            n, m, det = N - found, (self.M - moment) / self.height, one * three - two * two
+            a, b = (three * n + two * m) / det, (-one * m - two * n) / det
+            change = (a[..., None] + b[..., None] * z) / self.g
+            self.stretch = self.stretch + change
+            if self.stress_given:
+                self.S[0] += E * self.stretch * change
+            if np.all(largest(change, EACH) < 1e-12 * largest(self.eps[0], EACH)):
+                break
+
+    def _turn(self):
+        """Set the rate of rotation, and the angles of fibres and frame."""
+        intervals, along = self.recovery.intervals, self.g * self.rX[0]
+        total = self.across(self.rY)
+        with_faces = along + self.lean * self.rY[0]
+        self.rate = (self.along.d_ds(total[0][..., None])[..., 0]
+                     - with_faces @ (intervals.top - intervals.bottom)) / total[1]
+        if not np.isfinite(self.rate).all():
+            raise NotFound(DIVERGED)
+        dt, dn = self.along.d_ds(self.rY)
+        normal = (self.slope_from_axis(self.rY[1], dn)
+                  + self.from_axis(self.rate[..., None] * self.rY[0]))
+        self.alpha = _arcsin(normal / (self.g * self.stretch))
+        turned = (self.slope_from_axis(self.rY[0], self.along.smoothed(dt))
+                  - self.from_axis(self.rate[..., None] * self.rY[1]))
+        self.stretch = (self.at_axis(along)[..., None] + turned) / (self.g * np.cos(self.alpha))
+        phi = self.along.integral(self.rate)
+        self.phi = phi + (self.axis_angle - phi) @ self._line
+
+    # step 3
+
+    def _viscous_stress(self):
+        """Viscous S_xx, linear in Y, and S_xy."""
+        if self.forces.viscous is None:
+            return 0.0, 0.0
+        N, Q = _turned(self.Rv, self.phi)
+        (x, y), (a, b) = self.from_axis(self.rY), self.rX
+        units = self.recovery.modulus(self.eps - self.E0) * self.grade * np.array(
+            [1.0 + 0.0 * y, y / self.height]) / self.g
+        K = np.array([[self.integral(a * unit), self.integral((x * b - y * a) * unit)]
+                      for unit in units])
+        det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
+        first = (K[1, 1] * N - K[1, 0] * self.Mv) / det
+        second = (K[0, 0] * self.Mv - K[0, 1] * N) / det
+        S = first[..., None] * units[0] + second[..., None] * units[1]
+        return S, self._sheared(Q - self.integral(b * S))
+
+    def _sheared(self, force):
+        """Jourawski's shear stress (n, m) of shear forces (n,)."""
+        return (force / self.integral(self.rY[1] * self.jourawski))[..., None] * self.jourawski
+
+    def _shear(self):
+        """Add shear stress to S_xy to match the shear force."""
+        self.S[2] += self._sheared(self.Q - self.integral(
+            self.rX[1] * self.S[0] + self.rY[1] * self.S[2]))
+
+    def _solve(self):
+        shape, dtype = self.axis_angle.shape + self.g.shape[-1:], self.R.dtype
+        self.phi, self.alpha, self.stretch = self.axis_angle, np.zeros(shape, dtype), np.ones(
+            shape, dtype)
+        self.eps, self.S = np.zeros((2, 3) + shape, dtype)
+        self.stress_given = False
+        for k in range(MOST):
+            before = self.stretch
+            self._balance(BALANCE)
+            self._turn()
+            # set S_xy and S_yy from div P + b = 0 and the loads of the faces
+            rate, viscous, phi = self.rate[..., None], self._viscous_stress(), self.phi[..., None]
+            P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
+            dP = (self.along.d_ds(P) + rate * np.array([-P[1], P[0]])
+                  + self.width * _turned(self.body, phi))
+            bottom, top = [_turned(f[..., None], phi) for f in self.faces]
+            dP = dP + self.swell * P  # with the flux through oblique faces
+            left = top + bottom + self.across(dP)[..., None]
+            P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
+            P2 = P2 / (self.g * self.width)
+            det = cross(self.rX, self.rY)
+            self.S = np.array([self.S[0], cross(self.rX, P2) / det,
+                               cross(P2, self.rY) / det - viscous[1]])
+            self._shear()
+            self.change = largest(self.stretch - before, EACH)
+            if np.all(self.change <= largest(self.stretch - 1.0, EACH) * (
+                    SETTLED if k < ROUNDS - 1 else SLOWLY)):
+                break
+        self._balance()
+        self._take_samples()
+        self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
+        self.strain = self._fibres(self.S / self.grade)[0] if self.rigid else (
+            self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0))
+        if not np.all(np.isfinite(self.strain)):
+            raise NotFound(DIVERGED)
+
+    # step 4
+
+    def _take_samples(self):
+        """Take the element stress near the ends, where elements resolve the boundary layers."""
+        r, weight = self.recovery, np.zeros(len(self.s))
+        if not r.has_stress:
+            return
+        lengths = np.diff(r.arc.nodes)[self.e]
+        for k in (0, -1):
+            h = np.max(np.broadcast_to(self.span, self.g.shape)[k])
+            x = np.abs(self.s - self.s[k]) / h
+            size = np.max(lengths[x <= LAYER]) / h
+            fine = np.clip((COARSE - size) / (COARSE - FINE), 0.0, 1.0)
+            z = np.clip((LAYER - x) / (LAYER - INNER), 0.0, 1.0)
+            weight = np.maximum(weight, fine * z * z * (3.0 - 2.0 * z))
+        if weight.any():
+            xi, stress = r.samples  # where it is most accurate, (..., ne, p, m)
+            values = np.moveaxis(stress[..., self.elements, :, :], -1, -3)
+            values = self._between(values.reshape(*values.shape[:-2], -1), xi)
+            self.S += weight[:, None] * (values.swapaxes(-1, -2) - self.S)
+            self.stress_given = True
+            self._balance()
+            self._shear()
+
+    @cached_property
+    def result(self) -> Any:
+        """Spline of strain, stress and angle, with values (7, m)."""
+        return self.spline(first_order(np.concatenate(
+            [self.strain, self.stress, self.angle[None]])).swapaxes(0, 1))
+
+
+DIVERGED = "the strain is too large: no equilibrium of the section was found"
+
+
+def _arcsin(x):
+    return np.arcsin(np.minimum(np.maximum(x, -1.0), 1.0))
+
+
+def _turned(f, angle):
+    """Components of vectors (2, ...) along angles and normal to them."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * f[0] + s * f[1], c * f[1] - s * f[0]])
 
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
@@ -297,9 +518,15 @@ class Recovery:
         if remembers(beam) or forces.pressed:
             return
         try:
-            self.segments = self._solved()
+            self.segments = [Segment(self, a, b) for a, b in pairwise(self.forces.cuts)]
+            strain = np.max([largest(one.stretch - 1.0, EACH) for one in self.segments], axis=0)
+            change = np.max(np.max([one.change for one in self.segments], axis=0)
+                            / np.maximum(strain, TINY))
+            if change > UNSETTLED:
+                raise NotFound("the iteration does not converge: the last change of the strain is "
+                               f"{change:.0%} of its largest value")
         except NotRecovered as why:
-            self.failed = why.failed
+            self.segments, self.failed = [], why.failed
             self.why = self.why or str(why)
 
     @cached_property
@@ -325,16 +552,6 @@ class Recovery:
                     one.why = every.why
                 return every._parts
         return [cls(*each) for each in zip(forces, u)]
-
-    def _solved(self):
-        found = [Segment(self, a, b) for a, b in pairwise(self.forces.cuts)]
-        strain = np.max([largest(segment.stretch - 1.0, EACH) for segment in found], axis=0)
-        change = np.max(np.max([segment.change for segment in found], axis=0)
-                        / np.maximum(strain, TINY))
-        if change > UNSETTLED:
-            raise NotFound("the iteration does not converge: the last change of the strain is "
-                           f"{change:.0%} of its largest value")
-        return found
 
     def _heights(self, e, xi):
         return (self.beam.mesh.mapping().height(xi[:, None], e)[0] + 0.0 * xi[:, None])[:, 0]
@@ -412,11 +629,3 @@ class Recovery:
             values = self.segments[k].result(s[on])[:, rows]
             out[:, on] = np.einsum("nrm,nm->rn", values, weights[on])
         return out
-
-    @staticmethod
-    def gradient(strain: Array, angle: Array) -> Array:
-        """Deformation gradient (2, 2, ...) from strain (3, ...) and fibre angle."""
-        lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
-        across = angle + np.arccos(strain[2] / (lam_x * lam_y))
-        return np.array([[lam_x * np.cos(angle), lam_y * np.cos(across)],
-                         [lam_x * np.sin(angle), lam_y * np.sin(across)]])

@@ -17,8 +17,8 @@ from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
 from ..core.types import Array
 from ..mesh.mapping import cross
-from .recovered import ArcLength, Recovery
-from .section_forces import Sections
+from .recovered import Recovery
+from .section_forces import ArcLength, Sections
 
 #: Default number of sections in an element, both ends included.
 ALONG_ELEMENT = 9

@@ -7,11 +7,13 @@ the element between a node and a section gives the section force and moment.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebint, chebvander
 
 from ..beam.beam import Beam
 from ..beam.distribution import AXIS, BODY, SNAP, Sampled, station_of_node
@@ -20,7 +22,8 @@ from ..core.errors import AncfError
 from ..core.quadrature import gauss, lagrange
 from ..core.types import Array
 from ..mesh.mapping import MappingBeam, cross
-from ..sections.across import beside, jumps, pieces
+from ..sections import Layer
+from ..sections.across import EDGE, beside, jumps, pieces
 
 #: Quadrature points along an element for its loads.
 ALONG = 8
@@ -33,6 +36,11 @@ UNBALANCED, UNBALANCED_MOTION = 0.02, 0.5
 UNLOADED = 16 * np.finfo(float).eps
 #: Section force that is round-off, relative to that of the eigenstrains alone.
 BALANCED = 1e-4
+
+
+#: Least points of the only interval of a section; additional points (to the order N) and least
+#: points of one of several; points of an interval of variable width.
+ACROSS, MORE, FEW, ROUND = 7, 2, 5, 17
 
 
 class NotRecovered(AncfError):
@@ -52,6 +60,170 @@ class NotFound(NotRecovered):
     failed = True
 
 
+# the axis, and points across sections
+
+class ArcLength:
+    """Arc length along the reference axis; ``nodes`` (ne + 1,) at ends of elements."""
+
+    def __init__(self, beam: Beam) -> None:
+        x, w = gauss(ALONG)
+        speed = np.hypot(*beam.mesh.mapping().DF(np.array([x, 0.5 + 0.0 * x]))[:, 0])
+        series = np.linalg.solve(chebvander(2.0 * x - 1.0, ALONG - 1), speed.T)
+        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T
+        self.nodes = np.append(0.0, np.cumsum(speed @ w))
+
+    def at(self, e: Array, xi: Array) -> Array:
+        """Arc length at xi of elements e, both of shape (n,)."""
+        return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
+            2.0 * xi - 1.0, ALONG), self._inside[e])
+
+
+class Interval(NamedTuple):
+    """Part of a section from ``low`` to ``high`` (eta), with nodes of a coordinate s in [0, 1].
+
+    Fields are polynomials in s. If ``curved``, ``eta = middle - half cos(pi s)``, which smooths
+    widths with square roots at the ends; otherwise eta is linear in s.
+    """
+
+    low: float
+    high: float
+    curved: bool
+    nodes: Array
+    inverse: Array  # (n, n) from values at the nodes to coefficients of Chebyshev polynomials
+
+    @property
+    def eta(self) -> Array:
+        """Eta of the nodes."""
+        s = 0.5 - 0.5 * np.cos(np.pi * self.nodes) if self.curved else self.nodes
+        return self.low + (self.high - self.low) * s
+
+    def local(self, eta: Array) -> Array:
+        """s of points eta."""
+        s = (eta - self.low) / (self.high - self.low)
+        return np.arccos(np.clip(1.0 - 2.0 * s, -1.0, 1.0)) / np.pi if self.curved else s
+
+    def weights(self, s: Array) -> Array:
+        """Interpolation weights from the nodes to points s (...), shape (..., n)."""
+        return chebvander(2.0 * s - 1.0, len(self.nodes) - 1) @ self.inverse
+
+    def integrals(self, ends: Array) -> Array:
+        """Weights (k, n) of the integrals over eta from s = 0 to ends (k,)."""
+        x, w = gauss(len(self.nodes) * (2 if self.curved else 1))
+        s = ends[:, None] * x
+        slope = 0.5 * np.pi * np.sin(np.pi * s) if self.curved else 1.0 + 0.0 * s
+        return (self.high - self.low) * np.einsum("kg,kgn->kn", ends[:, None] * w * slope,
+                                                  self.weights(s))
+
+
+class AcrossPoints(NamedTuple):
+    """Points across sections: arrays (n, m), or (m,) if all sections are equal.
+
+    ``eta`` are the points, ``stretch`` the relative length of their interval; ``drift`` and
+    ``swell`` the derivatives of eta and log(stretch) by the height. ``axis`` and ``till_axis`` are
+    weights for the value on the axis, and for the integral from the bottom to the axis.
+    """
+
+    eta: Array
+    stretch: Any
+    drift: Any
+    swell: Any
+    axis: Array
+    till_axis: Array
+
+
+class Intervals:
+    """Points ``eta`` (m,) across a section of layers, with weights of integrals and values.
+
+    In some tapered sections the relative intervals vary along the axis; ``eta`` then belongs to the
+    highest section, and :meth:`points` gives others. ``layers`` are the columns of each layer,
+    ``width`` (m,) its relative width. ``from_bottom`` (m, m) and ``whole`` (m,) are weights of
+    integrals over eta; ``bottom`` and ``top`` of the values at the ends.
+    """
+
+    def __init__(self, layers: Sequence[Layer], order: int) -> None:
+        self._measures = [layer.measure for layer in layers]
+        pieces = [(piece, m.mean) for m in self._measures for piece in m.pieces]
+        self._intervals = []
+        for (low, high, b), _ in pieces:
+            curved = callable(b)
+            if len(pieces) > 1 or curved:
+                n = ROUND if curved else max(FEW, order + MORE)
+                nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
+            else:  # with the ends
+                n = max(ACROSS, 2 * order + 1)
+                nodes = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, n))
+                nodes[n // 2] = 0.5
+            self._intervals.append(Interval(low, high, curved, nodes, np.linalg.inv(
+                chebvander(2.0 * nodes - 1.0, n - 1))))
+        ends = np.cumsum([0] + [len(i.nodes) for i in self._intervals])
+        self._columns = [slice(a, b) for a, b in pairwise(ends.tolist())]
+        counts = np.cumsum([0] + [len(m.pieces) for m in self._measures])
+        self.layers = [slice(ends[a], ends[b]) for a, b in pairwise(counts)]
+        self.eta = np.concatenate([i.eta for i in self._intervals])
+        self.width = np.concatenate([
+            (b(i.eta) if callable(b) else b) / mean + 0.0 * i.eta
+            for i, ((_, _, b), mean) in zip(self._intervals, pieces)])
+        self._low, self._high = np.array([(i.low, i.high) for i in self._intervals]).T
+        self.moves = self._measures[0].moves
+        self.from_bottom, self.whole = self._integrals(self.eta), np.zeros(ends[-1])
+        for i, columns in zip(self._intervals, self._columns):
+            self.whole[columns] = i.integrals(np.ones(1))
+        self.bottom, self.top = self.weights(np.array([self._low[0], self._high[-1]]))
+
+    def _which(self, eta):
+        """The interval of each point; the upper one at an interface."""
+        return np.searchsorted(self._high[:-1] - EDGE, eta, side="right")
+
+    def weights(self, eta: Array) -> Array:
+        """Weights (k, m) of the values at points eta (k,)."""
+        which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
+        for k in np.unique(which):
+            i, on = self._intervals[k], np.flatnonzero(which == k)
+            out[on, self._columns[k]] = i.weights(i.local(eta[on]))
+        return out
+
+    def _integrals(self, eta):
+        """Weights (k, m) of the integrals from the bottom to eta."""
+        which, out = self._which(eta), np.zeros((len(eta), len(self.eta)))
+        for k, (i, columns) in enumerate(zip(self._intervals, self._columns)):
+            s = np.where(which > k, 1.0, i.local(np.clip(eta, i.low, i.high)))
+            out[:, columns] = np.where(which[:, None] < k, 0.0, i.integrals(s))
+        return out
+
+    def _ends_at(self, h):
+        """Lower and upper ends of the intervals at heights (n,), shape (nintervals, n) both."""
+        ends = [m.ends(h) for m in self._measures]
+        return (np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends]))
+
+    def points(self, h: Array) -> AcrossPoints:
+        """The points of sections of heights h (n,)."""
+        middle = np.array([0.5])
+        if not self.moves:
+            return AcrossPoints(self.eta, 1.0, 0.0, 0.0, self.weights(middle)[0],
+                                self._integrals(middle)[0])
+        of = np.repeat(np.arange(len(self._low)), [len(i.nodes) for i in self._intervals])
+        size = (self._high - self._low)[of]
+        z = (self.eta - self._low[of]) / size
+        (low, high), (low2, high2) = ((end[of].T for end in self._ends_at(k * h))
+                                      for k in (1.0, 2.0))
+        # ends are a + b / h: their derivative is 2 (end(2 h) - end(h)) / h
+        low_rate, high_rate = (2.0 * (b - a) / h[:, None] for a, b in ((low, low2), (high, high2)))
+        at = self.place(0.5 + 0.0 * h, h)
+        return AcrossPoints(
+            low + (high - low) * z, (high - low) / size, low_rate + (high_rate - low_rate) * z,
+            (high_rate - low_rate) / (high - low), self.weights(at), self._integrals(at))
+
+    def place(self, eta: Array, h: Array) -> Array:
+        """Map eta (n,) in sections of heights h (n,) to the highest section."""
+        if not self.moves:
+            return eta
+        low, high = self._ends_at(h)
+        which = np.sum(eta >= high[:-1], axis=0)
+        low, high = (np.take_along_axis(x, which[None], 0)[0] for x in (low, high))
+        starts, ends = self._low[which], self._high[which]
+        return starts + (ends - starts) * (eta - low) / (high - low)
+
+
 class Sections:
     """Points ``eta`` across sections at ``xi`` (n,) of elements ``e`` (n,), with shape functions.
 
@@ -69,12 +241,6 @@ class Sections:
         self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(
             *Sections(beam, e, xi).J[:, 0]) if lifted else None
 
-    @property
-    def full_volume(self) -> Array:
-        """Volume for sections of full height, see :meth:`.MappingBeam.full_volume`."""
-        mesh = self.beam.mesh
-        return self.volume if mesh.is_straight else mesh.mapping().full_volume(self.X, self.e)
-
     @cached_property
     def _functions(self):
         """Shape functions and their slopes, (nb, n, k) each."""
@@ -85,10 +251,11 @@ class Sections:
         def of(functions):
             return (q[self.e].swapaxes(1, 2) @ functions.swapaxes(0, 1)).swapaxes(0, 1)
 
+        r = of(self._functions[int(slope)])
         if slope or self._arm is None:
-            return of(self._functions[1 if slope else 0])
+            return r
         r_xi = of(self._functions[1])
-        return of(self._functions[0]) + self._arm * np.array([-r_xi[1], r_xi[0]])
+        return r + self._arm * np.array([-r_xi[1], r_xi[0]])
 
     def nodal(self, force: Array) -> Array:
         """Element vectors (ne, nb, 2) of forces (2, n, k)."""
@@ -101,12 +268,6 @@ class Sections:
         out = np.zeros((self.beam.mesh.nelements,) + parts.shape[1:], parts.dtype)
         np.add.at(out, self.e, parts)
         return out
-
-    def density(self) -> Array:
-        """Mass per volume, (n, k)."""
-        across, zero, X = self.beam.across, np.zeros(self.X.shape[1:]), beside(self.X)
-        return zero + across.of_layers(
-            X, zero, lambda k: across.density(across.layers[k], X, self.e), self.e, graded=False)
 
 
 class SectionForces:
@@ -147,7 +308,6 @@ class SectionForces:
                         for factor, load in loads for e, xi, f in load.points
                         if (station := _snapped(e + xi)) % 1.0]
         self._cut(loads, stations)
-        self._divide()
         self._balance(u)
         inside = self._unknown.astype(int)
         for e in inside:
@@ -168,15 +328,20 @@ class SectionForces:
     def body(self, at: Sections) -> Array:
         """Force per reference volume with inertia, (2, n, k)."""
         gravity = self._gravity[:, None, None]
-        out = self._body[:, None, None] + self.sampled(at, BODY) + np.zeros(at.X.shape)
+        out = self._body[:, None, None] + self.sampled(at, BODY)
         if self._acceleration is not None:
             gravity = gravity - at.field(self._acceleration)
-        return out + at.density() * gravity if np.any(gravity) else out
+        if gravity.any():
+            across, X = self.beam.across, beside(at.X)
+            out = out + gravity * across.of_layers(
+                X, np.zeros(X.shape[1:]), lambda k: across.density(across.layers[k], X, at.e),
+                at.e, graded=False)
+        return out
 
-    def sampled(self, at: Sections, where: int) -> Any:
-        """Sum of the Sampled densities of a kind, (2, n, k); or 0."""
-        return sum(s.at(at.e, at.X[0, :, 0], at.X[1], self.beam.mesh.nelements)
-                   for s in self._sampled if s.where == where)
+    def sampled(self, at: Sections, where: int) -> Array:
+        """Sum of the Sampled densities of a kind, (2, n, k)."""
+        return sum((s.at(at.e, at.X[0, :, 0], at.X[1], self.beam.mesh.nelements)
+                    for s in self._sampled if s.where == where), np.zeros(at.X.shape))
 
     def eigenstrain(self, X: Array, e: Array) -> Array:
         """Sum of the eigenstrains at reference points X (2, n, k), (3, n, k)."""
@@ -206,15 +371,6 @@ class SectionForces:
             on = breadth * on
         return at, on + self.sampled(at, side)
 
-    def _divide(self):
-        """Divide elements at cuts inside them: ends of the parts, (ne, parts + 1), some empty."""
-        inside = self.cuts[(self.cuts % 1.0) != 0]
-        e = inside.astype(int)
-        order = np.arange(len(e)) - np.searchsorted(e, e)
-        self._ends = np.ones((self.beam.mesh.nelements, 3 + np.max(order, initial=-1)))
-        self._ends[:, 0] = 0.0
-        self._ends[e, 1 + order] = inside % 1.0
-
     def _balance(self, u):
         """Set section forces at both ends of each element, and the loads along it."""
         beam, ne, (x, w) = self.beam, self.beam.mesh.nelements, gauss(ALONG)
@@ -226,11 +382,13 @@ class SectionForces:
             inside = Sections(beam, e, xi, eta, self.lifted)
             body = self.body(inside)
             if np.any(body):
-                size = beam.across.breadth(layer, inside.X, e) * v * inside.full_volume
+                volume = inside.volume if beam.mesh.is_straight else (
+                    beam.mesh.mapping().full_volume(inside.X, e))  # of sections of full height
+                size = beam.across.breadth(layer, inside.X, e) * v * volume
                 parts.append((inside, size * body))
         middle = Sections(beam, e, xi)
         axis = middle.field(self.q)
-        parts.append((middle, self.sampled(middle, AXIS) + 0.0 * axis))
+        parts.append((middle, self.sampled(middle, AXIS) + 0.0 * axis))  # complex as the axis
         force = sum(f.sum(axis=-1) for _, f in parts)
         moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
         self._r, self._force, self._moment = (
@@ -253,9 +411,9 @@ class SectionForces:
 
     def _at_ends(self, force):
         """Section forces (2 ends, ne, 2) and moments (2 ends, ne) of element vectors."""
-        (ql, qr), (left, right) = (np.split(x, 2, axis=1) for x in (self.q, force))
-        return (np.array([-left[:, 0], right[:, 0]]),
-                np.array([-_moments(ql, left), _moments(qr, right)]))
+        n = force.shape[1] // 2
+        return (np.array([-force[:, 0], force[:, n]]), np.array([
+            -_moments(self.q[:, :n], force[:, :n]), _moments(self.q[:, n:], force[:, n:])]))
 
     def _size(self, R, M):
         """The largest force times the height, plus the largest moment."""
@@ -263,8 +421,8 @@ class SectionForces:
 
     def viscous_middles(self) -> tuple[Array, Array]:
         """Viscous force (2, ne) and moment (ne,) in the middle of elements."""
-        left, q = (np.split(np.asarray(x), 2, axis=1)[0] for x in (self.viscous, self.q))
-        ne = self.beam.mesh.nelements
+        ne, n = len(self.q), self.q.shape[1] // 2
+        left, q = np.asarray(self.viscous)[:, :n], self.q[:, :n]
         r = Sections(self.beam, np.arange(ne), np.full(ne, 0.5)).field(self.q)[..., 0]
         R = -left[:, 0].T
         return R, cross(q[:, 0].T - r, R) - _moments(q, left)
@@ -286,11 +444,10 @@ class SectionForces:
         r = Sections(self.beam, e, xi).field(self.q)[..., 0]
         f, m = self._force[:, e], self._moment[e]
         turning = cross(self._r[:, e] - r[..., None], f) + m
-        ends = [q[:, 0] for q in np.split(self.q, 2, axis=1)]
         out = []
         for end, weights in ((0, till), (1, till - w)):
             R = self.R[end][e].T
-            M = (self.M[end][e] + cross(ends[end][e].T - r, R)
+            M = (self.M[end][e] + cross(self.q[e, end * self.q.shape[1] // 2].T - r, R)
                  - np.sum(weights * turning, axis=-1))
             out.append((R - np.sum(weights * f, axis=-1), M))
         (R0, M0), (R1, M1) = out
@@ -331,6 +488,13 @@ class SectionForces:
         #: Stations of unknown forces inside elements.
         self._unknown = np.unique(self._acted[(self._acted % 1.0 != 0)
                                               & ~np.isin(self._acted, known)])
+        #: Ends of the parts of elements between cuts inside them, (ne, parts + 1), some empty.
+        inside = self.cuts[(self.cuts % 1.0) != 0]
+        e = inside.astype(int)
+        order = np.arange(len(e)) - e.searchsorted(e)
+        self._ends = np.ones((ne, 3 + np.max(order, initial=-1)))
+        self._ends[:, 0] = 0.0
+        self._ends[e, 1 + order] = inside % 1.0
 
     def _check(self):
         """Raise NotRecovered unless section forces are continuous at unloaded nodes."""
@@ -358,40 +522,42 @@ class SectionForces:
 
 
 class Together:
-    """Section forces of several instants with the same cuts, as one with an axis of instants."""
+    """Section forces of several instants with the same cuts, as one with an axis of instants.
+
+    The axis follows that of components; moments have none.
+    """
 
     def __init__(self, instants: Sequence[SectionForces]) -> None:
         self.instants, first = instants, instants[0]
-        self.beam, self.small, self.lifted, self.cuts = (
-            first.beam, first.small, first.lifted, first.cuts)
-        self.viscous, self.pressed = first.viscous, any(one.pressed for one in instants)
+        self.beam, self.small, self.lifted, self.cuts, self.viscous = (
+            first.beam, first.small, first.lifted, first.cuts, first.viscous)
+        self.pressed = any(one.pressed for one in instants)
         self.sides = sorted({side for one in instants for side in one.sides})
 
-    def _all(self, ask: Callable[[SectionForces], Any], like: Any = 0.0) -> Array:
-        return np.stack([ask(one) + like for one in self.instants], axis=1)
+    def _forces(self, of: str, *where: Any) -> tuple[Array, Array]:
+        R, M = zip(*(getattr(one, of)(*where) for one in self.instants))
+        return np.stack(R, axis=1), np.array(M)
 
     def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
-        R, M = zip(*(one.at(e, xi, begin) for one in self.instants))
-        return np.stack(R, axis=1), np.array(M)
+        return self._forces("at", e, xi, begin)
 
     def viscous_middles(self) -> tuple[Array, Array]:
-        R, M = zip(*(one.viscous_middles() for one in self.instants))
-        return np.stack(R, axis=1), np.array(M)
-
-    def body(self, at: Sections) -> Array:
-        return self._all(lambda one: one.body(at))
-
-    def sampled(self, at: Sections, where: int) -> Array:
-        return self._all(lambda one: one.sampled(at, where), np.zeros((2, *at.X.shape[1:])))
+        return self._forces("viscous_middles")
 
     def face(self, side: int, e: Array, xi: Array) -> tuple[None, Array]:
-        return None, self._all(lambda one: one.face(side, e, xi)[1], np.zeros((2, len(e), 1)))
+        return None, np.stack([one.face(side, e, xi)[1] for one in self.instants], axis=1)
+
+    def body(self, at: Sections) -> Array:
+        return np.stack([one.body(at) for one in self.instants], axis=1)
+
+    def sampled(self, at: Sections, where: int) -> Array:
+        return np.stack([one.sampled(at, where) for one in self.instants], axis=1)
 
     def eigenstrain(self, X: Array, e: Array) -> Array:
-        return self._all(lambda one: one.eigenstrain(X, e))
+        return np.stack([one.eigenstrain(X, e) for one in self.instants], axis=1)
 
     def tangent(self, axis: Sections) -> Array:
-        return self._all(lambda one: one.tangent(axis))
+        return np.stack([one.tangent(axis) for one in self.instants], axis=1)
 
 
 def _traction(beam, traction, X, e):
@@ -409,5 +575,4 @@ def _snapped(stations):
 
 def _moments(q, force):
     """Moments (ne,) of element vectors on all DOFs but r, (ne, nb, 2) both."""
-    q, force = (np.moveaxis(x[:, 1:], -1, 0) for x in (q, force))
-    return np.sum(cross(q, force), axis=-1)
+    return (q[:, 1:, 0] * force[:, 1:, 1] - q[:, 1:, 1] * force[:, 1:, 0]).sum(axis=-1)
