@@ -17,7 +17,7 @@ from ...core.immutable import is_builtin
 from ...core.types import Array
 from ...mesh.places import is_point
 from ..item import Item, beside, require_entries
-from ..places import Vector
+from ..places import Vector, products
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
@@ -275,6 +275,26 @@ def angle_to(d: ArrayLike, e: ArrayLike) -> float:
     return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
 
 
+# equations of joints: their value at displacements u (N,) of the scene, their derivative for
+# :func:`gradients`, and a factor times their second derivative, rows, columns and values (k,)
+
+class Affine:
+    """The sum of ``direction . vector`` over pairs of both, less a constant."""
+
+    def __init__(self, *pairs: tuple[Vector, Any], less: float = 0.0) -> None:
+        self.pairs, self.less = pairs, less
+
+    def value(self, u: Array) -> float:
+        return sum(float(direction @ vector(u)) for vector, direction in self.pairs) - self.less
+
+    def terms(self, u: Array) -> Sequence[Any]:
+        return self.pairs
+
+    def second(self, factor: float) -> tuple[Array, Array, Array]:
+        none = np.zeros(0, dtype=int)
+        return none, none, np.zeros(0)
+
+
 class Aligned:
     """``(Q e) x d``: zero if d is parallel to e rotated by Q."""
 
@@ -282,28 +302,61 @@ class Aligned:
         self.d, self.e, self.Q = d, e, Q
 
     def value(self, u: Array) -> float:
-        """The value at displacements u (N,) of the scene."""
         e, d = self.Q @ self.e(u), self.d(u)
         return e[0] * d[1] - e[1] * d[0]
 
-    def terms(self, u: Array) -> list[Any]:
-        """Its derivative, for :func:`gradients`."""
+    def terms(self, u: Array) -> Sequence[Any]:
         e, d = self.Q @ self.e(u), self.d(u)
         return [(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ self.Q)]
 
     def second(self, factor: float) -> tuple[Array, Array, Array]:
-        """A factor times its second derivative: rows, columns and values (k,), both halves."""
-        J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ self.Q  # d x c = d^T [[0, 1], [-1, 0]] c
-        values = np.einsum("ij,ik,jl->ikjl", J, self.d.weights, self.e.weights)
-        rows = np.broadcast_to(self.d.dofs[:, :, None, None], values.shape).ravel()
-        columns = np.broadcast_to(self.e.dofs[None, None], values.shape).ravel()
-        values = -factor * values.ravel()
+        J = np.array([[0.0, -1.0], [1.0, 0.0]]) @ self.Q  # (Q e) x d = -d^T [[0, 1], [-1, 0]] Q e
+        rows, columns, values = products(self.d, self.e, factor * J)
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
 
 
-# unit length of the director of a rigid body
+class Distant:
+    """``(|d|^2 - R^2) / (2 R)``: zero if a vector d has the length R."""
 
-class UnitDirector(Joint):
+    def __init__(self, d: Vector, R: float) -> None:
+        self.d, self.R = d, R
+
+    def value(self, u: Array) -> float:
+        d = self.d(u)
+        return float(d @ d - self.R**2) / (2 * self.R)
+
+    def terms(self, u: Array) -> Sequence[Any]:
+        return [(self.d, self.d(u) / self.R)]
+
+    def second(self, factor: float) -> tuple[Array, Array, Array]:
+        return products(self.d, self.d, factor / self.R * np.eye(2))
+
+
+class ComposedJoint(Joint):
+    """A joint whose equations are some of the above, which :meth:`bind` sets."""
+
+    parts: Sequence[Any] = ()
+
+    def parts_at(self, t: float) -> Sequence[Any]:
+        """The equations at a time."""
+        return self.parts
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.array([part.value(u) for part in self.parts_at(t)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients(*(part.terms(u) for part in self.parts_at(t)))
+
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array] | None:
+        if self.constant:
+            return None
+        found = [part.second(m) for part, m in zip(self.parts_at(t), multipliers)]
+        i, j, values = map(np.concatenate, zip(*found))
+        return i, j, values
+
+
+class UnitDirector(ComposedJoint):
     """(d . d - 1) / 2 = 0 for the director d of a rigid body, whose first DOF is ``first``."""
 
     equations = ("length of the director",)
@@ -311,17 +364,7 @@ class UnitDirector(Joint):
 
     def __init__(self, body: RigidBody, first: int) -> None:
         self.name = body.name
-        self.dofs, self.start = first + 2 + np.arange(2), body.q0[2:]
-
-    def value(self, u: Array, t: float) -> Array:
-        du = u[self.dofs]  # d . d = 1 in the reference configuration
-        return np.array([self.start @ du + 0.5 * (du @ du)])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return np.zeros(2, dtype=int), self.dofs, self.start + u[self.dofs]
-
-    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        return self.dofs, self.dofs, np.full(2, multipliers[0])
+        self.parts = [Distant(Vector(body.q0[2:], first + np.array([[2], [3]]), 1.0), 1.0)]
 
 
 # independent equations of a joint

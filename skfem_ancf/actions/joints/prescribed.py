@@ -20,13 +20,13 @@ from ..item import Item
 from ..loads import EndMoment
 from ..places import Vector, both_of, point, section
 from ..symbols import Symbol, support_of, supports_of
-from .base import Aligned, Joint, angle_to, gradients, rotation
+from .base import Affine, Aligned, ComposedJoint, Joint, angle_to, rotation
 
 #: Largest number of intervals of an integral over time.
 PIECES = 500
 
 
-class PrescribedPosition(Joint):
+class PrescribedPosition(ComposedJoint):
     """r = r(t) for a material point. At a node of the axis it only fixes degrees of freedom.
 
     Parameters
@@ -50,16 +50,13 @@ class PrescribedPosition(Joint):
 
     def bind(self, layout: Layout) -> None:
         self.r = point(layout, self.beam, self.at)
-        self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
 
-    def value(self, u: Array, t: float) -> Array:
-        return self.r(u) - sample(self.motion, np.array([t]), "r", (2,))[0]
+    def parts_at(self, t: float) -> Sequence[Any]:
+        return [Affine((self.r, n), less=n @ x) for n in np.eye(2)
+                for x in sample(self.motion, np.array([t]), "r", (2,))]
 
     def offset(self, times: Array, N: int) -> Array:
         return self.r.start - sample(self.motion, times, "r", (2,))
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return self.found
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
@@ -109,7 +106,7 @@ class PrescribedDisplacement(Joint):
         return supports_of(layout, self.beam, self.at, self.names)
 
 
-class PrescribedAngle(Joint):
+class PrescribedAngle(ComposedJoint):
     """Prescribed rotation of a section or a rigid body: e(t) x d = 0.
 
     Parameters
@@ -139,11 +136,8 @@ class PrescribedAngle(Joint):
         _, self.d = section(layout, self.beam, self.at)
         self.start = np.arctan2(*self.d.start[::-1])
 
-    def value(self, u: Array, t: float) -> Array:
-        return self._normals(np.array([t])) @ self.d(u)
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients([(self.d, self._normals(np.array([t]))[0])])
+    def parts_at(self, t: float) -> Sequence[Any]:
+        return [Affine((self.d, n)) for n in self._normals(np.array([t]))]
 
     def _normals(self, times: Array) -> Array:
         a = self.start + sample(self.angle, times, "angle", ())
@@ -178,7 +172,7 @@ class Turned:
             epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
 
 
-class PrescribedTurn(Joint):
+class PrescribedTurn(ComposedJoint):
     """Prescribed relative rotation of two sections or rigid bodies: d x (R(t) e) = 0.
 
     Parameters
@@ -206,18 +200,9 @@ class PrescribedTurn(Joint):
         (_, self.d), (_, self.e) = (section(layout, *place) for place in (self.at, self.other))
         self.start = angle_to(self.d.start, self.e.start)
 
-    def _turned(self, t: float) -> Aligned:
-        return Aligned(self.d, self.e, rotation(
-            self.start + ask_number("angle(t={:g})", self.angle, t)))
-
-    def value(self, u: Array, t: float) -> Array:
-        return np.array([self._turned(t).value(u)])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients(self._turned(t).terms(u))
-
-    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        return self._turned(t).second(multipliers[0])
+    def parts_at(self, t: float) -> Sequence[Any]:
+        angle = self.start + ask_number("angle(t={:g})", self.angle, t)
+        return [Aligned(self.d, self.e, rotation(angle))]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = section(layout, *self.at)[0]
@@ -225,6 +210,7 @@ class PrescribedTurn(Joint):
 
 
 # a motor rotates a section or a rigid body
+
 
 class Motor(Item):
     """Rotate a rigid body or a section by a given angle, at a given speed, or with a torque.
@@ -273,7 +259,7 @@ class Motor(Item):
 
 # an end section with fixed direction and free thickness
 
-class PlaneSection(Joint):
+class PlaneSection(ComposedJoint):
     """t . r_Y = 0 at every section point: section slopes stay in the reference plane.
 
     For a cable, n . r_X = 0. On a beam along a coordinate axis it only fixes degrees of freedom.
@@ -295,18 +281,10 @@ class PlaneSection(Joint):
         self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
         first = layout.offset(beam) + node * beam.nd
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in fixed)
-        self.slopes = [Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0)
-                       for k in fixed]
-        self.found = gradients(*([(slope, self.direction)] for slope in self.slopes))
-
-    def value(self, u: Array, t: float) -> Array:
-        return np.array([self.direction @ slope(u) for slope in self.slopes])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return self.found
+        self.parts = [Affine((Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0),
+                              self.direction)) for k in fixed]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = section(layout, self.beam, self.at)[0]
         return (support_of(layout, self.beam, at, "angle"),)
-
 

@@ -20,10 +20,10 @@ from ...mesh.mapping import cross
 from ...core.quadrature import hermite_basis
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol, tangent_at
-from .base import Aligned, Joint, angle_to, gradients, rotation
+from .base import Affine, Aligned, ComposedJoint, Distant, Joint, angle_to, rotation
 
 
-class OnLine(Joint):
+class OnLine(ComposedJoint):
     """n . (r - p) = 0: a material point slides on a straight line.
 
     Parameters
@@ -46,15 +46,9 @@ class OnLine(Joint):
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
     def bind(self, layout: Layout) -> None:
-        self.r = point(layout, self.beam, self.at)
-        self.p = self.r.start if self.through is None else self.through
-        self.found = gradients([(self.r, self.normal)])
-
-    def value(self, u: Array, t: float) -> Array:
-        return np.array([self.normal @ (self.r(u) - self.p)])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return self.found
+        r = point(layout, self.beam, self.at)
+        through = r.start if self.through is None else self.through
+        self.parts = [Affine((r - Vector(through), self.normal))]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
@@ -62,7 +56,7 @@ class OnLine(Joint):
         return (Symbol("slider", (at,), (np.array([-y, x]) / np.hypot(x, y),)),)
 
 
-class OnCircle(Joint):
+class OnCircle(ComposedJoint):
     """``(|r - c|^2 - R^2) / (2 R) = 0``: a material point slides on a circle.
 
     Parameters
@@ -85,25 +79,13 @@ class OnCircle(Joint):
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
     def bind(self, layout: Layout) -> None:
-        self.r = point(layout, self.beam, self.at)
-        self.R = self.radius or require_positive(
-            "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
-        if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):
-            raise InputError(f"radius = {self.R!r} is negligible against the distance of the point "
+        d = point(layout, self.beam, self.at) - Vector(self.center)
+        distance = np.hypot(*d.start)
+        R = self.radius or require_positive("the distance of the point from the centre", distance)
+        if R < 1e-9 * distance:
+            raise InputError(f"radius = {R!r} is negligible against the distance of the point "
                              "from the centre")
-
-    def value(self, u: Array, t: float) -> Array:
-        d = self.r(u) - self.center
-        return np.array([(d @ d - self.R**2) / (2 * self.R)])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients([(self.r, (self.r(u) - self.center) / self.R)])
-
-    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        w = self.r.weights
-        values = np.einsum("ik,il->ikl", w, w) * (multipliers[0] / self.R)
-        rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)
-        return rows.ravel(), rows.transpose(0, 2, 1).ravel(), values.ravel()
+        self.parts = [Distant(d, R)]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
@@ -114,6 +96,8 @@ class OnCircle(Joint):
 # the axis of a beam as a curve, and the closest point on it
 
 #: Least number of sample points of an element for the initial search.
+
+
 SAMPLES = 5
 #: Largest number of iterations for the closest point.
 ITERATIONS = 40
@@ -526,7 +510,7 @@ class Sleeve(Joint):
         return (Symbol("slider", (at,), (tangent_at(beam, int(e[0]), float(X[0, 0])),)),)
 
 
-class Slot(Joint):
+class Slot(ComposedJoint):
     """A material point slides along a straight line of a rigid body, or of the ground.
 
     ``e x (p - b) = 0``, with a point b of the body and a direction e that rotates with it.
@@ -561,36 +545,23 @@ class Slot(Joint):
 
     def bind(self, layout: Layout) -> None:
         which, at = named_place(layout, self.at)
-        self.p, d = section(layout, which, at) if self.angle else (
-            point(layout, which, at), None)
-        through = self.p.start if self.through is None else self.through
-        b, self.e = section(layout, self.on, tuple(map(float, through)))
-        self.constant = not self.e.dofs.size
-        self.w = Vector(self.p.start - b.start, np.hstack([self.p.dofs, b.dofs]),
-                        np.hstack([self.p.weights, -b.weights]))
-        if not self.w.dofs.size:
+        p, d = section(layout, which, at) if self.angle else (point(layout, which, at), None)
+        b, e = section(layout, self.on, tuple(map(
+            float, p.start if self.through is None else self.through)))
+        self.constant, w = not e.dofs.size, p - b
+        if not w.dofs.size:
             raise InputError(f"{self!r}: the point and the line are both of the ground")
         if which == self.on or (which != GROUND and self.on != GROUND
                                 and layout.beam(which) is layout.beam(self.on)):
             raise InputError(f"{self!r}: a point cannot slide along a line of its beam or body")
-        gap = cross(self.direction, self.w.start)
+        gap = cross(self.direction, w.start)
         size = max(layout.beam(k).size for k in (which, self.on) if k != GROUND)
         if abs(gap) > 1e-6 * size:
-            raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
+            raise InputError(f"{self!r}: the point ({p.start[0]:.6g}, {p.start[1]:.6g}) "
                              f"is {abs(gap):.6g} off the line: give another through=")
-        kept = [(self.w, self.direction)] if d is None else [(self.w, self.direction), (d, d.start)]
-        self.pairs = [Aligned(vector, self.e, rotation(angle_to(start, self.e.start)))
+        kept = [(w, self.direction)] if d is None else [(w, self.direction), (d, d.start)]
+        self.parts = [Aligned(vector, e, rotation(angle_to(start, e.start)))
                       for vector, start in kept]
-
-    def value(self, u: Array, t: float) -> Array:
-        return np.array([turned.value(u) for turned in self.pairs])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients(*(turned.terms(u) for turned in self.pairs))
-
-    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        i, j, v = zip(*(turned.second(m) for turned, m in zip(self.pairs, multipliers)))
-        return np.concatenate(i), np.concatenate(j), np.concatenate(v)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, *named_place(layout, self.at))

@@ -21,13 +21,13 @@ from ...mesh.places import facets_of, is_point
 from ..item import Item
 from ..places import Vector, each, is_ground, point, section, several
 from ..symbols import Symbol, boundary_of, support_of
-from .base import Aligned, Joint, angle_to, equations_of, gradients, rotation
+from .base import Affine, Aligned, ComposedJoint, Joint, angle_to, equations_of, rotation
 
 
 # hinge between two or more beams
 
 
-class Hinge(Joint):
+class Hinge(ComposedJoint):
     """r_a = r_b for a material point of two beams, and of further ones; rotations are free.
 
     Parameters
@@ -46,17 +46,8 @@ class Hinge(Joint):
         self.equations = equations_of(("force along x", "force along y"), len(self.beams))
 
     def bind(self, layout: Layout) -> None:
-        self.points = [point(layout, beam, at) for beam, at in zip(self.beams, self.at)]
-        first = self.points[0]
-        self.found = gradients(*([(first, e), (other, -e)]
-                                 for other in self.points[1:] for e in np.eye(2)))
-
-    def value(self, u: Array, t: float) -> Array:
-        first = self.points[0](u)
-        return np.concatenate([first - other(u) for other in self.points[1:]])
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return self.found
+        first, *others = (point(layout, beam, at) for beam, at in zip(self.beams, self.at))
+        self.parts = [Affine((first, n), (other, -n)) for other in others for n in np.eye(2)]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         return symbol_of(self, layout, "hinge", "x y", point)
@@ -65,6 +56,8 @@ class Hinge(Joint):
 # bond between a boundary of a domain and another member (mortar method)
 
 #: Round-off relative to the largest entry of an equation.
+
+
 ROUND_OFF = 1e-14
 
 
@@ -173,7 +166,7 @@ def _of_beam(beam: Beam, x: Array, place: Any) -> tuple[Array, Array]:
     return found.dofs.swapaxes(0, 1), found.weights
 
 
-class Weld(Joint):
+class Weld(ComposedJoint):
     """Sections that coincide and keep their relative angles of the reference configuration.
 
     The direction of a section is its best-fit line, so it may warp and change its thickness; for a
@@ -211,11 +204,10 @@ class Weld(Joint):
             _key=self._key) for n, (beam, at) in enumerate(zip(self.beams, self.at)) if n != k]
 
     def bind(self, layout: Layout) -> None:
-        (self.a, d), *others = (
-            section(layout, beam, at) for beam, at in zip(self.beams, self.at))
-        self.pairs = []
+        (a, d), *others = (section(layout, beam, at) for beam, at in zip(self.beams, self.at))
+        self.parts = []
         for b, e in others:
-            gap = b.start - self.a.start
+            gap = b.start - a.start
             beams = [layout.beam(beam) for beam in self.beams if not is_ground(beam)]
             if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
                 centre = next((f": of {beam!r} alone it is the centre of mass that is meant, name "
@@ -223,25 +215,12 @@ class Weld(Joint):
                                zip(self.beams, self.at) if at is None), ":")
                 raise InputError(
                     f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
-                    f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
+                    f"({a.start[0]:.6g}, {a.start[1]:.6g}), the other at "
                     f"({b.start[0]:.6g}, {b.start[1]:.6g}){centre} name sections that meet, move a "
                     f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
                     "apart=True to draw them together")
-            self.pairs.append((b, Aligned(d, e, rotation(angle_to(d.start, e.start)))))
-
-    def value(self, u: Array, t: float) -> Array:
-        a, out = self.a(u), []
-        for b, turned in self.pairs:
-            out += [*(a - b(u)), turned.value(u)]
-        return np.array(out)
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients(*(terms for b, turned in self.pairs for terms in (
-            *([(self.a, n), (b, -n)] for n in np.eye(2)), turned.terms(u))))
-
-    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        i, j, v = zip(*(turned.second(m) for (_, turned), m in zip(self.pairs, multipliers[2::3])))
-        return np.concatenate(i), np.concatenate(j), np.concatenate(v)
+            self.parts += [*(Affine((a, n), (b, -n)) for n in np.eye(2)),
+                           Aligned(d, e, rotation(angle_to(d.start, e.start)))]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         return symbol_of(self, layout, "weld", "x y angle",
