@@ -54,6 +54,9 @@ class DomainForce(ForceElement):
 
 #: Kinds that the kernels know.
 KINDS = 4
+#: The derivatives of elements that depend on their first vector.
+FIRST = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
+NONE = np.zeros(0, dtype=np.int64)
 
 
 class Forces:
@@ -65,6 +68,15 @@ class Forces:
     there are velocity-dependent forces. ``masses`` contribute to the mass matrix; ``contacts`` are
     the obstacles.
     """
+
+    #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.
+    _vectors: Any = np.zeros(0), NONE, NONE, np.zeros(0)
+    #: Rows, columns, weights and derivatives of the entries of the stiffness.
+    _entries: Any = NONE, NONE, np.zeros(0), NONE
+    #: Whether their element has one outside the band; of those elements positions and numbers of
+    #: the derivatives between their rows of B, and these.
+    _far = NONE > 0
+    _between: Any = NONE, NONE, None
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
@@ -82,33 +94,34 @@ class Forces:
         self.parts = [parts[k] for k in order]
         self._place = np.argsort(order) if order else np.zeros(0, np.int64)
         n = len(self.parts)
-        vectors = [[part.d, part.e] for part in self.parts]
-        # links, numbers of their components, and where the derivatives by them are
-        blocks: list[tuple[list[Vector], Array, Array]] = []
-        for k, pair in enumerate(vectors):
-            rows = k + n * np.arange(4)
-            blocks.append((pair, rows, k + n * np.arange(16).reshape(4, 4)))
+        # of each element its links, the rows of their components in the vectors (those of the parts
+        # side by side), two of these for each derivative, and the numbers of the derivatives
+        blocks: list[Any] = []
+        for k, part in enumerate(self.parts):
+            a, b = np.divmod(np.arange(16), 4) if part.kind == TORSION else FIRST
+            blocks.append(((part.d, part.e), k + n * np.arange(4), a, b, k + n * (4 * a + b)))
+        self._blocks: list[Any] = [k + n * np.arange(16).reshape(4, 4) for k in range(n)]
         row, at = 4 * n, 16 * n
         self._slices = []
         for element in self.custom:
             m = 2 * len(element.links)
-            shape = (0,) if element.changing else (
-                (m, m) if element.entries is None else element.entries[0].shape)
-            end = at + int(np.prod(shape))
-            self._slices.append((slice(row, row + m), slice(at, end)))
-            blocks.append((element.links, row + np.arange(m), np.arange(at, end).reshape(shape)))
-            row, at = row + m, end
-        self._blocks, self.rows, self.size = blocks, row, at
-        self._couplings = [self._coupling(k) for k in range(len(blocks))]
-        self._far = [bool(np.any(np.abs(i - j) > bandwidth)
-                          or places is not None and np.any(np.abs(places[i] - places[j]) > 1))
-                     for i, j, _, _ in self._couplings]
+            a, b = np.divmod(np.arange(0 if element.changing else m * m), m) if (
+                element.entries is None) else element.entries
+            numbers = at + np.arange(len(a))
+            dense = element.entries is None and not element.changing
+            self._blocks.append(numbers.reshape(m, m) if dense else numbers)
+            self._slices.append((slice(row, row + m), slice(at, at + len(a))))
+            blocks.append((element.links, row + np.arange(m), a, b, numbers))
+            row, at = row + m, at + len(a)
+        self.rows, self.size = row, at
+        if blocks:
+            self._couple(blocks, places)
         #: Elements whose stiffness changes its pattern, and their DOFs.
         self.changing = [(e, np.concatenate([link.dofs.ravel() for link in e.links]))
                          for e in self.custom if e.changing]
         #: Entries of the last tangent of a step: rows, columns and values.
         self.kept = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        self.far = any(self._far) or bool(self.changing)
+        self.far = bool(self._far.any() or self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
         self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         # those of user-defined laws first, then in the order of the parts
@@ -118,99 +131,70 @@ class Forces:
         self.resists = (any(e.resists for e in self.custom) or any(map(_resists, self.parts))
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
-    def _coupling(self, k):
-        """Rows, columns, weights and source positions of the derivatives of element k."""
-        links, _, places = self._blocks[k]
-        if k >= len(self.parts) and self.custom[k - len(self.parts)].changing:
-            return places, places, np.zeros(0), places
-        dofs = [link.dofs[c] for link in links for c in range(2)]
-        if k >= len(self.parts) and (
-                entries := self.custom[k - len(self.parts)].entries) is not None:
-            i, j = (np.concatenate(dofs)[x] for x in entries)
-            return i, j, np.ones(len(i)), places
-        weights = [row for link in links for row in link.weights]
-        known = k >= len(self.parts)
-        used = range(len(dofs)) if known or self.parts[k].kind == TORSION else range(2)
-        out: list[list[Any]] = [[], [], [], []]
-        for i in used:
-            for j in used:
-                a, b = dofs[i], dofs[j]
-                out[0].append(np.repeat(a, len(b)))
-                out[1].append(np.tile(b, len(a)))
-                out[2].append(np.outer(weights[i], weights[j]).ravel())
-                out[3].append(np.full(len(a) * len(b), places[i, j]))
-        return tuple(np.concatenate(column) for column in out)
-
-    def _entries(self, far):
-        """Rows, columns, weights and source positions of elements inside, or outside, the band."""
-        none = np.zeros(0, dtype=np.int64)
-        found = [(none, none, np.zeros(0), none)] + [
-            c for c, other in zip(self._couplings, self._far) if other == far]
-        return tuple(np.concatenate(column) for column in zip(*found))
+    def _couple(self, blocks, places):
+        """Find the vectors, ``start + B u``, and the entries of all derivatives by two of them."""
+        start, vectors, pairs = np.zeros(self.rows), [], []
+        for k, (links, rows, a, b, numbers) in enumerate(blocks):
+            for link, both in zip(links, rows.reshape(-1, 2)):
+                start[both] = link.start
+                vectors.append((np.repeat(both, link.dofs.shape[1]), link.dofs.ravel(),
+                                link.weights.ravel()))
+            pairs.append((rows[a], rows[b], numbers, np.full(len(a), k)))
+        i, j, weights = map(np.concatenate, zip(*vectors))
+        self._vectors = start, i.astype(np.int64), j.astype(np.int64), weights
+        B = sparse.csr_array((weights, (i, j)), shape=(self.rows, self._N))
+        a, b, number, block = map(np.concatenate, zip(*pairs))
+        # each nonzero of row a with each of row b
+        first, many = B.indptr[:-1].astype(np.int64), np.diff(B.indptr).astype(np.int64)
+        size = many[a] * many[b]
+        pair = np.repeat(np.arange(len(a)), size)
+        p, q = np.divmod(np.arange(len(pair)) - np.repeat(np.cumsum(size) - size, size),
+                         many[b][pair])
+        p, q = first[a][pair] + p, first[b][pair] + q
+        i, j = (B.indices[x].astype(np.int64) for x in (p, q))
+        off = np.abs(i - j) > self._bandwidth
+        if places is not None:
+            off |= np.abs(places[i] - places[j]) > 1
+        far = np.bincount(block[pair], off, len(blocks)) > 0.0
+        self._entries = i, j, B.data[p] * B.data[q], number[pair]
+        self._far = far[block[pair]]
+        out = far[block]
+        rows, between = np.unique([a[out], b[out]], return_inverse=True)
+        a, b = between.reshape(2, -1)
+        self._between = len(rows) * a + b, number[out], B[rows].toarray()
 
     def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
         """The tables for kernels."""
         if not self.elements:
             return NO_FORCES
-        at, of, weight, start = [], [], [], np.zeros(self.rows)
-        for links, rows, _ in self._blocks:
-            for k, one in enumerate(links):
-                for c in range(2):
-                    row = rows[2 * k + c]
-                    start[row] = one.start[c]
-                    at.append(np.full(len(one.weights[c]), row))
-                    of.append(one.dofs[c])
-                    weight.append(one.weights[c])
-        i, j, w, place = self._entries(False)
-        keep = (i >= j) | (not symmetric)
+        (start, at, of, weight), (i, j, w, number) = self._vectors, self._entries
+        keep = ~self._far & ((i >= j) | (not symmetric))
         kinds = np.array([part.kind for part in self.parts], dtype=np.int64)
         numbers = np.array([part.numbers for part in self.parts]).reshape(-1, NUMBERS)
-        rows, columns, places = self._between_rows()
-        between = len(self.far_rows())
         return ForceTables(
-            start, _ints(at), _ints(of), np.concatenate([np.zeros(0), *weight]), len(self.parts),
+            start, at, of, weight, len(self.parts),
             np.searchsorted(kinds, np.arange(KINDS + 1)).astype(np.int64),
             np.ascontiguousarray(numbers.T).ravel(), self.size,
-            position(i[keep], j[keep]).astype(np.int64), place[keep].astype(np.int64), w[keep],
-            (rows * between + columns).astype(np.int64), places.astype(np.int64),
+            position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
+            self._between[0], self._between[1],
             handle if self.custom else 0, self.contacts.tables, 0, len(self.changing))
 
     def acting_rows(self) -> Array:
         """Derivatives of positions of concentrated elements, shape (k, N)."""
-        return self._derivatives([one for element in self.elements if not element.distributed
-                                  and not element.internal for one in element.links])
+        return np.array([link.row(n, self._N) for element in self.elements
+                         if not element.distributed and not element.internal
+                         for link in element.links for n in np.eye(2)]).reshape(-1, self._N)
 
     # elements that couple distant DOFs
 
-    def _far_blocks(self):
-        for block, far in zip(self._blocks, self._far):
-            if far:
-                yield block
-
     def far_rows(self) -> Array:
         """Derivatives of vectors of elements outside the band, shape (k, N)."""
-        return self._derivatives([one for links, _, _ in self._far_blocks() for one in links])
-
-    def _derivatives(self, links):
-        out = np.zeros((2 * len(links), self._N))
-        for k, row in enumerate(out):
-            one = links[k // 2]
-            np.add.at(row, one.dofs[k % 2], one.weights[k % 2])
-        return out
-
-    def _between_rows(self):
-        """Row, column and source position of the derivatives between those rows."""
-        found, first = [np.zeros((3, 0), dtype=np.int64)], 0
-        for _, rows, places in self._far_blocks():
-            m = len(rows)
-            a, b = np.divmod(np.arange(m * m), m)
-            found.append(np.array([first + a, first + b, places.ravel()]))
-            first += m
-        return np.concatenate(found, axis=1)
+        return np.zeros((0, self._N)) if self._between[2] is None else self._between[2]
 
     def far_entries(self) -> tuple[Array, Array, Array, Array]:
         """Rows, columns, weights and source positions outside the band; shapes (k,)."""
-        return self._entries(True)
+        i, j, w, number = (x[self._far] for x in self._entries)
+        return i, j, w, number
 
     # values
 
@@ -301,14 +285,13 @@ class Forces:
     def firmnesses(self, tables: ForceTables, u: Array) -> Array:
         """Largest eigenvalue of the stiffness of each element, shape (k,)."""
         D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
-        return np.array([np.linalg.norm(D[at], 2) for _, _, at in self._blocks])
+        return np.array([np.linalg.norm(D[numbers], 2) for numbers in self._blocks])
 
     def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
                 factor: float) -> tuple[Array, Array, Array]:
         """The stiffness in the DOFs: rows, columns and values."""
         D = self.stiffness(tables, t, u, v, factor)
-        near, far = self._entries(False), self._entries(True)
-        i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
+        i, j, w, place = self._entries
         touched = self.contacts.entries(t, u, self._bandwidth)
         parts = (i, j, w * D[place]), touched, self.changing_entries(t, u, u, v, factor)
         return tuple(np.concatenate(x) for x in zip(*parts))  # type: ignore[return-value]
@@ -322,8 +305,7 @@ class Forces:
 
         Plus a factor times the resistance.
         """
-        none = np.zeros(0, np.int64)
-        found = [(none, none, np.zeros(0))]
+        found = [(NONE, NONE, np.zeros(0))]
         for element, at in self.changing:
             x, y = (u[at].reshape(-1, 2) for u in (u0, u1))
             w = 0.0 * x if v is None else v[at].reshape(-1, 2)
@@ -416,7 +398,3 @@ NO_FORCES = constant(ForceTables(
 def _resists(part):
     k, c, damping = part.numbers[:3]
     return {0: damping, 1: c, 2: c, 3: k or c}[part.kind] > 0.0
-
-
-def _ints(parts):
-    return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)
