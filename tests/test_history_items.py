@@ -144,10 +144,9 @@ def test_statics_and_what_is_asked_about_its_states(name):
     # a state has its forces: reactions and loads are in balance
     applied = 3.0 * np.array([0.2, 1.0 if name == "item" else -1.0])
     own = state.reactions("left").force + applied
-    bound = scene.system.forces.remembering[0]
-    with scene.system.histories.lent(state.memory):
-        x = np.array([link(state.u) for link in bound.links])
-        ours = bound.force(x, 0.0 * x, 1.0).sum(axis=0)
+    bound = scene.system.after(state.memory).forces.remembering[0]
+    x = np.array([link(state.u) for link in bound.links])
+    ours = bound.force(x, 0.0 * x, 1.0).sum(axis=0)
     assert_allclose(own + ours, 0.0, atol=1e-5)
     assert np.all(scene.modes(2, state).frequencies > 0.0)
     at_once = scene.solve_static()

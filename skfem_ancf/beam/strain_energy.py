@@ -38,9 +38,11 @@ class Body:
         """Their :class:`~skfem_ancf.beam.kernels.elements.Elements`."""
         return list(map(elements_of, self.packs)) if self._kernel is None else self._kernel.elements
 
-    def remember(self, history: Array, span: Array) -> None:
-        """Let the elements have views of a history (n,) and of a time span (1,)."""
-        vars(self)["elements"] = remembering(self.elements, history, span)
+    def after(self, history: Array, span: Array) -> "Body":
+        """A copy whose elements have views of a history (n,) and of a time span (1,)."""
+        other = Body(self.packs, self.table)
+        vars(other)["elements"] = remembering(self.elements, history, span)
+        return other
 
 
 class FlatBody(NamedTuple):

@@ -71,6 +71,8 @@ class Collocation(Scheme):
     h^2``, one complex band matrix for each pair of eigenvalues; its factors are reused while the
     iteration contracts. The initial guess is the polynomial of the previous step. Joints enter as
     ``J(U) V = 0`` at the points (index 2); the end of the step is projected onto the constraints.
+    Materials and items with a history have that of the start of the step at all points, with the
+    time since then: the order is that of their law.
 
     A method is a subclass with :attr:`points` and ``order``.
 
@@ -96,7 +98,6 @@ class Collocation(Scheme):
         return f"<{type(self).__name__}, {len(self.points)} points>"
 
     def require(self, system: System) -> None:
-        system.histories.require_none(self, "its points lie within the step")
         if system.forces.changing:
             raise InputError(f"{self!r} does not take {system.forces.changing[0][0]!r}, whose "
                              "stiffness has entries that change from step to step: use "

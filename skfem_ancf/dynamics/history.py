@@ -62,8 +62,7 @@ def state_of(system: System, scheme: Scheme, y: Motion, arrays: Any = None) -> S
     if np.any(y.acceleration):  # a quasi-static run needs no density
         inertia = system.mass.multiply(y.acceleration)
     if system.damped:
-        with system.histories.lent(y.history):
-            inertia = inertia + system.damping_force(y.u, y.v, y.t)
+        inertia = inertia + system.after(y.history).damping_force(y.u, y.v, y.t)
     return State(system, y.u, load=1.0, converged=True, t=y.t, message=f"t = {y.t:g}",
                  multipliers=y.multipliers, inertia=inertia, acceleration=y.acceleration, motion=y,
                  origin=(scheme, arrays), memory=y.history)
@@ -276,10 +275,10 @@ class History(MaterialPoints, SpringForces):
             out += system.energy_of_beams(self.u)
         if system.forces.elements or remembers:
             for k, memory in enumerate(memories):
-                with system.histories.lent(memory if memory.size else None):
-                    out[k] += system.energy_of_forces(self.u[k], self.t[k])
-                    if remembers:
-                        out[k] += system.energy_of_beams(self.u[k])
+                now = system.after(memory if memory.size else None)
+                out[k] += now.energy_of_forces(self.u[k], self.t[k])
+                if remembers:
+                    out[k] += now.energy_of_beams(self.u[k])
         return out
 
     @cached_property

@@ -164,8 +164,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
         "bending is too large, and results after that time are meaningless. Use NeoHookean, more "
         "elements, a smaller load or shorter steps"]
     texts += filter(None, [contacts.sweep.deep()])
-    with run.system.histories.lent(run.y.history):
-        texts += contacts.sunk(run.y.u, run.y.t)
+    texts += run.system.after(run.y.history).forces.contacts.sunk(run.y.u, run.y.t)
     for text in texts:
         warn(text, ModelWarning)
     return history

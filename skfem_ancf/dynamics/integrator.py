@@ -101,6 +101,7 @@ class Integrator:
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         scheme.require(system)
+        system = system.after()  # whose history steps change
         self.system, self.scheme, self.limit = system, scheme, np.inf
         self.m = system.constraints.m
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
@@ -211,13 +212,12 @@ class Integrator:
 
     def _forces(self, y, history):
         """Sum of all forces except inertia, and the history."""
-        s, histories = self.system, self.system.histories
-        with histories.lent(history):
-            if histories.lasting and history is None:
-                histories.begin(y.u, y.t)
-                history = histories.values.copy()
-            force = s.external_force(y.u, y.t) - s.internal_force(y.u, y.t)
-            return force - s.damping_force(y.u, y.v, y.t) if s.damped else force, history
+        s = self.system.after(history)
+        if s.histories.lasting and history is None:
+            s.histories.begin(y.u, y.t, True)
+            history = s.histories.values.copy()
+        force = s.external_force(y.u, y.t) - s.internal_force(y.u, y.t)
+        return force - s.damping_force(y.u, y.v, y.t) if s.damped else force, history
 
     def _require_fitting_supports(self, jump, t):
         """Raise SupportError if the supports would displace the body suddenly."""
@@ -287,7 +287,8 @@ class Integrator:
         if pivots.any() and not isinstance(call, partial):  # compiled code has none
             pivots[:], state.factors[0] = 0, 0
         try:
-            with s.histories.lent(y.history), np.errstate(all="ignore"):
+            s.histories.put(y.history)
+            with np.errstate(all="ignore"):
                 done = call(self._matrices, *args)
         except BaseException as error:  # the motion may continue from y
             self._load_state(before)

@@ -104,7 +104,7 @@ def flat_points(x):
 def factorize_stages(e, matrices, method, s, w, state, step):
     """Factorise the iteration matrices at the mean of the points; False on failure."""
     origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
-    at = step * (method.points.size + 1)
+    at, e.span[0] = step * (method.points.size + 1), s.h
     for i in indices(origin.size):
         origin[i] = 0.0
     for k in range(method.points.size):

@@ -3,14 +3,18 @@
 With ``A^-1 = T diag(mu) T^-1`` the points decouple into systems ``K + mu D / h + mu^2 M / h^2``,
 one for each pair of eigenvalues: complex symmetric, with a positive real part up to a factor, so
 that L D L^T factors need no pivoting.
+
+Materials and items with a history have that of the start of the step at all points, and the time
+since then; it changes at the end of the step.
 """
 
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
-from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, body_gradients,
-                                  body_mixed, body_stress, linearised_by)
-from ..actions.forces.kernels import add_elastic_force, set_contact_rate, settle_contact
+from ..beam.strain_energy import (accept_body, add_force_by, add_viscous_stress, body_force,
+                                  body_gradients, body_mixed, body_stress, linearised_by)
+from ..actions.forces.kernels import (add_elastic_force, set_contact_rate, settle_contact,
+                                      settle_elements)
 from ..core.source import indices, source
 from ..actions.tables import (add_constraint_rate, add_joint_force, constraint, external_force,
                               joint_directions)
@@ -23,6 +27,8 @@ from .stage_tangent import factorize_stages, flat_points, join, solve_for
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
 #: steps.
 REUSED, MIXED, LASTING = 0.3, 0.5, 32
+#: ``e.lasting`` from which on materials have a history.
+MATERIALS = 2
 #: Newton corrections of the joints at the end of a step.
 CLOSINGS = 2
 
@@ -51,7 +57,11 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
             return k
         if e.lasting > 0:
             t = s.times[(k + 1) * (method.points.size + 1) - 1]
+            e.span[0] = s.h
             settle_contact(e.forces, t, 0.0, w.y[0], w.y[0], taken)
+            settle_elements(e.forces, t, w.before[0], w.y[0], w.y[1], taken)
+            accept_body(e.body, w.before[0], w.y[0], taken)
+            e.span[0] = 0.0
             state.dissipated[0] += taken[0]
             copy(e.history, memories[k, 1:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
@@ -91,7 +101,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             state.factorizations[0] += method.values.shape[1]
             state.factors[0], state.fresh[0] = 1, 1
             state.contraction[0], state.correction[0] = REUSED, -1.0
-        _internal(e, matrices, w, state)
+        _internal(e, matrices, method, s.h, w, state)
         for k in range(n):
             _residual(e, matrices, method, s, w, state, step, k)
         state.iterations[0] += n
@@ -99,7 +109,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             state.failure[0] = DEPENDENT
             return False
         status = judged(state, wanted, rough, REUSED, MIXED, False)
-        if status == GO_ON and state.fresh[0] > 0 and _is_lost(state):
+        if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and _is_lost(state):
             state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
             body_gradients(e.body, w.origin, w.B)
         if status == RESTART:
@@ -140,6 +150,7 @@ def _end(e, matrices, method, s, w, state, step):
     ends = method.points[n - 1] == 1.0
     for k in range(n):
         c, U, V, W = s.h * method.weights[k], w.U[k], w.V[k], w.W[k]
+        e.span[0] = s.h * method.points[k]
         if dampers.active > 0:
             damping_force(e, dampers, matrices.M, s.times[first + k], U, V, f, scratch)
             state.dissipated[0] += c * np.dot(f, V)
@@ -178,6 +189,7 @@ def _balance(e, matrices, s, w, at):
     """
     u, v, a, f, Q, scratch = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
     constrained, t = row_of(s.constrained, at), s.times[at]
+    e.span[0] = s.h
     copy(constrained[2], a)
     multiply(matrices.M, a, scratch)
     body_force(e.body, u, f)
@@ -276,7 +288,7 @@ def motion_at(joints, k):
 
 
 @source
-def _internal(e, matrices, w, state):
+def _internal(e, matrices, method, h, w, state):
     """Internal forces of all points, into R; independent stresses include viscous ones."""
     U, f, missing, constitutive = flat_points(w.U), flat_points(w.R), w.missing, w.constitutive
     independent = w.independent
@@ -289,6 +301,10 @@ def _internal(e, matrices, w, state):
         for i in indices(missing.size):
             missing[i] = constitutive[i] - independent[i]
         add_force_by(e.body, e.copies, w.B, missing, f)
+    elif e.lasting >= MATERIALS:
+        for k in range(w.U.shape[0]):
+            e.span[0] = h * method.points[k]
+            body_force(e.body, w.U[k], w.R[k])
     else:
         body_force(e.copies, U, f)
 
@@ -309,7 +325,7 @@ def _residual(e, matrices, method, s, w, state, step, k):
     """Set R, which has the internal force, to the residual at point k, and the joints' rates."""
     u, v, f, Q, d, scratch = w.U[k], w.V[k], w.R[k], w.x[0], w.x[1], w.x[2]
     at = step * (method.points.size + 1) + k
-    t = s.times[at]
+    t, e.span[0] = s.times[at], s.h * method.points[k]
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     if matrices.dampers.active > 0:
         damping_beside(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)

@@ -70,6 +70,7 @@ class Backend:
         self.tables = Tables(system)
         self._plain: str | None = None
         self._flat: Any = None  # Equations for compiled code, their words, and all to keep alive
+        self._base: Backend | None = None  # the same with another history
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif system.forces.contacts.custom:
@@ -90,16 +91,23 @@ class Backend:
     @cached_property
     def linearised(self) -> Backend | None:
         """The backend for :attr:`Tables.linearised`, or None."""
+        if self._base is not None:
+            base = self._base.linearised
+            return None if base is None else base.after(base.tables.after(self.tables.system))
         tables = self.tables.linearised
-        if tables is None:
-            return None
-        return self.with_tables(tables)
+        return None if tables is None else self.with_tables(tables)
 
     def with_tables(self, tables: Tables) -> Backend:
         """A copy for other tables."""
         backend = copy(self)
-        backend.tables, backend._flat = tables, None
+        backend.tables, backend._flat, backend._base = tables, None, None
         vars(backend).pop("linearised", None)
+        return backend
+
+    def after(self, tables: Tables) -> Backend:
+        """A copy for tables that differ in the history alone, see :meth:`Tables.after`."""
+        backend = self.with_tables(tables)
+        backend._base = self
         return backend
 
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
@@ -200,7 +208,7 @@ class Backend:
 
     def _give_up(self, kernel, error):
         if isinstance(error, code_cache.NotCompiled):
-            self._plain = str(error)
+            self._plain = (self._base or self)._plain = str(error)
             logger.info(self._plain)
             return
         PROBLEMS.append(f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
@@ -221,13 +229,20 @@ class Backend:
             with _LOCK, announced(missing) as update:
                 for part in self._parts(name):
                     load_part(part, update)
-                if self._flat is None:
-                    self._flat = loops.flat(self.tables.plain)
+                self._flatten(loops)
                 if name not in LOADED:
                     LOADED[name] = entry(kernel, (self._flat[0], *args))
                     code_cache.note(name)
                     update(name)
         return LOADED[name]
+
+    def _flatten(self, loops):
+        """Make the equations for compiled code; returns them."""
+        if self._flat is None:
+            plain = self.tables.plain
+            self._flat = loops.flat(plain) if self._base is None else loops.flat_after(
+                self._base._flatten(loops), plain)
+        return self._flat
 
 
 def load_part(name: str, update: Callable[[str], None]) -> None:

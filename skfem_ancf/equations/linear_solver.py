@@ -8,6 +8,7 @@ condensation for frames.
 from __future__ import annotations
 
 import logging
+from copy import copy
 from typing import Any
 from weakref import proxy
 
@@ -28,6 +29,12 @@ logger = logging.getLogger(__name__)
 SURE = 1e-10
 
 
+class Last:
+    """The last factors of a matrix that is more than a band."""
+
+    joined: Alone | Schur | NullSpace | None = None
+
+
 class LinearSolver:
     """Factorises the tangent of a system with its supports and joints, and solves with it.
 
@@ -37,11 +44,17 @@ class LinearSolver:
     def __init__(self, system: Any) -> None:
         self._system, self.handle = proxy(system), handle_of(self)
         self._at: tuple[Array, float] = np.zeros(0), 0.0
-        self._joined: Alone | Schur | NullSpace | None = None
-        self._pattern = Pattern()
+        self._pattern, self._last = Pattern(), Last()
         #: True if the matrix is more than a band: multipliers, or force elements between distant
         #: nodes.
         self.coupled = bool(system.constraints.joints) or system.forces.far
+
+    def after(self, system: Any) -> LinearSolver:
+        """A copy for a system with another history; matrices and factors are shared."""
+        _ = self.condensed, self._supports
+        other = copy(self)
+        other._system, other.handle = proxy(system), handle_of(other)
+        return other
 
     @cached_property
     def condensed(self) -> Condensed | None:
@@ -109,18 +122,18 @@ class LinearSolver:
         inside = np.abs(more[0] - more[1]) <= s.K.bandwidth
         s.K.add(*(x[inside] for x in more))
         more = tuple(x[~inside] for x in more)
-        self._joined = None
+        self._last.joined = None
         if not len(more[0]) and not constraints.m:
             s.K.factorize()
-            self._joined = Alone(s)
+            self._last.joined = Alone(s)
             return
         if s.symmetric and not len(more[0]) and constraints.few:
             try:
-                self._joined = Schur(s.K, J, constraints)
+                self._last.joined = Schur(s.K, J, constraints)
                 return
             except np.linalg.LinAlgError:
                 logger.debug("the band is not definite without the joints")
-        self._joined = NullSpace(s.K, J, more, constraints, self._pattern)
+        self._last.joined = NullSpace(s.K, J, more, constraints, self._pattern)
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """Solve for forces (N,) and constraint residuals (m,); returns x and multipliers.
@@ -134,7 +147,7 @@ class LinearSolver:
         b, none = residual * s.constraints.mask, np.zeros(0)
         if not self.coupled:
             return s.K.solve(b), none
-        solver = self._joined if self.condensed is None else self.condensed
+        solver = self._last.joined if self.condensed is None else self.condensed
         if solver is None or (solver is self.condensed and not solver.ready):
             raise np.linalg.LinAlgError("there are no factors")
         return solver.solve(b, none if phi is None else phi)
@@ -176,7 +189,7 @@ class LinearSolver:
         K = self._system.K
         if not self.coupled:
             return (K if self._system.symmetric else K.symmetric_part()).inertia()
-        solver = self._joined if self.condensed is None else self.condensed
+        solver = self._last.joined if self.condensed is None else self.condensed
         assert solver is not None
         return solver.inertia()
 
@@ -184,16 +197,16 @@ class LinearSolver:
         """Sign of the determinant of the matrix of :meth:`inertia`, but of the unsymmetric one."""
         if not self.coupled:
             return self._system.K.determinant_sign()
-        if isinstance(self._joined, NullSpace):
-            return determinant_sign(self._joined.reduced())
-        if isinstance(self._joined, Alone):
+        if isinstance(self._last.joined, NullSpace):
+            return determinant_sign(self._last.joined.reduced())
+        if isinstance(self._last.joined, Alone):
             return self._system.K.determinant_sign()
         return -1 if self.inertia().negative % 2 else 1
 
     def forget(self) -> None:
         """Discard all factors."""
         self._system.K.clear()
-        self._joined = None
+        self._last.joined = None
         if self.condensed is not None:
             self.condensed.forget()
 
@@ -201,7 +214,7 @@ class LinearSolver:
         """True if the last factors of an iteration show a definite tangent."""
         if not self.coupled:
             return self._system.K.definite
-        known = self._joined if self.condensed is None else self.condensed.ready
+        known = self._last.joined if self.condensed is None else self.condensed.ready
         return bool(known) and self._system.symmetric and self.inertia() == Inertia(0, False)
 
 

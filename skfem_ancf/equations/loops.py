@@ -189,13 +189,8 @@ def _of_points(point):
 def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
     """The equations for compiled code, their words, and those that must live as long."""
     words: list[Words] = []
-    forces, loads = plain.forces, plain.loads
+    forces, loads = _flat_forces(plain.forces), plain.loads
     body = _flat_body(plain.body, words)
-    if forces.contacts.number > 0:
-        forces = forces._replace(contacts=forces.contacts._replace(
-            address=part("contacts")))
-    if forces.number > 0:
-        forces = forces._replace(address=part("elements"))
     if len(loads.eigenstrains):
         loads = loads._replace(eigenstrained=_flat_body(loads.eigenstrained, words))
     viscous, copies = (body if x is plain.body else _flat_body(x, words)
@@ -203,6 +198,21 @@ def flat(plain: Equations) -> tuple[Equations, Words, list[Words]]:
     found = plain._replace(body=body, viscous=viscous, copies=copies, forces=forces, loads=loads,
                            factors=plain.K._replace(flat=np.empty(plain.K.flat.size)))
     return found, Words(found), words
+
+
+def flat_after(flat: tuple[Equations, Words, list[Words]], plain: Equations
+               ) -> tuple[Equations, Words, list[Words]]:
+    """The same with the history of other equations."""
+    found = flat[0]._replace(forces=_flat_forces(plain.forces), history=plain.history,
+                             span=plain.span)
+    return found, Words(found), flat[2]
+
+
+def _flat_forces(forces):
+    if forces.contacts.number > 0:
+        forces = forces._replace(contacts=forces.contacts._replace(
+            address=part("contacts")))
+    return forces._replace(address=part("elements")) if forces.number > 0 else forces
 
 
 def _flat_body(body, words):

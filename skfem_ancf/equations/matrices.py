@@ -105,36 +105,36 @@ class SceneMatrices(NamedTuple):
 
 def matrices_of(system: Any, state: Any) -> SceneMatrices:
     """The SceneMatrices of a System in one of its States, with its history of contact."""
-    with system.histories.lent(state.memory), system.forces.contacts.stuck():
-        u, v, t, tables = np.array(state.u), state.v, state.t, system.backend.tables
-        time = state.load if t is None else t
-        K = load_stiffness(system, u, state.load, t) + system.constraints.curvature(
-            u, time, state.multipliers)
-        D = sparse.csr_array((system.N, system.N))
-        for beam, s in zip(system.beams, system.slices):
-            i, j = entries_of(s.start + element_dofs(beam))
-            K = K + _square(system, i, j, system.histories.kernel(beam).tangents(u[s]))
-        if system.viscous:
-            band, none = BandMatrix(system.N, system.bandwidth), tables.stresses
-            body_tangent(tables.plain.viscous, u, 0.0 * u, none, True, tables.stresses, band.band)
-            D = D + band.tocsc()
-        if system.forces.elements:
-            forces = tables.plain.forces
-            i, j, k = system.forces.entries(forces, time, u, v, 0.0)
-            K = K + _square(system, i, j, k)
-            D = D + _square(system, i, j, system.forces.entries(forces, time, u, v, 1.0)[2] - k)
-        try:
-            M = sparse.csr_array(system.mass.tocsc())
-        except InputError:  # no density
-            M = None
-        if system.damping:
-            modes = sparse.csr_array(system.modal_damping.rows)
-            D = D + system.damping.mass * M + modes.T @ modes
-        force = state.load * system.external_force(u, t) - system.internal_force(u, t, state.load)
-        if system.damped:
-            force = force - system.damping_force(u, v, t)
-        return SceneMatrices(M, sparse.csr_array(D), sparse.csr_array(K), force,
-                             system.constraints.sparse_jacobian(u, time))
+    system = system.after(state.memory).sticking()
+    u, v, t, tables = np.array(state.u), state.v, state.t, system.backend.tables
+    time = state.load if t is None else t
+    K = load_stiffness(system, u, state.load, t) + system.constraints.curvature(
+        u, time, state.multipliers)
+    D = sparse.csr_array((system.N, system.N))
+    for beam, s in zip(system.beams, system.slices):
+        i, j = entries_of(s.start + element_dofs(beam))
+        K = K + _square(system, i, j, system.histories.kernel(beam).tangents(u[s]))
+    if system.viscous:
+        band, none = BandMatrix(system.N, system.bandwidth), tables.stresses
+        body_tangent(tables.plain.viscous, u, 0.0 * u, none, True, tables.stresses, band.band)
+        D = D + band.tocsc()
+    if system.forces.elements:
+        forces = tables.plain.forces
+        i, j, k = system.forces.entries(forces, time, u, v, 0.0)
+        K = K + _square(system, i, j, k)
+        D = D + _square(system, i, j, system.forces.entries(forces, time, u, v, 1.0)[2] - k)
+    try:
+        M = sparse.csr_array(system.mass.tocsc())
+    except InputError:  # no density
+        M = None
+    if system.damping:
+        modes = sparse.csr_array(system.modal_damping.rows)
+        D = D + system.damping.mass * M + modes.T @ modes
+    force = state.load * system.external_force(u, t) - system.internal_force(u, t, state.load)
+    if system.damped:
+        force = force - system.damping_force(u, v, t)
+    return SceneMatrices(M, sparse.csr_array(D), sparse.csr_array(K), force,
+                         system.constraints.sparse_jacobian(u, time))
 
 
 def _square(system, i, j, values):

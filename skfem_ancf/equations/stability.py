@@ -73,13 +73,13 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
     friction resists one.
     """
     t = system.clock if t is None else t
-    with system.forces.contacts.stuck():
-        try:
-            system.assemble(u, load)
-            system.solver.factorize(u, load if t is None else t, multipliers)
-            return verdict_of_factors(system)
-        except NO_FACTORS:
-            return Verdict("singular", 0)
+    system = system.sticking()
+    try:
+        system.assemble(u, load)
+        system.solver.factorize(u, load if t is None else t, multipliers)
+        return verdict_of_factors(system)
+    except NO_FACTORS:
+        return Verdict("singular", 0)
 
 
 def verdict_of_factors(system: Any) -> Verdict:
@@ -183,8 +183,8 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
 
     The tangent at u (N,) must be positive definite beyond round-off.
     """
-    with system.forces.contacts.stuck():
-        force, _ = system.assemble(u)
+    system = system.sticking()
+    force, _ = system.assemble(u)
     fix(system.K.band, system.constraints.fixed)
     loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
     if is_nothing(system, loads):

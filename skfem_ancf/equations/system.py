@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from itertools import accumulate, count, pairwise
 from math import sqrt
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 from weakref import proxy
 
 import numpy as np
@@ -114,6 +115,18 @@ class Scales:
         return float(turn @ s.mass.multiply(turn))
 
 
+T = TypeVar("T")
+
+
+def shared(make: Callable[[Any], T]) -> T:
+    """A property that is computed once for a scene, whatever its history."""
+    @wraps(make)
+    def of_whole(self):
+        return make(self) if self._whole is None else getattr(self._whole, make.__name__)
+
+    return cached_property(of_whole)  # type: ignore[return-value]
+
+
 class System:
     """The discrete equations of a scene.
 
@@ -185,7 +198,9 @@ class System:
         self.forces = Forces([*elements, *(DomainForce(domain, self.of(domain).start)
                                            for domain in domains)], self.N, self.bandwidth,
                              None if self.constraints.frame is None else chain_places(self.beams))
+        self._whole: System | None = None
         self.histories = Histories(self.forces, self.beams, self.slices)
+        self.forces = self.histories.forces
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.damping = UNDAMPED if damping is None else damping
         if self.damping.stiffness and domains:
@@ -216,13 +231,38 @@ class System:
     def __deepcopy__(self, memo):
         return self
 
+    def after(self, history: Array | None = None, span: float = 0.0) -> System:
+        """The equations after a history (n,), by default at rest, for an increment of a time span.
+
+        It is a system of its own, which a search in contact or the kernels of steps may change; all
+        that no history changes is shared.
+        """
+        if not self.histories.values.size:
+            return self
+        whole, other = self._whole or self, object.__new__(System)
+        vars(other).update((name, x) for name, x in vars(whole).items()
+                           if name not in ("backend", "solver"))
+        other._whole, other.clock = whole, self.clock
+        other.histories = whole.histories.after(history, span)
+        other.forces = other.histories.forces
+        return other
+
+    def sticking(self) -> System:
+        """The equations in whose tangents all points that touch an obstacle stick, see
+        :meth:`~skfem_ancf.actions.contact.contacts.Contacts.stick`."""
+        if not self.forces.contacts.anchored:
+            return self
+        other = self.after(self.histories.values, float(self.histories.span[0]))
+        other.forces.contacts.stick()
+        return other
+
     def of(self, load_or_member: Load | Beam | RigidBody | Domain) -> slice:
         """The DOFs of a member, or of the member of a load."""
         return self.slices[self._index[id(getattr(load_or_member, "beam", load_or_member))]]
 
     # parts
 
-    @cached_property
+    @shared
     def points(self) -> Points:
         """Location of material points."""
         frame = self.constraints.frame
@@ -232,9 +272,11 @@ class System:
     @cached_property
     def backend(self) -> Backend:
         """Runs kernels in NumPy or compiled."""
-        return Backend(self)
+        whole = self._whole
+        return Backend(self) if whole is None else whole.backend.after(
+            whole.backend.tables.after(self))
 
-    @cached_property
+    @shared
     def scales(self) -> Scales:
         """Energy scales and round-off."""
         return Scales(self)
@@ -242,9 +284,9 @@ class System:
     @cached_property
     def solver(self) -> LinearSolver:
         """Solves with :attr:`K`, supports and joints."""
-        return LinearSolver(self)
+        return LinearSolver(self) if self._whole is None else self._whole.solver.after(self)
 
-    @cached_property
+    @shared
     def mass_solver(self) -> MassSolver:
         """Solves with the mass matrix, supports and joints."""
         return MassSolver(self)
@@ -345,7 +387,7 @@ class System:
 
     # damping
 
-    @cached_property
+    @shared
     def retardation(self) -> list[float]:
         """The retardation time of each beam."""
         return [self.damping.stiffness + (b.damping.time if b.damping else 0.0)
@@ -361,7 +403,7 @@ class System:
         """True if a force depends on velocities."""
         return self.viscous or bool(self.damping) or self.forces.resists
 
-    @cached_property
+    @shared
     def modal_damping(self) -> ModalDamping:
         return ModalDamping(self, self._rest_modes)
 
@@ -386,7 +428,7 @@ class System:
         """A zero band matrix."""
         return BandMatrix(self.N, self.bandwidth, self.symmetric)
 
-    @cached_property
+    @shared
     def mass(self) -> BandMatrix:
         """The mass matrix."""
         M = self.new_band()
@@ -401,7 +443,7 @@ class System:
             M.add(self.of(body).start + i, self.of(body).start + j, values)
         return M
 
-    @cached_property
+    @shared
     def K(self) -> BandMatrix:
         """The tangent within the band, set by :meth:`assemble`."""
         return self.new_band()

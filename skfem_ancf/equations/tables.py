@@ -47,7 +47,7 @@ class Equations(NamedTuple):
     sizes: F1  # Constraints.coordinate_sizes
     history: F1  # Histories.values
     span: F1  # Histories.span
-    lasting: int  # 1 if steps change the history
+    lasting: int  # 1 if steps change the history, 3 if materials have one
     factors: Band  # work of compiled code: factors of K
 
 
@@ -68,12 +68,12 @@ class Tables:
         joints, histories = self._joints(), system.histories
         body = body_of(system.beams, system.slices, joined=not system.viscous)
         if histories.of_beams.size:
-            body.remember(histories.of_beams, histories.span)
+            body = body.after(histories.of_beams, histories.span)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes,
-                               histories.values, histories.span, int(histories.lasting),
+                               histories.values, histories.span, histories.lasting,
                                _NO_FACTORS)
 
     @property
@@ -118,6 +118,24 @@ class Tables:
         """A copy with other equations."""
         tables = copy(self)
         tables.plain = plain
+        return tables
+
+    def after(self, system: Any) -> "Tables":
+        """A copy for a system with another history."""
+        histories, plain = system.histories, self.plain
+        tables = self.with_equations(plain)
+        tables._system = ref(system)
+        body = plain.body
+        if histories.of_beams.size:
+            body = body.after(histories.of_beams, histories.span)
+        if system.forces.custom:
+            tables._user_defined = None
+        forces = plain.forces._replace(
+            contacts=system.forces.contacts.tables,
+            custom=tables.handle if system.forces.custom else 0)
+        tables.plain = plain._replace(
+            body=body, viscous=body if plain.viscous is plain.body else plain.viscous, copies=body,
+            forces=forces, history=histories.values, span=histories.span)
         return tables
 
     def _forces(self):

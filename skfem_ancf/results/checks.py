@@ -104,33 +104,31 @@ def check(state: Any) -> Checks:
 
 def _yields(state):
     """Findings of ends and stout bodies that press obstacles of default stiffness in too far."""
-    system, contacts = state.system, state.system.forces.contacts
+    system = state._equations
+    contacts = system.forces.contacts
     soft = any(group.firmest > 1.0 for _, group in contacts.groups)
     if not soft or system.constraints.missing_supports:
         return
     t = state.load if state.t is None else state.t
-    with system.histories.lent(state.memory):
-        respond = response(system, state.u, state.load, t, state.multipliers, state.t)
-        yields = contacts.yielding(state.u, t, respond) if system.solver.stays() else []
-        for k, share in enumerate(yields):
-            if share > YIELDS:
-                which, group = contacts.groups[k]
-                firm = (1.0 + contacts.firmness[k]) * group.numbers[STIFFNESS]
-                yield (f"{contacts.obstacles[which]!r} of default stiffness yields under the end "
-                       f"of a beam or a stout body: some {100.0 * share:.2g} % of its force or of "
-                       "the displacement. solve_static and scene.run stiffen it; for motions and "
-                       f"continuation give stiffness={2.0 * firm * share / YIELDS:.2g}, and small "
-                       "steps where it touches")
+    respond = response(system, state.u, state.load, t, state.multipliers, state.t)
+    yields = contacts.yielding(state.u, t, respond) if system.solver.stays() else []
+    for k, share in enumerate(yields):
+        if share > YIELDS:
+            which, group = contacts.groups[k]
+            firm = (1.0 + contacts.firmness[k]) * group.numbers[STIFFNESS]
+            yield (f"{contacts.obstacles[which]!r} of default stiffness yields under the end "
+                   f"of a beam or a stout body: some {100.0 * share:.2g} % of its force or of "
+                   "the displacement. solve_static and scene.run stiffen it; for motions and "
+                   f"continuation give stiffness={2.0 * firm * share / YIELDS:.2g}, and small "
+                   "steps where it touches")
 
 
 def _slips(state):
     """Findings of friction: a static solution knows no path."""
-    contacts = state.system.forces.contacts
+    contacts = state._equations.forces.contacts
     if not contacts.anchored:
         return
-    with state.system.histories.lent(state.memory):
-        obstacles = contacts.slipping(np.array(state.u), state.load)
-    for one in obstacles:
+    for one in contacts.slipping(np.array(state.u), state.load):
         yield (f"points slip on {one!r}, and friction depends on the path: solve_static goes from "
                "start to end in one step, along which every point slips straight on. Use scene.run "
                "with the path of loads, supports and obstacles")
@@ -142,7 +140,7 @@ SHORT = 30.0
 
 def warn_of(state: Any) -> None:
     """Warn (:class:`~skfem_ancf.core.errors.ModelWarning`) of each finding of ``solve_static``."""
-    for text in state.system.forces.contacts.sunk(state.u, state.load):
+    for text in state._equations.forces.contacts.sunk(state.u, state.load):
         warn(text, ModelWarning)
     for text in _kinks(state):
         warn(text, ModelWarning)
@@ -212,8 +210,7 @@ def _kinks(state):
         if at_node and (not 0 < k < t.shape[1] or t[1, k - 1] != t[0, k]):
             continue  # an end
         sides = [k - 1, k] if at_node else [int(station)] * 2
-        remembering = state.system.histories.beam(beam, state)
-        found = _kink(remembering, state.u_of(beam), force, sides)
+        found = _kink(state._with_history(beam), state.u_of(beam), force, sides)
         if found is not None:
             angle, reach, length = found
             who = "of a beam" if beam.name is None else f"of beam {beam.name!r}"

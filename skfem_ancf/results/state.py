@@ -134,13 +134,11 @@ class SpringForces:
         >>> round(state.spring_force(), 2)
         10.0
         """
-        forces, base = self.system.forces, self.base
-        found = spring_of(forces.elements, spring)
+        found, base = spring_of(self.system.forces.elements, spring), self.base
 
         def at(u, v, memory, start=None):
-            with self.system.histories.lent(memory):
-                forces.recall()
-                return spring_force(found, u, v, start)
+            self.system.after(memory).forces.recall()
+            return spring_force(found, u, v, start)
 
         if self.u.ndim > 1:
             memories = (one if one.size else None for one in self._columns["history"])
@@ -316,8 +314,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
         gives the critical load.
         """
         if self._verdict is None and self.t is None and self.base is None:
-            with self._history():
-                self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
+            self._verdict = verdict(self._equations, np.array(self.u), self.load, self.multipliers)
         return self._verdict
 
     @property
@@ -360,9 +357,10 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
         """Velocity of the degrees of freedom, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
-    def _history(self):
-        """A context with the history of this state."""
-        return self.system.histories.lent(self.memory)
+    @cached_property
+    def _equations(self):
+        """The system after the history of this state."""
+        return self.system.after(self.memory)
 
     # linear solutions
 
@@ -452,7 +450,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
                       None, self._eigenstrains(beam), self._with_history(beam))
 
     def _with_history(self, beam):
-        return self.system.histories.beam(beam, self)
+        return (self.base or self)._equations.histories.beam(beam)
 
     def _eigenstrains(self, beam):
         return [(self._unit * self.load * load.factor(self.t), load) for load in self.system.loads
@@ -526,7 +524,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
 
     def _distributed(self, beam):
         """Densities of distributed force elements, and axial coordinates of concentrated ones."""
-        system, base = self.system, self.base
+        system, base = self._equations, self.base
         sampled: list[Sampled] = []
         places: list[float] = []
         free = [element for element, found in system.forces.looks(np.array(self.u), self._time)
@@ -680,8 +678,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
         InputError
             If there is no contact.
         """
-        with self._history():
-            return contact_of(self, obstacle, on)
+        return contact_of(self, obstacle, on)
 
     @property
     def strain_energy(self) -> float:
@@ -690,19 +687,17 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
         It is W(E) of the total strain, also under temperatures and eigenstrains E0: the field
         "energy" is W(E - E0), and the difference is the potential of these loads.
         """
-        with self._history():
-            if self.base is not None:
-                return linear_energy(self.system, self.base.u, self.u - self.base.u, self.load)
-            return self.system.strain_energy(self.u, self._time)
+        if self.base is not None:
+            return linear_energy(self._equations, self.base.u, self.u - self.base.u, self.load)
+        return self._equations.strain_energy(self.u, self._time)
 
     @property
     def internal_force(self) -> Array:
         """Internal force on all degrees of freedom, shape (N,)."""
         if self._force is None:
-            with self._history():
-                self._force = (
-                    self.system.internal_force(self.u, self.t, self.load) if self.base is None else
-                    linear_force(self.system, self.base.u, self.u - self.base.u, self.load))
+            self._force = (
+                self._equations.internal_force(self.u, self.t, self.load) if self.base is None else
+                linear_force(self._equations, self.base.u, self.u - self.base.u, self.load))
         return self._force
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:

@@ -308,8 +308,8 @@ class Design:
         if state is None:
             return largest
         system, s = state.system, c.coordinate_sizes
-        with system.histories.lent(state.memory):
-            work = np.abs(system.internal_force(np.array(state.u), None, state.load) * s).max()
+        force = system.after(state.memory).internal_force(np.array(state.u), None, state.load)
+        work = np.abs(force * s).max()
         return np.concatenate([np.where(c.free, work / s, s), np.full(c.m, system.size),
                                largest])
 

@@ -33,8 +33,7 @@ SYMMETRIC = 1e-4
 def residual(system: Any, u: Array, multipliers: Array, load: float, memory: Any = None) -> Array:
     """The equations of statics, (N + m,); those of supports at fixed degrees of freedom."""
     c = system.constraints
-    with system.histories.lent(memory):
-        force = system.internal_force(u, None, load)
+    force = system.after(memory).internal_force(u, None, load)
     rest = force - load * system.external_force(u) + c.sparse_jacobian(u, load).T @ multipliers
     rest[c.fixed] = u[c.fixed] - c.values(load)
     return np.concatenate([rest, c.constraint(u, load)])
@@ -282,8 +281,7 @@ class _Quadratic:
 
     def _tangent(self, system, load):
         s = self._state
-        with system.histories.lent(s.memory):
-            return StrainTangent(system, np.array(s.u), load, s.t, s.multipliers)
+        return StrainTangent(system.after(s.memory), np.array(s.u), load, s.t, s.multipliers)
 
     def _forces(self, system, at):
         free = system.constraints.free

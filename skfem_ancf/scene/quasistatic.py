@@ -237,8 +237,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
     made = _Record(system, steps if isinstance(steps, Steps) else None, sensors)
     made.t = t_start
     try:
-        with (system.histories.lent(),
-              progress_bar(progress, total=ends[-1] - t_start, desc="time") as bar):
+        with progress_bar(progress, total=ends[-1] - t_start, desc="time") as bar:
             begin = _begin(system, t_start, start, u, rules, stable)
             for instant in follow(system, ends, increments, begin, rules, stable):
                 bar.update(instant.t - made.t)
@@ -348,7 +347,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
 def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
           smallest: bool) -> Instant:
     """The equilibrium at t; by all strategies if the increment is the smallest."""
-    route = Route(last.result.u, None, (1.0, 1.0), (last.t, t))
+    route = Route(last.result.u, None, (1.0, 1.0), (last.t, t), t - last.t)
     start = StaticResult(**vars(last.result) | {
         "load": 0.0, "steps": [], "rejected": 0, "unstable": False, "doubt": "",
         "diverging": False})
@@ -357,8 +356,9 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     if last.rate is not None:
         far = max(NEAR * system.size, FASTER * last.rate * (t - last.t))
 
-    with system.stopped_at(t), system.histories.lent(span=t - last.t):
-        search = Search(system, last.result.u, last.result.memory, rules, stable, False)
+    with system.stopped_at(t):
+        search = Search(system, last.result.u, last.result.memory, rules, stable, False,
+                        t - last.t)
         bounded = search.touches or search.stabilised_by_loads
         for method in ("mixed", "descent" if bounded else "newton"):
             try:

@@ -146,8 +146,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
     critical: list[CriticalPoint] = []
-    with system.histories.lent(None if branch is None else branch.state.memory), progress_bar(
-            progress, total=steps, desc="path") as bar:
+    with progress_bar(progress, total=steps, desc="path") as bar:
+        tracer.system = system.after(None if branch is None else branch.state.memory)
         points, step = [_start(tracer, branch, side)], ds
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
@@ -172,12 +172,12 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                 raise Interrupted(f"stopped at the load {start.load:.6g}; the exception's state is "
                                   "the path up to there", (points, critical)) from None
             for kind, one, change in found:
-                one.history = system.histories.after(start, one)
+                one.history = _history_at(one, start)
                 critical.append(CriticalPoint(
                     kind, one.load, one.arc, one.state.replace(message=f"{kind} point"),
                     one.tangent, change, one))
-            point.history = system.histories.after(start, point)
-            system.histories.put(point.history)
+            point.history = _history_at(point, start)
+            tracer.system = system.after(point.history)
             points.append(point)
             bar.update(1)
             ends = last or (until is not None and ask("until(point)", until, point))
@@ -196,7 +196,9 @@ class Tracer:
     """Corrector and tangent of the equilibrium path of a system."""
 
     def __init__(self, system: System, tol: float, max_iterations: int) -> None:
-        self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
+        self.whole, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
+        #: after the history of the last point
+        self.system = system
         weights = position_weights(system)
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
         self.unit = system.constraints.values(1.0) - system.constraints.values(0.0)
@@ -293,7 +295,7 @@ class Tracer:
                                     abs(external @ step * dl)))
             if closed and work <= rules.tol * reference + rules.floor and self._small(
                     residual, force, load * external):
-                return Point(self.system, u, m, load, force, start.arc + ds,
+                return Point(self.whole, u, m, load, force, start.arc + ds,
                              work / reference if reference > 0 else 0.0, k)
             drive, gap = self._drive(external, u, load)
             try:
@@ -318,8 +320,7 @@ def _start(tracer, branch, side):
         point = branch.critical
         return replace(point, arc=0.0, tangent=side * point.tangent,
                        multiplier_rate=side * point.multiplier_rate)
-    system = tracer.system
-    zero = np.zeros(system.N)
+    system, zero = tracer.whole, np.zeros(tracer.whole.N)
     point = Point(system, zero, np.zeros(system.constraints.m), 0.0, zero)
     # loads that move no node count with the strain that their forces could cause
     forces = float(np.abs(system.external_force(zero)) @ system.constraints.coordinate_sizes)
@@ -334,6 +335,12 @@ def _start(tracer, branch, side):
         point.rate, point.tangent = point.rate / motion, point.tangent / motion
         point.multiplier_rate = point.multiplier_rate / motion
     return point
+
+
+def _history_at(point, start):
+    """The history at a point after another one."""
+    histories = start.system.after(start.history).histories
+    return histories.accept(start.u, point.u, point.load)[0]
 
 
 def _step(tracer, start, ds):

@@ -44,27 +44,27 @@ def modes(system: System, state: State, k: int) -> Modes:
     potential, K is unsymmetric and eigenvalues may be complex. Points stick that touch an obstacle
     with friction, also those that slip.
     """
-    with system.histories.lent(state.memory), system.forces.contacts.stuck():
-        tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
-        if tangent.size[0] <= DENSE:
-            tangent.require_independent()
-        M = _free_mass(system, tangent)
-        n, m = tangent.size
-        k = _count(k, n - m)
-        shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
-        tangent.balance(M, shift)
-        if tangent.symmetric and not small:
-            values, X = _sparse(tangent, state, M, k, shift)
-        elif tangent.symmetric:
-            values, X = _dense(tangent, M, k, shift)
-        else:
-            values, X = _unsymmetric(tangent, M, k, shift, small)
-        shapes = np.zeros((k, system.N), dtype=X.dtype)
-        shapes[:, tangent.free] = X.T
-        frequencies = np.sqrt(values) if np.any(values.imag) else (
-            np.sign(values.real) * np.sqrt(np.abs(values.real)))
-        _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * system.scales.bending_eigenvalue)
-        return Modes(frequencies, shapes, state, values.astype(complex))
+    system = system.after(state.memory).sticking()
+    tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
+    if tangent.size[0] <= DENSE:
+        tangent.require_independent()
+    M = _free_mass(system, tangent)
+    n, m = tangent.size
+    k = _count(k, n - m)
+    shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
+    tangent.balance(M, shift)
+    if tangent.symmetric and not small:
+        values, X = _sparse(tangent, state, M, k, shift)
+    elif tangent.symmetric:
+        values, X = _dense(tangent, M, k, shift)
+    else:
+        values, X = _unsymmetric(tangent, M, k, shift, small)
+    shapes = np.zeros((k, system.N), dtype=X.dtype)
+    shapes[:, tangent.free] = X.T
+    frequencies = np.sqrt(values) if np.any(values.imag) else (
+        np.sign(values.real) * np.sqrt(np.abs(values.real)))
+    _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * system.scales.bending_eigenvalue)
+    return Modes(frequencies, shapes, state, values.astype(complex))
 
 
 def rest_modes(system: System, k: int) -> tuple[Array, Array]:
@@ -258,10 +258,8 @@ def buckling(system: System, k: int, state: State | None = None) -> Buckling:
     """
     system.constraints.require_supports()
     state = state or _prestressed(system)
-    mine, (theirs, memory) = system.histories, (system.histories, None) if state is None else (
-        state.system.histories, state.memory)
-    with theirs.lent(memory), mine.lent(mine.of_state(state)):
-        tangent, loads, du, stress, multipliers = _linear_response(system, state)
+    system = system.after(system.histories.of_state(state))
+    tangent, loads, du, stress, multipliers = _linear_response(system, state)
     n, m = tangent.size
     k = _count(k, n - m)
     Ks = loads.geometric(stress, multipliers, 1.0) + _geometric_of_domains(system, tangent, du)
@@ -302,7 +300,8 @@ def _linear_response(system, state):
         raise InputError("the state is unstable: its own loads are beyond the buckling load"
                          if state.load else "the scene is unstable before there is any load: what "
                          "load factors do not scale is beyond the buckling load")
-    tangent = StrainTangent(state.system, state.u, state.load, state.t, state.multipliers)
+    tangent = StrainTangent(state.system.after(state.memory), state.u, state.load, state.t,
+                            state.multipliers)
     loads = StrainTangent(system, state.u, 0.0, None, state.multipliers)
     return tangent, loads, *tangent.added(system.external_force(state.u))
 

@@ -35,13 +35,14 @@ class Route(NamedTuple):
 
     ``u`` (N,) is the displacement at level 0. With ``gap`` (N,), the residual there under full load
     is reduced to zero; otherwise ``loads`` and ``times`` are the load factor, and the time of
-    supports and obstacles, at both levels.
+    supports and obstacles, at both levels. ``span`` is the time that passes for materials.
     """
 
     u: Array
     gap: Array | None = None
     loads: tuple[float, float] = (0.0, 1.0)
     times: tuple[float, float] = (0.0, 1.0)
+    span: float = 0.0
 
     def acting(self, level: float) -> tuple[float, float]:
         """Load factor and time at a level."""
@@ -72,11 +73,15 @@ class Options(NamedTuple):
 
 
 class Increment:
-    """The step from the last equilibrium to a load level; ``record`` counts all iterations."""
+    """The step from the last equilibrium to a load level; ``record`` counts all iterations.
+
+    Its ``system`` is that after the history of the last equilibrium.
+    """
 
     def __init__(self, system: System, start: StaticResult, level: float,
                  options: Options) -> None:
-        self.system, self.start, self.level, self.options = system, start, level, options
+        self.system = system.after(start.memory, (level - start.load) * options.route.span)
+        self.start, self.level, self.options = start, level, options
         self.load, self.time = options.route.acting(level)
         self.record = LoadStep(level)
 
@@ -112,12 +117,12 @@ class Increment:
 
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""
-        histories, start = self.system.histories, self.start
-        rubbed = start.rubbed + histories.accept(start.u, found.u, self.time)
+        start = self.start
+        memory, lost = self.system.histories.accept(start.u, found.u, self.time)
         return StaticResult(**vars(start) | {
-            "steps": [*start.steps, self.record], "load": self.level, "rubbed": rubbed,
-            "memory": histories.get(), "u": found.u, "multipliers": found.multipliers,
-            "force": found.force})
+            "steps": [*start.steps, self.record], "load": self.level,
+            "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,
+            "multipliers": found.multipliers, "force": found.force})
 
     def _augmented(self):
         """Repeat with corrected pressures until the penetration is within tolerance.
@@ -127,7 +132,6 @@ class Increment:
         Lagrange Multiplier Methods", Academic Press 1982, 2.2.
         """
         contacts = self.system.forces.contacts
-        self.system.histories.put(self.start.memory, self.level - self.start.load)
         found = self._touching()
         for _ in range(AUGMENTED):
             if not self.system.forces.corrected(found.u, self.time):

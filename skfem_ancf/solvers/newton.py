@@ -126,23 +126,24 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     if memory is None:
         start = (np.zeros(system.N), 0.0) if u is None else (u, 1.0)
         system.forces.contacts.require_clear(*start)
-    with system.histories.lent():
-        return Search(system, u, memory, rules, stable, progress).find()
+    return Search(system, u, memory, rules, stable, progress).find()
 
 
 class Search:
     """The search for an equilibrium: initial state, options, and methods for strategies.
 
-    ``u`` (N,) and ``memory`` (n,) are initial displacement and contact history, or None; ``steps``
-    the options of load steps. ``stabilised_by_loads`` is True if the supports leave a rigid motion
-    free, so that only loads or obstacles stabilise the scene; ``loose`` is an unstabilised motion
-    in words. ``soft`` is True if the second correction of the mixed iteration did far more work
-    than the loads, as for a slack rope. ``attempts`` lists the strategies tried.
+    ``u`` (N,) and ``memory`` (n,) are initial displacement and history, or None; ``steps`` the
+    options of load steps; ``span`` the time that passes for materials. ``stabilised_by_loads`` is
+    True if the supports leave a rigid motion free, so that only loads or obstacles stabilise the
+    scene; ``loose`` is an unstabilised motion in words. ``soft`` is True if the second correction
+    of the mixed iteration did far more work than the loads, as for a slack rope. ``attempts`` lists
+    the strategies tried.
     """
 
     def __init__(self, system: System, u: Array | None, memory: Array | None, steps: Steps,
-                 stable: bool, progress: bool | None) -> None:
-        self.system, self.rules, self.stable, self.progress = system, steps, stable, progress
+                 stable: bool, progress: bool | None, span: float = 0.0) -> None:
+        self.system = system = system.after(memory, span)
+        self.rules, self.stable, self.progress, self._span = steps, stable, progress, span
         self.stabilised_by_loads = bool(system.constraints.missing_supports)
         self.attempts: list[Attempt] = []
         self.soft, self.loose = False, ""
@@ -154,7 +155,7 @@ class Search:
         contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
         memory = system.histories.begin(np.zeros(system.N) if u is None else u,
-                                        times[u is not None], memory)
+                                        times[u is not None], memory is None)
         self._start, self._times, self._memory = u, times, memory
         if contacts.keeps:
             _ = self.route  # with the contact history of the start
@@ -164,9 +165,10 @@ class Search:
         """The whole load; from a displacement that is given, the way to reduce its residual."""
         system, u = self.system, self._start
         if u is None:
-            return Route(np.zeros(system.N), times=self._times)
+            return Route(np.zeros(system.N), times=self._times, span=self._span)
         missing = system.external_force(u) - system.internal_force(u)
-        return Route(u.copy(), missing * system.constraints.mask, times=self._times)
+        return Route(u.copy(), missing * system.constraints.mask, times=self._times,
+                     span=self._span)
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
@@ -361,16 +363,15 @@ class Search:
 
         ``eased``: starting from the equilibrium without friction.
         """
-        route, system = route or self.route, self.system
+        route = route or self.route
+        result, options = self._beginning(route), self._options(route, method)
+        step = Increment(self.system, result, 1.0, options)
+        system, contacts = step.system, step.system.forces.contacts
         if (not (system.symmetric or self.stabilised_by_loads or self.rubs)
                 and not stability.has_potential(system, route.u, 1.0)):
             raise StepFailed("the loads have no potential")
-        result = self._beginning(route)
-        options, contacts = self._options(route, method), system.forces.contacts
-        step, down = Increment(system, result, 1.0, options), descent.Descent(system)
-        far = options._replace(most=min(most, 7 * self.rules.max_iterations))
-
-        system.histories.put(self._memory)
+        down, far = descent.Descent(system), options._replace(
+            most=min(most, 7 * self.rules.max_iterations))
         # descents start where obstacles have moved to
         times = (route.acting(level)[1] for level in (0.0, 1.0))
         if passed := system.forces.passed(*((result.u, t) for t in times)):
@@ -414,7 +415,7 @@ class Search:
     def _require_good(self, result):
         """Raise StepFailed if a rigid motion is not stabilised, or an axis is folded."""
         if self.stabilised_by_loads and not stability.is_stabilised(
-                self.system, result.u, result.multipliers):
+                self.system.after(result.memory), result.u, result.multipliers):
             self.loose, self._unstabilised = self._loose(result.u), self._unstabilised + 1
             raise StepFailed("the loads do not hold what the supports leave free" + (
                 f": nothing holds {self.loose}" if self.loose else ""))
@@ -453,8 +454,8 @@ class Search:
         start = replace(self._beginning(self.route), u=found.u, multipliers=found.multipliers)
         loads, times = ((x, x) for x in step.options.route.acting(1.0))
         again = Increment(self.system, start, 1.0, step.options._replace(
-            route=Route(found.u, None, loads, times), close=True))
-        again.record = step.record
+            route=Route(found.u, None, loads, times, step.options.route.span), close=True))
+        again.record, step.system = step.record, again.system  # with its pressures
         return again.solve(self.stable)
 
     def _beginning(self, route):

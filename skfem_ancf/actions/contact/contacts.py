@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -118,6 +119,7 @@ class Contacts:
                 floats=np.concatenate([tables.floats, *springs]),
                 memory=np.zeros(tables.memory.size + len(springs)), lasting=tables.lasting | TURNS)
         self.tables, self._springs, self.keeps = tables, len(springs), bool(groups or springs)
+        self._answers: Any = None
         self.put(0.0, 0.0, self.tables.poses)
 
     def _tables(self):
@@ -194,20 +196,20 @@ class Contacts:
             for x, k in zip(numbers, before):
                 x[STIFFNESS] = k
 
-    @contextmanager
-    def stuck(self) -> Iterator[None]:
-        """Context in which all points that touch stick in tangents, also those that slip.
+    def after(self, memory: Array) -> Contacts:
+        """A copy with other history data (n,)."""
+        _ = self.sweep if self.obstacles else None  # one, whatever the history
+        other = copy(self)
+        other.tables, other._answers = self.tables._replace(memory=memory), self  # as handle
+        return other
+
+    def stick(self) -> None:
+        """Let all points that touch stick in tangents, also those that slip.
 
         Points that have slipped are at the limit of friction, on one side of it or the other by the
         last digit; and of a disturbance either way friction resists one.
         """
-        memory = self.tables.memory
-        before = memory[ANCHORED]
-        try:
-            memory[ANCHORED] *= 2.0
-            yield
-        finally:
-            memory[ANCHORED] = before
+        self.tables.memory[ANCHORED] *= 2.0
 
     def begin(self, u: Array, t: float, anew: bool) -> None:
         """Begin a run; ``anew``, friction begins at u."""

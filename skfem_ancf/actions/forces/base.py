@@ -258,16 +258,15 @@ def derivative(function: Callable[[Array], Any], x: Array) -> Array:
 
 
 class Remembering:
-    """A bound force element with a memory, at the history that is set: as one without memory.
+    """A bound force element with a memory, at one history: as one without memory.
 
-    ``history`` (k,) is that at the start of an increment, ``span`` (1,) the time since; views of
-    those of a scene.
+    ``history`` (k,) is that at the start of an increment, ``span`` (1,) the time since.
     """
 
     def __init__(self, element: Any) -> None:
         self.element = element
         self.start = np.array(require_finite(f"start() of {element!r}", element.start(), (None,)))
-        self.remember(self.start, np.zeros(1))
+        self._at(self.start, np.zeros(1))
 
     def __getattr__(self, name):
         return getattr(vars(self)["element"], name)
@@ -275,8 +274,14 @@ class Remembering:
     def __repr__(self) -> str:
         return repr(self.element)
 
-    def remember(self, history: Array, span: Array) -> None:
-        """Use a part of the history of a scene, and its span."""
+    def after(self, history: Array, span: Array) -> Remembering:
+        """A copy at another history and span, of which it has views."""
+        other = object.__new__(Remembering)
+        vars(other).update(vars(self))
+        other._at(history, span)
+        return other
+
+    def _at(self, history, span):
         self._values, self.history, self.span = history, history.view(), span
         self.history.flags.writeable = False
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -162,6 +163,17 @@ class Forces:
         rows, between = np.unique([a[out], b[out]], return_inverse=True)
         a, b = between.reshape(2, -1)
         self._between = len(rows) * a + b, number[out], B[rows].toarray()
+
+    def after(self, memory: Array, pasts: Sequence[tuple[Array, Array]]) -> Forces:
+        """A copy with a history of obstacles and springs, and histories and spans of the items
+        with a memory: arrays that it uses, and changes where it accepts an increment."""
+        other, new = copy(self), [one.after(*past) for one, past in zip(self.remembering, pasts)]
+        of = dict(zip(map(id, self.remembering), new))
+        other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
+        other.changing = [(of.get(id(e), e), at) for e, at in self.changing]
+        if memory.size:
+            other.contacts = self.contacts.after(memory)
+        return other
 
     def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
         """The tables for kernels."""

@@ -61,7 +61,7 @@ class Contact:
 
 
 def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:
-    forces = state.system.forces
+    forces = state._equations.forces
     if not (forces.contacts.obstacles or forces.changing):
         raise InputError("the scene has no contact: scene.obstacle(Circle((0, -1), 0.5)) adds an "
                          "obstacle, scene.contact('all') that of its members with each other")
@@ -92,7 +92,7 @@ def _number(members, which):
 
 def _of_obstacles(state, known, member):
     """Contact points, forces, pressures, gaps, sticking and the least gap of each group."""
-    contacts, t = state.system.forces.contacts, state.load if state.t is None else state.t
+    contacts, t = state._equations.forces.contacts, state.load if state.t is None else state.t
     v = None if state.t is None else np.array(state.v)
     pushes = contacts.pushes(np.array(state.u), v, t) if contacts.obstacles else []
     for (_, group), (k, x, force, pressure, gap) in zip(contacts.groups, pushes):
@@ -113,7 +113,7 @@ def _of_obstacles(state, known, member):
 def _of_bodies(state, known, member):
     """The same of bodies that touch each other, on both sides."""
     t = state.load if state.t is None else state.t
-    for element, found in state.system.forces.looks(np.array(state.u), t):
+    for element, found in state._equations.forces.looks(np.array(state.u), t):
         if not any(element.same(other) for other in known):
             continue
         x, y, force, pressure, gap, sticks, own, other = found
@@ -125,7 +125,7 @@ def _of_bodies(state, known, member):
 
 def loads_of_contact(state: Any, dofs: slice) -> list[tuple[int, float, Array]]:
     """Forces of obstacles on the beam with some DOFs: element, xi, and nodal force (nb, 2)."""
-    contacts, u = state.system.forces.contacts, np.array(state.u)
+    contacts, u = state._equations.forces.contacts, np.array(state.u)
     t, out = state.load if state.t is None else state.t, []
     v = None if state.t is None else np.array(state.v)
     for (_, group), (_, _, force, _, _) in zip(contacts.groups, contacts.pushes(u, v, t)):
