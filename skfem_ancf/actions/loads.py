@@ -29,7 +29,7 @@ from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
 from .item import Item, beside, require_entries
-from .places import Vector, members_at, nearest_of, section
+from .places import Vector, dense_entries, members_at, nearest_of, section
 from .symbols import (ARROWS, Symbol, arrows_along, at_node, faces_of, force_symbol, inside,
                       values_at)
 
@@ -577,9 +577,7 @@ class EndMoment(Load):
         x, y = self.direction(u)
         D = np.array([[2.0 * x * y, y * y - x * x], [y * y - x * x, -2.0 * x * y]])
         values = np.einsum("ij,k,l->ikjl", self.M / (x * x + y * y) ** 2 * D, self.c, self.c)
-        rows = np.broadcast_to(self.dofs[:, :, None, None], values.shape)
-        columns = np.broadcast_to(self.dofs[None, None], values.shape)
-        return rows.ravel(), columns.ravel(), values.ravel()
+        return dense_entries(self.dofs, self.dofs, values)
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         out = np.zeros(self.beam.N)

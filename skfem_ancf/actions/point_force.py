@@ -21,7 +21,7 @@ from ..core.errors import (InputError, ask, require_direction, require_finite,
 from ..core.types import Array, TimeFunction
 from ..mesh.places import as_point
 from .item import Item
-from .places import point, section
+from .places import dense_entries, point, section
 from .symbols import Symbol, force_symbol, inside
 from .loads import DeadLoad, Load, TimedLoad, number_at
 
@@ -32,7 +32,66 @@ def is_off_axis(beam: Beam, X: Array) -> bool:
     return not beam.has_sections and bool(abs(X[1] - 0.5) > beam.finder.allowed)
 
 
-class OffAxisForce(Load):
+class DirectedForce(Load):
+    """A force F(d) on a point and a couple G(d) on the tangent d there, (2,) each; bound.
+
+    A subclass defines :meth:`both` and :meth:`slopes_of_both`.
+    """
+
+    constant = False
+    # element and xi of a beam; DOFs and weights of the point and of the tangent, and its start
+    _place: tuple[int, float] | None
+    _dofs: Any
+    _weights: Any
+    _along: Any
+    _slopes: Any
+    _start: Any
+
+    def _put(self, beam: Any, e: int, X: Array) -> None:
+        """Place it at a point (2,) of an element."""
+        self._place, here = (e, float(X[0])), np.array([e])
+        self._dofs, self._weights = probe_reference(beam, e, X)
+        slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]), here)
+        self._along, self._slopes, self._start = self._dofs, slopes[0, 0, 0], frame[0, 0, 0]
+
+    def both(self, d: Array) -> tuple[Array, Array]:
+        """F and G."""
+        raise NotImplementedError
+
+    def slopes_of_both(self, d: Array) -> tuple[Array, Array]:
+        """Their derivatives, (2, 2) each."""
+        raise NotImplementedError
+
+    def _tangent(self, u: Array) -> Array:
+        return self._start + u[self._along] @ self._slopes
+
+    def _spread(self, force: Array, couple: Array) -> Array:
+        out = np.zeros(self.beam.N, couple.dtype)
+        np.add.at(out, self._dofs, force[:, None] * self._weights)
+        np.add.at(out, self._along, couple[:, None] * self._slopes)
+        return out
+
+    def force(self, u: Array) -> Array:
+        return self._spread(*self.both(self._tangent(u)))
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        weights = np.broadcast_to(self._weights, self._dofs.shape)
+        found = [dense_entries(dofs, self._along, np.einsum("ij,ik,l->ikjl", D, w, self._slopes))
+                 for dofs, w, D in zip(
+                     (self._dofs, self._along),
+                     (weights, np.broadcast_to(self._slopes, self._along.shape)),
+                     self.slopes_of_both(self._tangent(u)))]
+        i, j, values = map(np.concatenate, zip(*found))
+        return i, j, values
+
+    def distribution(self, u: Array) -> Distribution:
+        if self._place is None:
+            return Distribution()
+        (e, xi), nodal = self._place, self.force(u)[self._dofs]
+        return Distribution(stations=(e + xi,), points=((e, xi, nodal.T),))
+
+
+class OffAxisForce(DirectedForce):
     """A dead force F at ``r + Y n``, n the unit normal of the axis, with its potential.
 
     Parameters
@@ -45,61 +104,34 @@ class OffAxisForce(Load):
         As for :class:`~skfem_ancf.actions.loads.Load`; the beam is a Beam.
     """
 
-    constant = False
-
     def __init__(self, force: Array, e: int, X: Array, beam: Any, amplitude: Any = None) -> None:
         super().__init__(beam, amplitude)
-        self.total, self._place, here = force, (e, float(X[0])), np.array([e])
-        self._dofs, self._weights = probe_reference(beam, e, np.array([X[0], 0.5]))
-        slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]), here)
-        self._slopes, self._start = slopes[0, 0, 0], frame[0, 0, 0]
-        Y = float(beam.mesh.mapping().offset(X.reshape(2, 1, 1), here)[0, 0])
+        self.total = force
+        self._put(beam, e, np.array([X[0], 0.5]))
+        Y = float(beam.mesh.mapping().offset(X.reshape(2, 1, 1), np.array([e]))[0, 0])
         #: minus the potential of the couple is this vector times the unit tangent
         self._arm = Y * np.array([force[1], -force[0]])
 
-    def _tangent(self, u: Array) -> tuple[Array, Any]:
-        d = self._start + u[self._dofs] @ self._slopes
-        return d, np.sqrt(d @ d)
+    def both(self, d: Array) -> tuple[Array, Array]:
+        size = np.sqrt(d @ d)
+        return self.total, (self._arm - d * (self._arm @ d) / size**2) / size
 
-    def _nodal(self, couple: Array) -> Array:
-        return self.total[:, None] * self._weights + couple[:, None] * self._slopes
-
-    def _at(self, u: Array) -> Array:
-        d, size = self._tangent(u)
-        return self._nodal((self._arm - d * (self._arm @ d) / size**2) / size)
-
-    def _spread(self, nodal: Array) -> Array:
-        out = np.zeros(self.beam.N, nodal.dtype)
-        out[self._dofs] = nodal
-        return out
-
-    def force(self, u: Array) -> Array:
-        return self._spread(self._at(u))
+    def slopes_of_both(self, d: Array) -> tuple[Array, Array]:
+        a, size, along = self._arm, np.sqrt(d @ d), self._arm @ d
+        return np.zeros((2, 2)), (3.0 * along / size**2 * np.outer(d, d) - np.outer(a, d)
+                                  - np.outer(d, a) - along * np.eye(2)) / size**3
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        (a, p), (b, q) = self._tangent(u0), self._tangent(u1)
+        a, b = self._tangent(u0), self._tangent(u1)
+        p, q = np.sqrt(a @ a), np.sqrt(b @ b)
         couple = 0.5 * (1.0 / p + 1.0 / q) * self._arm - 0.5 * (self._arm @ (a + b)) * (a + b) / (
             (p + q) * p * q)
-        return self._spread(self._nodal(couple))
-
-    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        (d, size), a = self._tangent(u), self._arm
-        along = a @ d
-        D = (3.0 * along / size**2 * np.outer(d, d) - np.outer(a, d) - np.outer(d, a)
-             - along * np.eye(2)) / size**3
-        values = np.einsum("ij,k,l->ikjl", D, self._slopes, self._slopes)
-        rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
-        columns = np.broadcast_to(self._dofs[None, None], values.shape)
-        return rows.ravel(), columns.ravel(), values.ravel()
+        return self._spread(self.total, couple)
 
     def potential(self, u: Array) -> float:
-        (d, size), (start, before) = self._tangent(u), self._tangent(0.0 * u)
+        now, before = (d / np.sqrt(d @ d) for d in (self._tangent(u), self._start))
         return -float(np.sum(self.total[:, None] * self._weights * u[self._dofs])
-                      + self._arm @ (d / size - start / before))
-
-    def distribution(self, u: Array) -> Distribution:
-        e, xi = self._place
-        return Distribution(stations=(e + xi,), points=((e, xi, self._at(u).T),))
+                      + self._arm @ (now - before))
 
 
 class PointForce(Load):
@@ -257,7 +289,7 @@ class Train(TimedLoad):
         return places
 
 
-class FollowerForce(Load):
+class FollowerForce(DirectedForce):
     """A point force that rotates with the tangent of the axis, or with a rigid body.
 
     It has no potential and may cause flutter. On the face of a cable it has the couple of its
@@ -275,16 +307,9 @@ class FollowerForce(Load):
         Number of the chain of elements whose tangent is used, where several meet.
     """
 
-    constant = False
     symmetric = False
     for_bodies = True
-    # of a bound one: element and xi, coordinates and weights of its place and of the tangent
-    _place: tuple[int, float] | None
-    _dofs: Any
-    _weights: Any
-    _along: Any
-    _slopes: Any
-    _start: Any
+    # of a bound one: F is a matrix times the unit tangent
     _turn: Any
     _couple: float = 0.0
 
@@ -298,9 +323,9 @@ class FollowerForce(Load):
         return (self._with(beam=number_at(layout, self.at, self.beam)),)
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        bound, lever = cast("FollowerForce", super().bind(cast("Beam", beam))), 0.0
+        bound, lever = cast("FollowerForce", super().bind(beam)), 0.0
         if isinstance(beam, RigidBody):
-            bound._dofs, weights = beam.probe(self.at)
+            bound._dofs, bound._weights = beam.probe(self.at)
             bound._place, bound._start = None, beam.q0[2:]
             bound._along, bound._slopes = beam.direction()
         else:
@@ -310,51 +335,21 @@ class FollowerForce(Load):
             if is_off_axis(beam, X):
                 lever = float(beam.mesh.mapping().offset(X.reshape(2, 1, 1), np.array([e]))[0, 0])
                 X = np.array([X[0], 0.5])
-            bound._dofs, weights = probe_reference(beam, e, X)
-            bound._place, bound._along = (e, float(X[0])), bound._dofs
-            slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
-                                           np.array([e]))
-            bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
-        bound._weights = np.broadcast_to(weights, bound._dofs.shape)
-        # the force is a matrix times the unit tangent
+            bound._put(beam, e, X)
         (x, y), n = self.total, bound._start / np.hypot(*bound._start)
         a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
         bound._turn = np.array([[a, b], [-b, a]])
         bound._couple = -a * lever  # of the component along the axis
         return bound
 
-    def _tangent(self, u):
-        return self._start + u[self._along] @ self._slopes
+    def both(self, d: Array) -> tuple[Array, Array]:
+        return self._turn @ d / np.hypot(*d), self._couple * (TURN @ d) / (d @ d)
 
-    def _force(self, u):
-        d = self._tangent(u)
-        force = (self._turn @ d / np.hypot(*d))[:, None] * self._weights
-        if self._couple:
-            force = force + self._couple * (TURN @ d / (d @ d))[:, None] * self._slopes
-        return force
-
-    def force(self, u: Array) -> Array:
-        out = np.zeros(self.beam.N)
-        np.add.at(out, self._dofs, self._force(u))
-        return out
-
-    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        d = self._tangent(u)
-        size = np.hypot(*d)
-        D = self._turn @ (np.eye(2) - np.outer(d, d) / size**2) / size
-        values = np.einsum("ij,ik,l->ikjl", D, self._weights, self._slopes)
-        if self._couple:
-            D = self._couple * (TURN - 2.0 * np.outer(TURN @ d, d) / size**2) / size**2
-            values += np.einsum("ij,k,l->ikjl", D, self._slopes, self._slopes)
-        rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
-        columns = np.broadcast_to(self._along[None, None], values.shape)
-        return rows.ravel(), columns.ravel(), values.ravel()
-
-    def distribution(self, u: Array) -> Distribution:
-        if self._place is None:
-            return Distribution()
-        e, xi = self._place
-        return Distribution(stations=(e + xi,), points=((e, xi, self._force(u).T),))
+    def slopes_of_both(self, d: Array) -> tuple[Array, Array]:
+        square = d @ d
+        along = np.outer(d, d) / square
+        return (self._turn @ (np.eye(2) - along) / np.sqrt(square),
+                self._couple * (TURN - 2.0 * TURN @ along) / square)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield force_symbol([_place(self, layout)], self.total,
