@@ -223,10 +223,16 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
         return bound
     zero = np.zeros(beam.N)
     try:
-        require_finite("its force", bound.force(zero), (beam.N,))
+        force = require_finite("its force", bound.force(zero), (beam.N,))
         bound._freeze()
+
+        def require_constant(u: Array, _: Array) -> None:
+            if np.any(np.abs(bound.force(u) - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
+                raise InputError("force(u) depends on the displacement: set constant = False in "
+                                 "its class and define stiffness(u)")
+
         if bound.constant:
-            _require_constant(bound)
+            beside(require_constant, beam.sizes)
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
@@ -249,17 +255,6 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
                          "only neighbours of the chain may be coupled, as they are in its elements")
     beside(partial(_require_derivatives, bound), bound.beam.sizes)
     return bound
-
-
-def _require_constant(load):
-    force = load.force(np.zeros(load.beam.N))
-
-    def check(u, _):
-        if np.any(np.abs(load.force(u) - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
-            raise InputError("force(u) depends on the displacement: set constant = False in its "
-                             "class and define stiffness(u)")
-
-    beside(check, load.beam.sizes)
 
 
 def _require_derivatives(load, u, d):

@@ -138,7 +138,14 @@ def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vect
     except MeshError:
         if not is_point(place):
             raise
-        return _inner_section(layout, member, place)
+        e, X = locate(member, place)  # inside an element
+        if not member.has_sections:
+            X = np.array([X[0], 0.5])
+            place = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+        dofs, _ = probe_reference(member, e, X)
+        weights = direction_weights(member, e, float(X[0]))
+        return (point(layout, member, place),
+                _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights))
     dofs, weights = direction_of(member, node)
     direction = _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights)
     if is_point(place) and member.has_sections:
@@ -163,17 +170,6 @@ def _section_of_frame(layout, beam, at):
                          f"np.array([{node}])")
     k, node, _ = (rigid or ends)[0]
     return k, np.array([node])
-
-
-def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
-    """As :func:`section`, for a section inside an element."""
-    e, X = locate(beam, at)
-    if not beam.has_sections:
-        X = np.array([X[0], 0.5])
-        at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    dofs, _ = probe_reference(beam, e, X)
-    weights = direction_weights(beam, e, float(X[0]))
-    return point(layout, beam, at), _of(layout, beam, beam.q0_local[dofs] @ weights, dofs, weights)
 
 
 def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
@@ -276,17 +272,6 @@ def several(beams: Any) -> tuple[Any, ...]:
     return tuple(beams)
 
 
-def _nearest_other(layout, at, found):
-    """Where the nearest node of another beam is, for a message."""
-    others = [(x, beam.name or k) for k, beam in enumerate(layout.beams) if k not in found
-              for x in beam.mesh.p.T]
-    if not others:
-        return ""
-    x, name = min(others, key=lambda one: np.hypot(*(one[0] - at)))
-    return (f"; the nearest node of another beam, {name!r}, is at ({x[0]:.6g}, {x[1]:.6g}), "
-            f"{np.hypot(*(x - at)):.6g} away")
-
-
 def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:
     """Beams and places of a joint."""
     if len(places) > 1:
@@ -295,8 +280,14 @@ def joined(layout: Layout, places: Sequence[Any]) -> tuple[list[Any], Any]:
     at = require_finite("the point of a joint", places[0] if places else None, (2,))
     found = members_at(layout, at)
     if len(found) < 2:
-        names = [layout.members[k].name or k for k in found]
+        names, near = [layout.members[k].name or k for k in found], ""
+        others = [(x, beam.name or k) for k, beam in enumerate(layout.beams) if k not in found
+                  for x in beam.mesh.p.T]
+        if others:
+            x, name = min(others, key=lambda one: np.hypot(*(one[0] - at)))
+            near = (f"; the nearest node of another beam, {name!r}, is at ({x[0]:.6g}, "
+                    f"{x[1]:.6g}), {np.hypot(*(x - at)):.6g} away")
         raise InputError(f"a joint at {shown(places[0])} needs two beams or rigid bodies there, "
-                         f"found {names}{_nearest_other(layout, at, found)}: name a place of each, "
-                         "as (beam, (x, y)) or ('ground', (x, y))")
+                         f"found {names}{near}: name a place of each, as (beam, (x, y)) or "
+                         "('ground', (x, y))")
     return found, tuple(map(float, at))

@@ -34,7 +34,13 @@ def read(path: Path) -> dict[str, Array]:
     """
     with open(path, "rb") as file:
         try:
-            arrays = _read(file)
+            size = os.fstat(file.fileno()).st_size
+            with zipfile.ZipFile(file) as members:
+                if any(x.compress_type != zipfile.ZIP_STORED or x.file_size > size
+                       for x in members.infolist()):
+                    raise Unreadable("its arrays are compressed: this package writes no such files")
+            with np.load(file, allow_pickle=False) as found:
+                arrays = dict(found)
         except Exception as error:  # any content
             raise Unreadable(f"{type(error).__name__}: {error}") from None
     for name, array in arrays.items():
@@ -42,16 +48,6 @@ def read(path: Path) -> dict[str, Array]:
             raise Unreadable(f"the array {name!r} has the type {array.dtype}, neither numbers nor "
                              "texts")
     return arrays
-
-
-def _read(file):
-    size = os.fstat(file.fileno()).st_size
-    with zipfile.ZipFile(file) as members:
-        if any(x.compress_type != zipfile.ZIP_STORED or x.file_size > size
-               for x in members.infolist()):
-            raise Unreadable("its arrays are compressed: this package writes no such files")
-    with np.load(file, allow_pickle=False) as arrays:
-        return dict(arrays)
 
 
 @contextmanager

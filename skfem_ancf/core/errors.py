@@ -275,7 +275,23 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     """
     given = array
     if not (type(array) is np.ndarray and array.dtype is _FLOAT):
-        array = _real_array(name, array)
+        require_unmasked(name, given)
+        try:
+            array = np.asarray(given)
+            if array.dtype.kind == "c":
+                raise InputError(f"{name} must be real, got complex numbers: {shown(given)}")
+            # objects: fractions, or large integers
+            if not (array.dtype.kind in "iuf" or array.dtype.kind == "O" and all(
+                    map(_is_real, array.flat))):
+                raise TypeError
+            array = array.astype(np.float64)
+        except OverflowError:
+            raise InputError(f"{name} has a value that is too large for a float: {shown(given)}"
+                             ) from None
+        except (TypeError, ValueError) as error:  # such as rows of different lengths
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"{name} must be an array of numbers, got {shown(given)}") from None
     if shape is not None and array.shape != shape and (array.ndim != len(shape) or any(
             wanted not in (None, n) for wanted, n in zip(shape, array.shape))):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
@@ -326,24 +342,6 @@ def require_point(point: Any) -> Array:
         return require_finite("a material point", point, (2,))
     raise MeshError("a material point has two coordinates (x, y) in the reference configuration, "
                     f"or is the name of an end, as 'right', got {shown(point)}")
-
-
-def _real_array(name, value):
-    require_unmasked(name, value)
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind == "c":
-            raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
-        # objects: fractions, or large integers
-        if array.dtype.kind in "iuf" or array.dtype.kind == "O" and all(map(_is_real, array.flat)):
-            return array.astype(np.float64)
-    except OverflowError:
-        raise InputError(f"{name} has a value that is too large for a float: {shown(value)}"
-                         ) from None
-    except (TypeError, ValueError) as error:  # such as rows of different lengths
-        if isinstance(error, InputError):
-            raise
-    raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
 
 
 _PLAIN = {int, float, str, bool, np.float64, np.int64, type(None)}
@@ -634,14 +632,6 @@ MEANT = {
 }
 
 
-def meant(thing: object, name: str) -> list[str]:
-    """At most three attributes of an object that an unknown name may mean."""
-    there = [one for one in dir(thing) if not one.startswith("_")]
-    found = [key for key, words in MEANT.items()
-             if name.lower() in words.lower().split() and re.split(r"\W", key)[0] in there]
-    return (found or difflib.get_close_matches(name, there, 3, 0.6))[:3]
-
-
 class NearMisses:
     """Base class whose AttributeError suggests attributes for synonyms.
 
@@ -658,8 +648,13 @@ class NearMisses:
         def __getattr__(self, name):
             if hasattr(type(self), name):  # a property failed: raise its error
                 return object.__getattribute__(self, name)
-            others = [] if name.startswith("_") else meant(self, name)
-            text = f"; did you mean {' or '.join(others)}?" if others else ""
+            text = ""
+            if not name.startswith("_"):
+                there = [one for one in dir(self) if not one.startswith("_")]
+                others = [key for key, words in MEANT.items() if name.lower() in
+                          words.lower().split() and re.split(r"\W", key)[0] in there]
+                others = others or difflib.get_close_matches(name, there, 3, 0.6)
+                text = f"; did you mean {' or '.join(others[:3])}?" if others else ""
             # without name=, else Python adds its own suggestion
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}{text}",
                                  name=None, obj=None)

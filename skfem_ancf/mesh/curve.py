@@ -26,8 +26,28 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
     """A cubic spline r(s) and parameters of the nodes, see :meth:`MeshBeam.from_points`."""
     from scipy.interpolate import BSpline, splprep
 
-    x = _table(points) if isinstance(points, str) or hasattr(points, "__fspath__") else points
-    x = require_finite("points", x, (None, 2))
+    if isinstance(points, str) or hasattr(points, "__fspath__"):
+        # rows x, y of a file, separated by commas, blanks or semicolons, with an optional header
+        path = require_path("points", points)
+        try:
+            lines = path.read_text(encoding="utf-8-sig").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"{path} cannot be read: {error}") from error
+        lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+        if any(";" in line for line in lines):  # maybe with decimal commas
+            lines = [line.replace(",", ".").replace(";", ",") for line in lines]
+        if lines and any(letter.isalpha() and letter not in "eE" for letter in lines[0]):
+            lines = lines[1:]
+        try:
+            rows = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None, ndmin=2,
+                              quotechar='"')
+        except ValueError as error:
+            raise MeshError(f"{path} must hold rows of two numbers, x and y: {error}") from None
+        if rows.shape[1] != 2:
+            raise MeshError(f"{path} must hold rows of two numbers, x and y; it has "
+                            f"{rows.shape[1]} columns")
+        points = rows
+    x = require_finite("points", points, (None, 2))
     noise, n = require_finite_scalar("noise", noise), len(x)
     if n < 2 or noise < 0:
         raise MeshError(f"an axis needs at least two points, got {n}" if n < 2 else
@@ -45,29 +65,6 @@ def axis_of(points: Any, elements: int | None, noise: float) -> tuple[Any, Array
     fine = np.interp(np.arange(PIECES * (n - 1) + 1) / PIECES, np.arange(n), s)
     length = np.append(0.0, np.cumsum(np.hypot(*np.diff(curve(fine)))))
     return curve, np.interp(np.linspace(0.0, length[-1], elements + 1), length, fine)
-
-
-def _table(filename):
-    """Rows x, y of a file, separated by commas, blanks or semicolons, with an optional header."""
-    path = require_path("points", filename)
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path} cannot be read: {error}") from error
-    lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if any(";" in line for line in lines):  # maybe with decimal commas
-        lines = [line.replace(",", ".").replace(";", ",") for line in lines]
-    if lines and any(letter.isalpha() and letter not in "eE" for letter in lines[0]):
-        lines = lines[1:]
-    try:
-        rows = np.loadtxt(lines, delimiter="," if lines and "," in lines[0] else None, ndmin=2,
-                          quotechar='"')
-    except ValueError as error:
-        raise MeshError(f"{path} must hold rows of two numbers, x and y: {error}") from None
-    if rows.shape[1] != 2:
-        raise MeshError(f"{path} must hold rows of two numbers, x and y; it has {rows.shape[1]} "
-                        "columns")
-    return rows
 
 
 logger = logging.getLogger(__name__)
@@ -160,7 +157,18 @@ class Curve:
                 f"{s[k + 1]:.9g}: the integral of the derivative misses r by "
                 f"{gap[k] * lengths[k]:.6g}")
         if len(s) > 2:
-            _require_no_kink(s[1:-1], p[:, 1:-1], p_beside)
+            chords = (p_beside - p[:, None, 1:-1]) * np.sign(ASIDE)[:, None]
+            wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
+            # far from the origin the direction of such short chords is round-off
+            chord = np.hypot(*chords[:, 2:]).min(axis=0)
+            seen = chord * KINK > 32.0 * np.finfo(float).eps * np.abs(p[:, 1:-1]).max()
+            kink = np.where(seen & (np.abs(narrow) > 0.7 * np.abs(wide)), np.abs(narrow), 0.0)
+            k = int(np.argmax(kink))
+            if kink[k] > KINK:
+                raise MeshError(
+                    f"the curve has a kink of {np.rad2deg(narrow[k]):.3g} degrees at s = "
+                    f"{s[k + 1]:.9g}: give one beam for each smooth part, and weld them in a scene "
+                    'with scene.joint("weld", ...)')
         v = np.hypot(*d_fine)
         pieces = (v[:-2:2] + 4.0 * v[1::2] + v[2::2]) * np.repeat(step / 96.0, 16)  # Simpson's rule
         bent = np.abs(_angles(d_fine[:, :-2:2], d_fine[:, 2::2])) / pieces
@@ -233,22 +241,6 @@ def _stencil(s, s0, s1):
 def _gauss_points(a, step):
     x, w = gauss(12)
     return a[:, None] + step[:, None] * x, w
-
-
-def _require_no_kink(s, p, beside):
-    """Raise MeshError if the direction of a curve jumps at an interior node."""
-    chords = (beside - p[:, None]) * np.sign(ASIDE)[:, None]
-    wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
-    # far from the origin the direction of such short chords is round-off
-    chord = np.hypot(*chords[:, 2:]).min(axis=0)
-    seen = chord * KINK > 32.0 * np.finfo(float).eps * np.abs(p).max()
-    kink = np.where(seen & (np.abs(narrow) > 0.7 * np.abs(wide)), np.abs(narrow), 0.0)
-    k = int(np.argmax(kink))
-    if kink[k] > KINK:
-        raise MeshError(
-            f"the curve has a kink of {np.rad2deg(narrow[k]):.3g} degrees at s = {s[k]:.9g}: give "
-            "one beam for each smooth part, and weld them in a scene with "
-            'scene.joint("weld", ...)')
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:

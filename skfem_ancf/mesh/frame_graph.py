@@ -267,7 +267,10 @@ class FrameGraph:
         self.tol = require_not_negative("tol", tol, False) if tol is not None else float(min(
             MERGED * self.size, OF_LONGEST * np.max(length)))
         close = max(2.0 * self.tol, min(CLOSE * self.tol, OF_LONGEST * np.max(length)))
-        pairs, apart = self._close_pairs(max(close, NEAR * self.size))
+        tree = scipy.spatial.cKDTree(places.T)
+        pairs = tree.query_pairs(max(close, NEAR * self.size), output_type="ndarray").reshape(-1, 2)
+        pairs = pairs[np.lexsort(pairs.T[::-1])]
+        apart = np.hypot(*(places[:, pairs[:, 0]] - places[:, pairs[:, 1]]))
         one = (apart <= self.tol * (1.0 + 1e-9)) & (self.tol > 0.0)
         for (i, j), d in zip(pairs[~one], apart[~one]):
             if d <= NEAR * self.size:
@@ -298,13 +301,6 @@ class FrameGraph:
                      "apart")
         _warn_of(pairs[~one], apart[~one], "are different nodes, as they are farther apart than "
                  f"tol = {self.tol:.3g}: give a larger tol= if they should be one")
-
-    def _close_pairs(self, distance):
-        """Pairs of points (k, 2) within a distance, and their distances, (k,)."""
-        tree = scipy.spatial.cKDTree(self.points.T)
-        pairs = tree.query_pairs(distance, output_type="ndarray").reshape(-1, 2)
-        pairs = pairs[np.lexsort(pairs.T[::-1])]
-        return pairs, np.hypot(*(self.points[:, pairs[:, 0]] - self.points[:, pairs[:, 1]]))
 
     @property
     def size(self) -> float:
@@ -339,7 +335,13 @@ class FrameGraph:
                 return np.unique(self.given[:, self.groups[place]])
             raise NameUnknown("name of nodes", place, {**self.nodes, **self.groups})
         if is_point(place) and not isinstance(place, list):
-            return self._nearest_node(place)
+            x = require_finite("the point", place, (2,))
+            off = np.hypot(*(self.points - x[:, None]))
+            k = int(np.argmin(off))
+            if off[k] > 1e3 * NEAR * self.size:
+                raise MeshError(f"no node of the frame is at {_at(x)}: the nearest is number {k} "
+                                f"at {_at(self.points[:, k])}")
+            return np.array([k])
         if callable(place):
             chosen = satisfying(place, self.points, "nodes")
             if not len(chosen):
@@ -349,15 +351,6 @@ class FrameGraph:
                 isinstance(place, np.ndarray) and place.ndim == 1 and len(place)):
             return np.unique(np.concatenate([self.points_at(one) for one in place]))
         raise InputError(f"a place of a frame is {PLACES}, got {shown(place)}")
-
-    def _nearest_node(self, place):
-        x = require_finite("the point", place, (2,))
-        off = np.hypot(*(self.points - x[:, None]))
-        k = int(np.argmin(off))
-        if off[k] > 1e3 * NEAR * self.size:
-            raise MeshError(f"no node of the frame is at {_at(x)}: the nearest is number {k} at "
-                            f"{_at(self.points[:, k])}")
-        return np.array([k])
 
     def lines_of(self, given: Any) -> Array:
         """Numbers of lines, shape (k,), from the name of a group, a number, or a list of these."""
@@ -421,16 +414,13 @@ def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
 
 def _pairs(what, values):
     """Pairs in rows, as an array (2, n)."""
-    found = require_finite(what, list(values) if _is_iterable(values) else values)
+    rows = hasattr(values, "__iter__") and not isinstance(values, (np.ndarray, str, Mapping))
+    found = require_finite(what, list(values) if rows else values)
     if found.ndim != 2 or found.shape[1] != 2 or not len(found):
         hint = "; give its transpose" if found.ndim == 2 and len(found) == 2 else ""
         raise InputError(f"{what} are pairs, one at least: a list of pairs or an array of shape "
                          f"(n, 2), got {shown(values)} of shape {found.shape}{hint}")
     return found.T
-
-
-def _is_iterable(values):
-    return hasattr(values, "__iter__") and not isinstance(values, (np.ndarray, str, Mapping))
 
 
 def _numbers(what, values):

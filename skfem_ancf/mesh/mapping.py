@@ -94,13 +94,10 @@ def nodal_derivatives(mesh: Any, most: int) -> list[Array]:
     if most > 1 and mesh.p_XY is not None:
         known.append(-turned(mesh.p_XY))
     more = np.zeros((max(most - 2, 0), *mesh.p.shape))
-    if most > 2 and not mesh.is_straight:
-        _add_higher(mesh, np.array(known), more)
-    return [*known[:most + 1], *more]
-
-
-def _add_higher(mesh, known, out):
-    """Fill in derivatives from the third on, (n, 2, nvertices), from ``known`` ones (3, ...)."""
+    result = [*known[:most + 1], *more]
+    if most <= 2 or mesh.is_straight:
+        return result
+    values_known: Any = np.array(known)
     apart = mesh.t[0, 1:] != mesh.t[1, :-1]
     at = np.cumsum(np.bincount(mesh.t[1], mesh.lengths, mesh.p.shape[1]))
     for a, b in zip(mesh.t[0, np.append(True, apart)], mesh.t[1, np.append(apart, True)]):
@@ -112,11 +109,12 @@ def _add_higher(mesh, known, out):
         # conditions: the derivatives 0, 1, 2 of the powers at each place
         powers = np.array([[perm(k, d) * (x / size[:, None]) ** max(k - d, 0) for k in range(n)]
                            for d in range(3)]).transpose(2, 3, 0, 1).reshape(-1, n, n)
-        values = known[:, :, near] * scale[:3, None, :, None]
+        values = values_known[:, :, near] * scale[:3, None, :, None]
         values = values.transpose(2, 3, 0, 1).reshape(-1, n, 2)
         found = np.linalg.solve(powers, values)
-        for k in range(3, min(2 + len(out), n - 1) + 1):
-            out[k - 3][:, nodes] = factorial(k) * found[:, k].T / scale[k]
+        for k in range(3, min(2 + len(more), n - 1) + 1):
+            more[k - 3][:, nodes] = factorial(k) * found[:, k].T / scale[k]
+    return result
 
 
 #: Round-off in coefficients of relative heights.

@@ -409,9 +409,8 @@ class MeshBeam(NumberedMesh):
 
         Their chains have equal lengths, too.
         """
-        return self.is_straight and self.heights is None and self._are_equal()
-
-    def _are_equal(self):
+        if not self.is_straight or self.heights is not None:
+            return False
         # the round-off of the nodes' positions is no difference in length
         noise = 8 * EPS * np.abs(self.doflocs).max()
         least, most = _ends(self.lengths)

@@ -30,10 +30,6 @@ CLOSE, ITERATIONS = 1e-7, 30
 SAMPLES, WALK, CANDIDATES = 4, 3, 6
 
 
-def _taylor(m):
-    return np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d) for d in range(2 * m)])
-
-
 def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
     """A polynomial with coefficients (n, ...), lowest first, and its derivative."""
     return (polyval(xi, coefficients, tensor=False),
@@ -50,7 +46,9 @@ class Inverse:
     def __init__(self, start: Array, axis: Array, director: Array, height: float,
                  heights: Array | None) -> None:
         self.start = start
-        self.axis, self.director = (_taylor(c.shape[1] // 2) @ c for c in (axis, director))
+        self.axis, self.director = (np.array([
+            hermite_basis(c.shape[1] // 2, np.zeros(1), d)[:, 0] / factorial(d)
+            for d in range(c.shape[1])]) @ c for c in (axis, director))
         n, m = self.axis.shape[1], self.director.shape[1]
         #: Minus the cross product of both; the axial coordinate does not depend on the height.
         self.beside = np.zeros((n + m - 1, axis.shape[2]))
@@ -163,7 +161,14 @@ class Finder:
         """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
         e, X, outside, tied = self.find(x, chain)
         if (outside > self.allowed).any():
-            raise self._refusal(x, outside, chain)
+            bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
+            x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
+            raise MeshError(
+                f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
+                f"{'the body' if chain is None else 'the line that was named'}"
+                f"{more if len(outside) > 1 else ''}: points are given by their position in the "
+                f"reference configuration of height {mesh.height:.6g}, whose axis runs from "
+                f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")
         return e, X, tied
 
     def from_axis(self, e: Array, X: Array) -> Array:
@@ -181,7 +186,13 @@ class Finder:
 
     def _nearest_axis(self, x, noise, e, X, outside, tied):
         """Among all elements that contain points choose those with the nearest axis, in place."""
-        k, some = self._around(x)
+        points, elements = [], []  # pairs of points and elements that may contain them
+        for some, tree, radius in self._circles:
+            near = tree.query_ball_point(x.T, radius, return_sorted=False)
+            many = np.fromiter(map(len, near), dtype=int, count=len(near))
+            points.append(np.repeat(np.arange(x.shape[1]), many))
+            elements.append(some[np.concatenate([*near, []]).astype(int)])
+        k, some = np.concatenate(points), np.concatenate(elements)
         Y = self.inverse(x[:, k, None], some)[..., 0]
         inside = self._outside(Y, noise) == 0.0
         k, some, Y = k[inside], some[inside], np.clip(Y[:, inside], 0.0, 1.0)
@@ -195,16 +206,6 @@ class Finder:
         e[at], X[:, at], outside[at] = some[first], Y[:, first], 0.0
         chains = self.mesh.chains
         np.logical_or.at(tied, k, chains[some] != chains[e[k]])
-
-    def _around(self, x):
-        """Pairs of points and elements that may contain them: numbers (m,) of both."""
-        points, elements = [], []
-        for some, tree, radius in self._circles:
-            near = tree.query_ball_point(x.T, radius, return_sorted=False)
-            many = np.fromiter(map(len, near), dtype=int, count=len(near))
-            points.append(np.repeat(np.arange(x.shape[1]), many))
-            elements.append(some[np.concatenate([*near, []]).astype(int)])
-        return np.concatenate(points), np.concatenate(elements)
 
     @cached_property
     def _circles(self):
@@ -231,8 +232,10 @@ class Finder:
         e, X, outside = self._nearest(x, noise)
         left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
         if len(left):
+            k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
+            near = self._tree.query(x[:, left].T, k=k)[1].reshape(len(left), k)
             e[left], X[:, left], outside[left] = self._best(
-                x[:, left], self._candidates(x[:, left]), noise)
+                x[:, left], np.sort(near // SAMPLES, axis=1), noise)
             for i in left[outside[left] > self.allowed]:  # rare: neighbouring coils are nearer
                 all_of_them = np.arange(self.mesh.nelements)[None]
                 e[i], X[:, i], outside[i] = (part[..., 0] for part in self._best(
@@ -265,11 +268,6 @@ class Finder:
     @cached_property
     def _tree(self):
         return scipy.spatial.cKDTree(self._samples.T)
-
-    def _candidates(self, x):
-        k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
-        near = self._tree.query(x.T, k=k)[1].reshape(x.shape[1], k)
-        return np.sort(near // SAMPLES, axis=1)
 
     @cached_property
     def _line(self):
@@ -315,16 +313,6 @@ class Finder:
         low, high = x.min(axis=1), x.max(axis=1)
         return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
                 f"{low[1]:.6g} to {high[1]:.6g}")
-
-    def _refusal(self, x, outside, chain):
-        bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
-        x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
-        return MeshError(
-            f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
-            f"{'the body' if chain is None else 'the line that was named'}"
-            f"{more if len(outside) > 1 else ''}: points are given by their position in the "
-            f"reference configuration of height {mesh.height:.6g}, whose axis runs from "
-            f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")
 
 
 #: Tolerance for a point on a section, relative to an adjacent element.
@@ -418,7 +406,13 @@ def facets_of(mesh: Any, place: Place) -> Array:
         raise InputError(f"a place must not have masked values, got {shown(place)}")
     place = points_of_rows(place)
     if isinstance(place, str):
-        return _named(mesh, place)
+        named = mesh.boundaries or {}
+        if place not in named:
+            raise NameUnknown("boundary", place, named)
+        if not len(named[place]):
+            raise MeshError(f"the boundary {place!r} is empty: it has no facet of this mesh; "
+                            f"others are {_names(mesh)}")
+        return named[place]
     if is_point(place):
         return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
     if isinstance(place, np.ndarray):
@@ -487,16 +481,6 @@ def _pair(x: Array) -> str:
 
 def _names(mesh: Any) -> str:
     return ", ".join(repr(name) for name, facets in (mesh.boundaries or {}).items() if len(facets))
-
-
-def _named(mesh: Any, name: str) -> Array:
-    if name not in (mesh.boundaries or {}):
-        raise NameUnknown("boundary", name, mesh.boundaries or {})
-    facets = mesh.boundaries[name]
-    if not len(facets):
-        raise MeshError(f"the boundary {name!r} is empty: it has no facet of this mesh; others "
-                        f"are {_names(mesh)}")
-    return facets
 
 
 def _numbered(mesh: Any, facets: Array) -> Array:

@@ -237,18 +237,14 @@ class Across(Immutable):
         self.constant = even and not varying
         self.uniform = self.constant and mesh.is_uniform
         self.moving = any(s.measure.moves for s in self.layers)
-        if varying:
-            self._check()
-
-    def _check(self):
-        """Evaluate all functions over the body, so that errors appear when the beam is made."""
-        X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
-        for layer in self.layers:
-            low, *_, high = self._ends(layer, X[0])
-            inside = self.at(layer, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
-            for name in NAMES:
-                if callable(getattr(layer, name)):
-                    inside.evaluated(name)
+        if varying:  # evaluate all functions over the body, so that errors appear here
+            X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
+            for layer in self.layers:
+                low, *_, high = self._ends(layer, X[0])
+                inside = self.at(layer, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
+                for name in NAMES:
+                    if callable(getattr(layer, name)):
+                        inside.evaluated(name)
 
     @cached_property
     def jumps(self) -> Array:

@@ -160,14 +160,13 @@ class Control(ForceElement):
         self._held[:] = [(float(row[0]), float(row[1]) if moment else row[1:])
                          for row in np.asarray(held)]
 
-    def _value(self, x, v, t):
-        if self.dt is None or not self._held:
-            return self.ask(x, v, t)
-        k = bisect_right(self._held, t, key=lambda sample: sample[0])
-        return self._held[max(k - 1, 0)][1]
-
     def force(self, x: Array, v: Array, t: float) -> Array:
-        out, value = np.zeros(np.shape(x)), self._value(x, v, t)
+        out = np.zeros(np.shape(x))
+        if self.dt is None or not self._held:
+            value = self.ask(x, v, t)
+        else:
+            k = bisect_right(self._held, t, key=lambda sample: sample[0])
+            value = self._held[max(k - 1, 0)][1]
         if self.kind == "moment":
             g = np.empty((4, 1))
             turning(np.reshape(x[:2], (4, 1)), g)

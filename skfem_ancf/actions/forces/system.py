@@ -129,7 +129,9 @@ class Forces:
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
                                key=lambda e: -1 if e in self.custom else self.rows_of(e)[0])
         self.contacts = Contacts(self.elements, [e.key for e in self._springs])
-        self.resists = (any(e.resists for e in self.custom) or any(map(_resists, self.parts))
+        damping = ({0: c, 1: b, 2: b, 3: a or b}[part.kind] for part in self.parts
+                   for a, b, c in [part.numbers[:3]])
+        self.resists = (any(e.resists for e in self.custom) or any(c > 0.0 for c in damping)
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _couple(self, blocks, places):
@@ -405,8 +407,3 @@ _X, _I = np.zeros(0), np.zeros(0, np.int64)
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
     _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS))
-
-
-def _resists(part):
-    k, c, damping = part.numbers[:3]
-    return {0: damping, 1: c, 2: c, 3: k or c}[part.kind] > 0.0

@@ -152,7 +152,13 @@ class Nodes(Joint):
         positions, directions, weights, start = [], [], [], []
         for k, beam in enumerate(layout.beams):
             at, first = chain_ends(beam).ravel(), layout.offset(k)
-            dofs, c = _directions(beam, at)
+            if beam.mesh.heights is None:  # all alike
+                dofs, c = direction(beam, int(at[0]))
+                dofs = dofs[:, None] + beam.nd * (at - at[0])[:, None]
+                c = np.tile(c, (len(at), 1))
+            else:
+                found = [direction(beam, int(node)) for node in at]
+                dofs, c = np.stack([a for a, _ in found], axis=1), np.array([b for _, b in found])
             q0 = beam.q0_local[dofs]
             start.append(np.sum(c * (q0[0] + 1j * q0[1]), axis=1))
             positions.append(first + at[:, None] * beam.nd + np.arange(2))
@@ -374,13 +380,3 @@ def chain_places(beams: Sequence[Beam]) -> Array:
         out.append(np.repeat(first + np.arange(len(starts)) + np.cumsum(starts), beam.nd))
         first = out[-1][-1] + 1
     return np.concatenate(out)
-
-
-def _directions(beam: Beam, nodes: Array) -> tuple[Any, Array]:
-    """DOFs (2, nodes, n) and weights (nodes, n) of section directions."""
-    if beam.mesh.heights is None:
-        dofs, c = direction(beam, int(nodes[0]))
-        shift = beam.nd * (nodes - nodes[0])
-        return dofs[:, None] + shift[:, None], np.tile(c, (len(nodes), 1))
-    found = [direction(beam, int(node)) for node in nodes]
-    return np.stack([dofs for dofs, _ in found], axis=1), np.array([c for _, c in found])

@@ -133,7 +133,15 @@ class Glue(Joint):
                 dofs, weights = np.moveaxis(np.array([other.probe(p) for p in x.T]), 0, -1)
                 dofs = dofs.astype(int)
             else:
-                dofs, weights = _of_beam(other, x, self.place)
+                e, X, _ = other.finder.inside(x)
+                if self.place is not None and not is_point(self.place):
+                    cells = np.unique(other.mesh.f2t[:, facets_of(other.mesh, self.place)])
+                    off = x[:, ~np.isin(e, cells)].T
+                    if len(off):
+                        raise MeshError(f"({off[0, 0]:.6g}, {off[0, 1]:.6g}) is in the beam "
+                                        "elsewhere")
+                found = BeamPoints(other, 0, slice(0, other.N), None, e, X)
+                dofs, weights = found.dofs.swapaxes(0, 1), found.weights
         except MeshError as error:
             raise InputError(f"the boundary {shown(self.boundary)} of {domain!r} does not meet "
                              f"{other!r} at {shown(self.place)}: {error}. Both have to be at one "
@@ -152,18 +160,6 @@ class Glue(Joint):
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = boundary_of(layout, layout.beam(self.domain), self.boundary)
         return (Symbol("joint", (at,), text="weld"),)
-
-
-def _of_beam(beam: Beam, x: Array, place: Any) -> tuple[Array, Array]:
-    """:meth:`Glue._surface` for a beam with sections."""
-    e, X, _ = beam.finder.inside(x)
-    if place is not None and not is_point(place):
-        cells = np.unique(beam.mesh.f2t[:, facets_of(beam.mesh, place)])
-        off = ~np.isin(e, cells)
-        if np.any(off):
-            raise MeshError(f"({x[0, off][0]:.6g}, {x[1, off][0]:.6g}) is in the beam elsewhere")
-    found = BeamPoints(beam, 0, slice(0, beam.N), None, e, X)
-    return found.dofs.swapaxes(0, 1), found.weights
 
 
 class Weld(ComposedJoint):
