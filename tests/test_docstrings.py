@@ -133,7 +133,7 @@ PUBLIC = [case for case in CASES if public(*case.values)]
 def test_the_walk_finds_the_public_api():
     names = {case.id for case in CASES}
     assert len(names) > 400 < 2 * len(PUBLIC)
-    assert {"scene.model.Model.clamp", "beam.beam.Beam.__init__", "forms.weak.tangent",
+    assert {"scene.model.Model.clamp", "beam.beam.Beam.__init__", "forms.tangent",
             "mesh.places.facets_of", "mesh.mapping.MappingBeam.F"} <= names
 
 

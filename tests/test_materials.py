@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, EnergyMomentum, InputError, MeshBeam, NameUnknown,
                         Scene, StVenantKirchhoff)
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.forms.weak import green_lagrange
+from skfem_ancf.forms import green_lagrange
 from skfem_ancf.materials import MATERIALS, Material, PointwiseMaterial
 from skfem_ancf.materials.base import hooke as hooke_matrix
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -14,13 +15,13 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import MeshQuad
 
-from ..core.errors import (InputError, MeshError, NameUnknown, require_finite,
+from ..core import archive
+from ..core.errors import (FileError, InputError, MeshError, NameUnknown, require_finite,
                            require_finite_scalar, require_function, require_integer,
                            require_moderate, require_option, require_options, require_path,
                            require_positive, require_unmasked, shown)
 from ..core.immutable import cached_property, is_builtin, packed
 from ..core.types import Array, StrPath
-from . import files
 from .curve import Curve, axis_of, check_curvature, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
 from .numbering import ElementBeamP1, NumberedMesh, default_tags, halved
@@ -30,6 +31,12 @@ EPS = float(np.finfo(float).eps)
 
 #: Largest number of elements of :meth:`MeshBeam.refined`.
 MAX_ELEMENTS = 2**24
+
+#: Formats of several files that refer to each other: written in place.
+IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
+#: Optional and required attributes of a mesh in a file.
+OPTIONAL = ("s", "p_XY", "heights")
+NEEDED = ("doflocs", "t", "height", "p_X", "p_Y", "lengths", "sections")
 
 #: Largest number of quads along and across an element in a picture or a file.
 MAX_SUBDIVISION = 1000
@@ -651,7 +658,18 @@ class MeshBeam(NumberedMesh):
     def save_npz(self, filename: StrPath) -> None:
         """Save all but the functions ``curve`` and ``taper``, for :meth:`load_npz`."""
         path = require_path("filename", filename)
-        files.save_npz(self, path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz"))
+        path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
+        content = {name: getattr(self, name) for name in (*NEEDED, *OPTIONAL, "kind")
+                   if getattr(self, name) is not None}
+        for name, facets in (self.boundaries or {}).items():
+            content[f"b_{name}"] = facets
+            if getattr(facets, "ori", None) is not None:
+                content[f"o_{name}"] = facets.ori
+        content |= {f"s_{name}": elements for name, elements in (self.subdomains or {}).items()}
+        try:
+            archive.write(path, content)
+        except OSError as error:
+            raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod
     def load_npz(cls, filename: StrPath) -> MeshBeam:
@@ -663,7 +681,32 @@ class MeshBeam(NumberedMesh):
             If the file cannot be read, or contains no beam.
         """
         kinds = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if is_builtin(of)}
-        return files.load_npz(cls, require_path("filename", filename), kinds | {cls.kind: cls})
+        kinds[cls.kind], path = cls, require_path("filename", filename)
+        try:
+            data = archive.read(path)
+            missing = sorted(set(NEEDED) - data.keys())
+            if missing:
+                raise MeshError(f"{missing} are missing")
+            kind = str(data.get("kind", cls.kind))
+            if kind not in kinds:
+                raise MeshError(f"its kind {kind!r} is not known, only {sorted(kinds)}")
+            tags = {name[2:]: OrientedBoundary(facets, data[f"o_{name[2:]}"])
+                    if f"o_{name[2:]}" in data else facets
+                    for name, facets in data.items() if name.startswith("b_")}
+            parts = {name[2:]: elements for name, elements in data.items()
+                     if name.startswith("s_")}
+            return kinds[kind](
+                data["doflocs"], data["t"], tags or None, parts or None,
+                height=float(data["height"]), sections=str(data["sections"]),
+                **{name: data[name] for name in ("p_X", "p_Y", "lengths", *OPTIONAL)
+                   if name in data})
+        except OSError as error:
+            raise FileError(f"cannot read {str(path)!r}: {error}") from error
+        except MeshError as error:
+            raise MeshError(f"{str(path)!r} contains no beam: {error}") from error
+        except Exception as error:  # whatever is in the file
+            raise MeshError(f"{str(path)!r} contains no beam, or is damaged: "
+                            f"{type(error).__name__}: {error}") from error
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
@@ -677,9 +720,20 @@ class MeshBeam(NumberedMesh):
         path = require_path("filename", filename)
         if path.suffix == ".npz":
             require_options(f"save({path.name!r})", kwargs, ("filename",))
-            self.save_npz(path)
-        else:
-            files.save_quads(self, path, point_data, cell_data, **kwargs)
+            return self.save_npz(path)
+        import meshio
+
+        try:
+            if not path.suffix:
+                raise FileError(f"the file name {str(path)!r} has no suffix: end it with .npz, "
+                                ".vtu or another format of meshio")
+            with contextlib.nullcontext(path) if path.suffix in IN_PARTS else (
+                    archive.replacing(path)) as new:
+                self.to_meshquad().save(new, point_data, cell_data, **kwargs)
+        except FileError:
+            raise
+        except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:
+            raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod
     def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
