@@ -20,6 +20,7 @@ from ..core.types import Array, Place, StrPath
 from ..equations.system import System
 from ..io.tables import to_xarray
 from ..recovery.resultants import Resultants, over_time
+from ..results.report import report_of_history
 from ..results.state import MaterialPoints, Reaction, SpringForces, State
 from ..visuals.animation import animate
 from ..visuals.pyvista import Series
@@ -440,6 +441,7 @@ class History(MaterialPoints, SpringForces):
         return values, " ".join(map(str, (sensor, *parts)))
 
     animate = animate
+    report = report_of_history
     to_xarray = to_xarray
 
     def save(self, filename: StrPath, progress: bool | None = None, *,

@@ -13,6 +13,7 @@ from ..io import tables, vtu
 from ..recovery.fields import DRAWN, find_field, no_value, values_on_grid
 from ..recovery.grids import layout
 from ..visuals import diagrams, html, matplotlib, pyvista
+from .report import report
 
 #: Points of all beams together, along an element at least and at most, and across it.
 POINTS, FEW, MANY, ACROSS = 4000, 4, 32, 8
@@ -110,3 +111,4 @@ class Output:
     view = pyvista.view
     plot = matplotlib.plot_state
     plot_resultants = diagrams.plot_resultants
+    report = report

@@ -505,8 +505,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output):
                     (base if at_rest else self).u_of(number))))
         points: list[Any] = []
         if base is None and system.forces.contacts.groups:
-            with self._history():
-                points = loads_of_contact(self, s)
+            points = loads_of_contact(self, s)
             loads.append((1.0, Distribution(stations=tuple(e + xi for e, xi, _ in points),
                                             points=tuple(points))))
         sampled, places = self._distributed(beam)

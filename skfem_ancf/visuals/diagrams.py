@@ -148,7 +148,7 @@ def rounded(value: float, unit: str) -> str:
     if unit.split(" ")[0] == "N" and abs(value) >= 1e4:
         power = 2 if abs(value) >= 1e7 else 1
         value, unit = value / 1000.0**power, "kM"[power - 1] + unit
-    return f"{value:.4g} {unit}".strip()
+    return f"{float(f'{value:.4g}'):.9g} {unit}".strip()
 
 
 def lines_of(state: Any, beams: Any, recover: bool = True) -> list[Any]:
@@ -174,7 +174,8 @@ def _on_structure(axes, state, beams, recover):
         [np.sum(np.hypot(*np.diff(line["x"]))) for line in lines])))
     force = max(np.max(np.abs(line[name])) for line in lines for name in "NQ")
     noise = {"N": ROUND_OFF * force, "Q": ROUND_OFF * force, "M": ROUND_OFF * force * size}
-    supports = symbols_of(state, False, True) if hasattr(state.system, "items") else []
+    known = symbols_of(state, False, True) if hasattr(state.system, "items") else []
+    supports = [s for s in known if s.kind in ("support", "joint", "slider")]
     for ax, (name, label) in zip(axes, _ROWS):
         largest = max(np.max(np.abs(line[name])) for line in lines)
         scale = ordinate / largest if largest > noise[name] else 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,11 @@ from ..core.errors import AncfError
 DPI = 80
 
 
-def _picture(draw):
+def picture(draw: Callable[[], Any], dpi: int = DPI) -> str:
     """An img element of the figure of ``draw()``; empty if that fails."""
     try:
         figure, data = draw().figure, io.BytesIO()
-        figure.savefig(data, format="png", dpi=DPI, bbox_inches="tight")
+        figure.savefig(data, format="png", dpi=dpi, bbox_inches="tight")
     except AncfError:
         return ""
     return f'<img src="data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"/>'
@@ -32,7 +33,7 @@ def _words(text):
 def state_html(state: Any) -> str:
     """The text of a State, and its strain across the section."""
     field = "eps_yy" if any(np.any(state.u_of(b)) for b in state.beams) else "displacement"
-    return _words(str(state)) + _picture(lambda: state.plot(field))
+    return _words(str(state)) + picture(lambda: state.plot(field))
 
 
 def scene_html(scene: Any) -> str:
@@ -44,7 +45,7 @@ def scene_html(scene: Any) -> str:
     table = "".join(f"<tr><td>{kind}</td><td>{html.escape(_short(thing))}</td></tr>"
                     for kind, thing in rows)
     return (_words(repr(scene)[1:-1]) + f"<table>{table}</table>"
-            + _picture(lambda: scene.state().plot("displacement", colorbar=False, title="",
+            + picture(lambda: scene.state().plot("displacement", colorbar=False, title="",
                                                   cmap="Greys")))
 
 
@@ -62,20 +63,23 @@ def path_html(path: Any) -> str:
         node, component = np.unravel_index(np.argmax(np.abs(moved)), moved.shape)
         return path.plot(beam.mesh.p[:, node], int(component), beam)
 
-    return _words(repr(path)[1:-1]) + _picture(draw)
+    return _words(repr(path)[1:-1]) + picture(draw)
 
 
 def history_html(history: Any) -> str:
     """The text of a History, and its energies over time."""
+    return _words(repr(history)[1:-1]) + (
+        picture(lambda: history_picture(history)) if len(history) > 1 else "")
+
+
+def history_picture(history: Any) -> Any:
+    """Axes with the energies of a History over time."""
     from .matplotlib import dress, figure_class
 
-    def draw():
-        ax = figure_class()(figsize=(5.5, 3.0), layout="constrained").subplots()
-        for name in ("strain", "kinetic", "potential", "total"):
-            ax.plot(history.t, getattr(history, f"{name}_energy"), lw=1.4, label=name)
-        ax.legend(fontsize=8, frameon=False)
-        dress(ax, "energy")
-        ax.set(xlabel="time", ylabel="")
-        return ax
-
-    return _words(repr(history)[1:-1]) + (_picture(draw) if len(history) > 1 else "")
+    ax = figure_class()(figsize=(5.5, 3.0), layout="constrained").subplots()
+    for name in ("strain", "kinetic", "potential", "total"):
+        ax.plot(history.t, getattr(history, f"{name}_energy"), lw=1.4, label=name)
+    ax.legend(fontsize=8, frameon=False)
+    dress(ax, "energy")
+    ax.set(xlabel="time", ylabel="")
+    return ax

@@ -1,0 +1,380 @@
+"""Reports: one page of HTML with the model, its solution and what was checked."""
+
+from __future__ import annotations
+
+import html
+import platform
+from collections.abc import Iterable, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..actions.item import Item
+from ..beam.domain import Domain
+from ..beam.layout import Layout
+from ..core.archive import output_file
+from ..core.errors import AncfError, require_path, require_text
+from ..core.types import Array, StrPath
+from ..recovery.fields import PRESSURES, units_of
+from ..visuals.diagrams import ROOM, lines_of, rounded, unit_of_resultant
+from ..visuals.html import history_picture, picture
+from ..visuals.matplotlib import figure_class, plot_scene
+from ..visuals.symbols import symbols_of
+
+#: Fields whose largest values are listed, with their units.
+LISTED = {"displacement": "length", "S_xx": "stress", "von_mises": "stress", "utilisation": ""}
+#: Rows of a table at most; instants of a motion that are compared.
+ROWS, INSTANTS = 40, 50
+#: Sum of all forces over the largest of them in an equilibrium.
+BALANCED = 1e-5
+#: Resolution of the pictures, in dots per inch.
+DPI = 110
+
+STYLE = """
+@page { size: A4; margin: 15mm }
+body { font: 10pt/1.4 "Helvetica Neue", Arial, sans-serif; color: #222; max-width: 180mm;
+       margin: 10mm auto; padding: 0 4mm }
+h1 { font-size: 17pt; margin: 0 } h2 { font-size: 12pt; margin: 6mm 0 1mm; color: #1f5f8b }
+p { margin: 1mm 0 } .note { color: #666; font-size: 9pt }
+table { border-collapse: collapse; margin: 2mm 0; font-size: 9pt; break-inside: avoid }
+td, th { border-bottom: 1px solid #ccc; padding: 0.6mm 3mm 0.6mm 0; text-align: left;
+         vertical-align: top }
+th { border-bottom: 1.5px solid #222 } td.number { text-align: right; white-space: nowrap }
+img { max-width: 100%; max-height: 68mm; display: block; margin: 2mm auto }
+h2, figure { break-inside: avoid; break-after: avoid } figure { margin: 0 }
+.tall img { max-height: 160mm }
+.bad { color: #b3261e }
+@media print { body { margin: 0; padding: 0; max-width: none } }
+"""
+
+
+def report(state: Any, filename: StrPath, title: str | None = None) -> Path:
+    """Write a page of HTML about the solution: to read, to print, to send; returns its path.
+
+    The page contains the pictures and needs no other file. It has the model with its sizes,
+    materials, loads and supports; reactions and their balance; extremes of displacement, stress,
+    utilisation and section forces, and where they are; diagrams; findings, and versions. Units are
+    those of :meth:`Scene.units <skfem_ancf.Scene.units>`. Printed it is two to four A4 pages.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.State`.
+    filename
+        Ends with .html; missing folders are created.
+    title
+        Title of the page; by default the name of the file.
+
+    Examples
+    --------
+    >>> from skfem_ancf import Frame, StVenantKirchhoff
+    >>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3, density=7850, strength=235e6)
+    >>> frame = Frame.from_lines([(0, 0), (4, 0)], [(0, 1)], material=steel, height=0.2, width=0.1)
+    >>> state = frame.units("N", "m").pin(0).hold(1, "y").line_load((0, -1e4)).solve_static()
+    >>> state.report("girder.html").name  # doctest: +SKIP
+    'girder.html'
+    """
+    path = require_path("filename", filename, (".html", ".htm"))
+    title = require_text("title", title)
+    return _written(path, path.stem if title is None else title, _Page(state).parts())
+
+
+def report_of_history(history: Any, filename: StrPath, title: str | None = None) -> Path:
+    """Write a page of HTML about a motion or run: :meth:`State.report
+    <skfem_ancf.State.report>` of its instant of largest utilisation, or displacement; returns its
+    path.
+
+    It begins with the energies and sensors over time.
+
+    Parameters
+    ----------
+    history
+        A :class:`~skfem_ancf.History`.
+    filename, title
+        As for a State.
+    """
+    path = require_path("filename", filename, (".html", ".htm"))
+    title = require_text("title", title)
+    chosen = np.unique(np.linspace(0, len(history) - 1, min(len(history), INSTANTS)).astype(int))
+    states = list(history.states(chosen.tolist()))
+    strong = any(_strengths(b) for b in states[0].beams)
+    size = [one.extremes("utilisation" if strong else "displacement", 1)[0].value
+            for one in states]
+    state = states[int(np.argmax(size))]
+    about = (f"t = {history.t[0]:g} to {history.t[-1]:g}, {history.steps} steps by "
+             f"{history.scheme!r}. What follows is the instant t = {state.t:g}, of the largest "
+             f"{'utilisation' if strong else 'displacement'} of {len(chosen)} instants.")
+    sensors = [_figure(lambda name=name: history.plot_curve("t", name, xlabel="time"))
+               for name, values in history.sensors.items() if values.ndim == 1]
+    parts = ["<h2>Motion</h2>", _text(about), _figure(lambda: history_picture(history)), *sensors]
+    return _written(path, path.stem if title is None else title, [*parts, *_Page(state).parts()])
+
+
+def _written(path, title, parts):
+    name = html.escape(title)
+    page = (f"<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
+            f"<meta name='viewport' content='width=device-width, initial-scale=1'>"
+            f"<style>{STYLE}</style></head>\n<body><h1>{name}</h1>\n" + "\n".join(
+                part for part in parts if part) + "\n</body></html>\n")
+    with output_file(path) as temporary:
+        Path(temporary).write_text(page, encoding="utf-8")
+    return path
+
+
+def _text(text, kind=""):
+    return f"<p class='{kind}'>{html.escape(text)}</p>"
+
+
+def _figure(draw, kind=""):
+    found = picture(draw, DPI)
+    return f"<figure class='{kind}'>{found}</figure>" if found else ""
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A table; numbers are tuples of one text."""
+    rows = list(rows)
+    cells = ["".join(f"<td class='number'>{html.escape(c[0])}</td>" if isinstance(c, tuple) else
+                     f"<td>{html.escape(str(c))}</td>" for c in row) for row in rows[:ROWS]]
+    more = _text(f"and {len(rows) - ROWS} more", "note") if len(rows) > ROWS else ""
+    return "" if not rows else (
+        "<table><tr>" + "".join(f"<th>{html.escape(h)}</th>" for h in head) + "</tr>"
+        + "".join(f"<tr>{row}</tr>" for row in cells) + f"</table>{more}")
+
+
+def _strengths(beam):
+    return [layer.material for layer in beam.across.layers if layer.material.strength is not None]
+
+
+def total_force(system: Any, u: Array, force: Array) -> Array:
+    """Resultant of a force on the DOFs (N,) and its moment about the origin, (3,)."""
+    out = np.zeros(3)
+    for member, s in zip(system.members, system.slices):
+        f, q = force[s], (member.q0 + u[s]).reshape(-1, 2)
+        out[:2] += (member.rigid_motions()[:, :2].T @ f if isinstance(member, Domain) else
+                    f.reshape(-1, member.nd)[:, :2].sum(axis=0))
+        f = f.reshape(-1, 2)
+        out[2] += np.sum(q[:, 0] * f[:, 1] - q[:, 1] * f[:, 0])
+    return out
+
+
+class _Page:
+    """The parts of the page of a state."""
+
+    def __init__(self, state: Any) -> None:
+        self.state, self.system = state, state.system
+        self.units = units_of(state)
+
+    def number(self, value: float, kind: str = "") -> tuple[str]:
+        """A number with the unit of a length, force, moment or stress, as a cell."""
+        force, length = self.units or ("", "")
+        unit = "" if self.units is None else {
+            "length": length, "force": force, "moment": f"{force} {length}",
+            "stress": PRESSURES.get(self.units, f"{force}/{length}²"), "": ""}[kind]
+        if unit == "Pa" and abs(value) >= 1e5:
+            value, unit = (1e-9 * value, "GPa") if abs(value) >= 1e10 else (1e-6 * value, "MPa")
+        return (rounded(value + 0.0, unit),)
+
+    def name(self, beam: Any) -> str:
+        """Name or number of a member."""
+        return str(self.system.members.index(beam)) if beam.name is None else beam.name
+
+    def parts(self) -> list[str]:
+        """All sections of the page."""
+        state = self.state
+        how = ("linear, for small displacements" if state.base is not None else
+               f"instant t = {state.t:g} of a motion" if state.t is not None else
+               f"equilibrium for large displacements: {state.verdict}")
+        units = "" if self.units is None else f" Units: {', '.join(self.units)}."
+        start = state.replace(u=np.zeros_like(state.u), load=0.0, t=None)
+        model = _figure(lambda: plot_scene(start, names=len(self.system.members) > 1))
+        findings = list(state.checks.findings) if state.beams else []
+        return [
+            _text(f"{how[0].upper()}{how[1:]}. Load factor {state.load:g}.{units}"),
+            "<h2>Model</h2>", model, self._bodies(), self._materials(),
+            "<h2>Loads and supports</h2>", self._actions(),
+            "<h2>Reactions</h2>", self._reactions(),
+            "<h2>Results</h2>", self._extremes(), *self._pictures(), self._worst(),
+            "<h2>Section forces</h2>" if state.beams else "", self._section_forces(),
+            "<h2>Findings</h2>", *([_text(text, "bad") for text in findings]
+                                   or [_text("None: the solution is within the range of its mesh "
+                                             "and materials.")]), *self._recovered(),
+            _text(self._versions(), "note")]
+
+    def _bodies(self):
+        rows = []
+        for beam in self.state.beams:
+            mesh, weighs = beam.mesh, all(layer.density is not None
+                                          for layer in beam.across.layers)
+            rows.append((self.name(beam), self.number(float(np.sum(mesh.lengths)), "length"),
+                         self.number(mesh.height, "length"), str(beam.section).strip("<>"),
+                         f"{mesh.nelements} × {type(beam.element).__name__}",
+                         (f"{beam.total_mass:.4g}",) if weighs else "–"))
+        others = [(self.name(one), repr(one)) for one in self.system.members[len(rows):]]
+        return _table(("beam", "length", "height", "section", "elements", "mass"), rows) + _table(
+            ("body", ""), others)
+
+    def _materials(self):
+        def cell(value, kind):
+            return "–" if value is None else "f(x, y)" if callable(value) else (
+                self.number(value, kind))
+
+        def strength(given):
+            return "–" if given is None else (" / ".join(
+                self.number(x, "stress")[0] for x in given),) if isinstance(given, tuple) else (
+                    self.number(given, "stress"))
+
+        every = dict.fromkeys((layer.material, layer.grade, layer.density)
+                              for beam in self.state.beams for layer in beam.across.layers)
+        return _table(("material", "E", "ν", "density", "strength"), [
+            (f"{getattr(m, 'title', '') or type(m).__name__}, plane {m.plane}",
+             cell(grade or m.E, "stress"), (f"{m.nu:g}",), cell(density, ""), strength(m.strength))
+            for m, grade, density in every])
+
+    def _actions(self):
+        kinds = {"force": "force", "moment": "moment"}
+        rows = []
+        for s in symbols_of(self.state, True, True, True):
+            x, (a, b) = s.at[len(s.at) // 2].start, s.direction[0]
+            place = "" if s.kind in ("weight", "drag") else f"({x[0]:.4g}, {x[1]:.4g})"
+            if s.kind in ("support", "joint"):
+                rows.append((s.kind, place, s.text.replace(" ", ", ") or "fixed", ""))
+                continue
+            way = f"direction ({a:.3g}, {b:.3g})" if s.kind in ("force", "weight") else ""
+            kind, unit = s.kind, kinds.get(s.kind, "")
+            if len(s.at) > 1:
+                place = f"from {_at(s.at[0])} to {_at(s.at[-1])}"
+                if kind == "force":
+                    kind, unit = "distributed force", ""
+            value = self.number(s.value, unit) if s.kind in (
+                "force", "moment", "weight", "mass") else ""
+            rows.append((kind, place, f"{s.text.removesuffix('= ')} {way}".strip(), value))
+        rows.sort(key=lambda row: row[0] in ("support", "joint"))
+        return _table(("what", "where", "", "value"), dict.fromkeys(rows))
+
+    def _reactions(self):
+        """Forces of supports, and the balance of all forces."""
+        state, system, u = self.state, self.system, self.state._acted
+        rows = [(place, *self._forces(*force)) for place, force in self._supports()]
+        support = state._support_force()
+        inertia, internal = state._inertia + np.zeros_like(u), state.internal_force
+        joints = np.zeros_like(u) if not system.constraints.joints else (
+            state.multipliers @ system.constraints.full_jacobian(u, state._time))
+        parts = {"loads": internal + inertia + joints - support,
+                 "supports": np.where(system.constraints.free, 0.0, support) - joints,
+                 "springs, obstacles, foundations": -internal, "inertia and damping": -inertia}
+        totals = {name: total_force(system, u, force) for name, force in parts.items()}
+        size = max(np.max(np.abs(one[:2])) for one in totals.values()) or 1.0
+        length = float(np.max(np.ptp(np.hstack([b.mesh.p for b in state.beams]), axis=1))
+                       ) if state.beams else 1.0
+        shown = [(name, *self._forces(*one)) for name, one in totals.items()
+                 if name in ("loads", "supports") or np.max(
+                     np.abs(one / [1, 1, length])) > 1e-9 * size]
+        rest = sum(totals.values())
+        error = max(np.max(np.abs(rest[:2])), abs(rest[2]) / length) / size
+        balance = _text(
+            f"The sum of all forces on the structure is {error:.1g} of the largest of them." + (
+                " They are in balance." if error < BALANCED else "" if state.t is None else
+                " The schemes of motions balance forces on average over a step."),
+            "note" if error < BALANCED or state.t is not None else "bad")
+        head = "along x", "along y", "moment"
+        return _table(("support", *head), rows) + _table(
+            ("all forces, moments about the origin", *head), shown) + balance
+
+    def _forces(self, x, y, moment):
+        return self.number(x, "force"), self.number(y, "force"), self.number(moment, "moment")
+
+    def _supports(self):
+        """Places of supports and their reactions (3,)."""
+        state, frame = self.state, self.system.constraints.frame
+        if frame is not None:
+            for node in np.flatnonzero(np.any(frame.fixed, axis=1)).tolist():
+                found = state.reactions(node)
+                yield f"node {node} at {_pair(frame.graph.points[:, node])}", (
+                    *found.force, found.moment)
+        layout, known = Layout(*self.system.members), set()
+        for item in self.system.items:
+            symbols = [s for one in item.expand(layout) for s in one.symbols(layout)
+                       if s.kind == "support"]
+            if not symbols or not isinstance(item, Item) or not hasattr(item, "boundary"):
+                continue
+            try:
+                found = state.reactions(item.boundary, item.beam)
+            except AncfError:
+                continue
+            place = f"{_at(symbols[0].at[0])} of beam {self.name(layout.beam(item.beam))}"
+            if place not in known:
+                known.add(place)
+                yield place, (*found.force, found.moment)
+
+    def _extremes(self):
+        rows = []
+        for field, kind in LISTED.items():
+            stress = [b for b in self.state.beams if b.section.has_fields]
+            if field == "utilisation" and not any(map(_strengths, stress)):
+                continue
+            try:
+                every = [self.state.extremes(field, 1, beam=b)[0] for b in (
+                    self.state.beams if field == "displacement" else stress)
+                    if field != "utilisation" or _strengths(b)]
+            except AncfError:
+                continue  # a law without this stress
+            if every:
+                one = max(every, key=lambda e: abs(e.value))
+                rows.append((f"largest {field.replace('_', ' ')}", self.number(one.value, kind),
+                             _pair(one.point), str(one.beam)))
+        return _table(("", "value", "at", "beam"), rows)
+
+    def _pictures(self):
+        strong = any(map(_strengths, self.state.beams))
+        yield _figure(lambda: self.state.plot("displacement", scale="auto"))
+        yield _figure(lambda: self.state.plot("utilisation" if strong else "von_mises",
+                                              scale="auto"))
+
+    def _worst(self):
+        if not any(map(_strengths, self.state.beams)):
+            return ""
+        return _table(("utilisation", "at", "beam"), [
+            ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))
+            for one in self.state.extremes()])
+
+    def _section_forces(self):
+        if not self.state.beams:
+            return ""
+        lines, rows = lines_of(self.state, self.state.beams), []
+        for name in "NQM":
+            unit = unit_of_resultant(name, self.units)
+            for what, pick in (("maximum", np.argmax), ("minimum", np.argmin)):
+                line = lines[int(pick([one[name][pick(one[name])] for one in lines]))]
+                k = int(pick(line[name]))
+                rows.append((f"{what} {name}", (rounded(float(line[name][k]), unit),),
+                             _pair(line["x"][:, k]), self.name(line["beam"])))
+        points = np.hstack([line["x"] for line in lines])
+        width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
+        beside = height > width
+        size = (7.0, 4.5) if beside else (6.3, min(9.5, 3.0 * (6.3 * height / width + 0.55)))
+        axes = figure_class()(figsize=size, layout="constrained").subplots(
+            *((1, 3) if beside else (3, 1)))
+        return _figure(lambda: self.state.plot_resultants(axes=axes, on="structure")[0], "tall"
+                       ) + _table(("", "value", "at", "beam"), rows)
+
+    def _recovered(self):
+        for name, why in self.state.recovered.items():
+            if why:
+                yield _text(f"Stress of beam {name} is that of its elements: {why}.", "note")
+
+    def _versions(self):
+        from importlib.metadata import version
+
+        return (f"skfem-ancf {version('skfem-ancf')}, scikit-fem {version('scikit-fem')}, NumPy "
+                f"{np.__version__}, SciPy {version('scipy')}, Python {platform.python_version()}. "
+                f"{self.system.N} degrees of freedom. {date.today().isoformat()}")
+
+
+def _pair(x):
+    return f"({x[0]:.4g}, {x[1]:.4g})"
+
+
+def _at(vector):
+    return _pair(vector.start)

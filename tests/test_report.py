@@ -1,0 +1,140 @@
+"""Reports as pages of HTML: what they say, and that they need nothing else."""
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, FileError, Frame,
+                        InputError, MeshBeam, RigidBody, Scene, Section, StVenantKirchhoff)
+from skfem_ancf.results.report import total_force
+
+STEEL = StVenantKirchhoff(2.1e11, 0.3, density=7850, strength=235e6)
+
+
+class Page(HTMLParser):
+    """Rows of tables, headings, texts, and sources of pictures; closes what it opens."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.rows, self.text, self.sources, self.open = [], {}, [], []
+        self.feed(path.read_text(encoding="utf-8"))
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+        if tag in ("img", "link", "script", "a"):
+            self.sources.append(dict(attributes).get("src", tag))
+        if tag not in ("img", "meta", "br"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+        elif self.open:
+            self.text.setdefault(self.open[-1], []).append(data)
+
+    def row(self, *start):
+        return next(row for row in self.rows if row[:len(start)] == list(start))
+
+
+def test_a_girder_on_two_supports(tmp_path):
+    """Reactions q L / 2, sag 5 q L^4 / (384 E I), M = q L^2 / 8, sigma = M / W, and where."""
+    frame = Frame.from_lines([(0, 0), (4, 0)], [(0, 1)], material=STEEL, height=0.2, width=0.1,
+                             groups={"girder <1>": [0]})
+    frame.units("N", "m").pin(0).hold(1, "y").line_load((0, -1e4))
+    path = frame.solve_linear().report(tmp_path / "new" / "girder.html", title="A & B")
+    page = Page(path)
+    assert not page.open and len(page.sources) == 4
+    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
+    assert "http" not in re.sub(r"base64,[^']*", "", path.read_text(encoding="utf-8"))
+    assert page.text["h1"] == ["A & B"] and page.row("girder <1>")[1:3] == ["4 m", "0.2 m"]
+    for at in ("node 0 at (0, 0)", "node 1 at (4, 0)"):
+        assert page.row(at)[1:3] == ["0 N", "20 kN"]
+    assert page.row("loads")[1:] == ["0 N", "-40 kN", "-80 kN m"]
+    assert page.row("supports")[1:] == ["0 N", "40 kN", "80 kN m"]
+    sag = 5 * 1e4 * 4**4 / (384 * 2.1e11 * 0.1 * 0.2**3 / 12)
+    assert float(page.row("largest displacement")[1].split()[0]) == pytest.approx(sag, rel=0.01)
+    stress, unit = page.row("largest S xx")[1].split()  # with 0.2 q / b of the body's solution
+    assert abs(float(stress)) == pytest.approx(30.02, abs=0.001) and unit == "MPa"
+    assert float(page.row("largest utilisation")[1]) == pytest.approx(30 / 235, rel=2e-3)
+    assert page.row("maximum M")[1:3] == ["20 kN m", "(2, 0)"]
+    assert page.row("StVenantKirchhoff, plane stress")[1:] == [
+        "210 GPa", "0.3", "7850", "235 MPa"]
+    assert page.row("distributed force")[1] == "from (0, 0) to (4, 0)"
+    said = " ".join(page.text["p"])
+    assert "They are in balance" in said and "None: the solution" in said
+    assert re.search(r"skfem-ancf \d.*NumPy \d", said)
+
+
+def test_all_kinds_of_forces_balance(tmp_path):
+    """Obstacle, spring, weight, rigid body: their sum vanishes, and each has its line."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), 0.01), ElementBeamANCF(2), STEEL,
+                width=0.05, name="arm")
+    body = RigidBody(2.0, 0.01, (1.0, 0.0))
+    scene = Scene(beam, body)
+    scene.weld(("arm", "right"), (body, (1, 0)))
+    scene.clamp("left", beam="arm").gravity((0, -9.81))
+    scene.spring(1e4, (("arm", (0.8, 0)), (0.8, -0.3)))
+    state = scene.obstacle(Circle((0.5, -0.055), 0.05)).units("N", "m").solve_static(tol=1e-12)
+    page = Page(state.report(tmp_path / "arm.html"))
+    weight = 9.81 * (7850 * 0.01 * 0.05 + 2.0)
+    assert float(page.row("loads")[2].split()[0]) == pytest.approx(-weight, rel=1e-3)
+    held, sprung = (float(page.row(name)[2].split()[0])
+                    for name in ("supports", "springs, obstacles, foundations"))
+    assert sprung == pytest.approx(state.contact().total[1] - state.spring_force(), rel=1e-3)
+    assert held + sprung == pytest.approx(weight, rel=1e-3)
+    assert page.row("(0, 0) of beam arm")[2] == page.row("supports")[2]
+    assert any("obstacle touches it" in text for text in page.text["p"])
+    assert page.row("body") and page.row("spring")
+
+
+def test_total_force_has_moments_about_the_origin():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), ElementBeamANCF(2), STEEL, 0.1)
+    scene = Scene(beam).point_force((2.0, 3.0), at=(0.6, 0.05)).moment("right", 7.0)
+    u = np.zeros(scene.N)
+    force = scene.system.external_force(u, 1.0)
+    assert total_force(scene.system, u, force) == pytest.approx([2, 3, 3 * 0.6 - 2 * 0.05 + 7])
+
+
+def test_findings_and_brittle_strengths(tmp_path):
+    glass = STEEL.replace(strength=(1e6, 5e6))
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), ElementBeamCable(5), glass, 0.1)
+    state = Scene(beam).clamp("left").point_force((0, -50), at=(1, 0)).solve_static()
+    page = Page(state.report(tmp_path / "glass.html"))
+    assert any("times the strength" in text for text in page.text["p"])
+    assert page.row("StVenantKirchhoff, plane stress")[-1] == "1000000 / 5000000"
+    numbers = Section.numbers(EA=1e6, EI=1e2)
+    bare = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), ElementBeamCable(5),
+                section=numbers)
+    state = Scene(bare).clamp("left").point_force((0, -5), at=(1, 0)).solve_static()
+    rows = [row[0] for row in Page(state.report(tmp_path / "bare.html")).rows]
+    assert "largest displacement" in rows and "largest S xx" not in rows
+
+
+def test_a_motion_is_reported_at_its_worst_instant(tmp_path):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5), STEEL, 0.05)
+    scene = Scene(beam).clamp("left").point_force((0, -10.0), at=(1, 0))
+    history = scene.sensor("energy", lambda state: state.strain_energy).integrate(0.06, 0.002)
+    page = Page(history.report(tmp_path / "motion.html"))
+    worst = int(np.argmax([state.extremes(count=1)[0].value for state in history]))
+    assert any(f"the instant t = {history.t[worst]:g}," in text for text in page.text["p"])
+    assert len(page.sources) == 6 and page.row("inertia and damping")
+
+
+def test_wrong_files(tmp_path):
+    beam = Beam(MeshBeam.init_line([0, 1], 0.01), ElementBeamCable(5), STEEL, 0.05)
+    state = Scene(beam).clamp("left").point_force((0, -1.0), at=(1, 0)).solve_static()
+    for wrong in ("report.pdf", 3):
+        with pytest.raises((InputError, FileError)):
+            state.report(wrong)
