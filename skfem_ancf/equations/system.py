@@ -164,6 +164,8 @@ class System:
         True if all loads and force elements have a potential.
     items : tuple or None
         The actions as the user gave them, for plots; None in a copy in another process.
+    derivatives : callable or None
+        For derivatives of a State by parameters, see :class:`~skfem_ancf.scene.design.Gradient`.
     units : tuple of str or None
         Units of force and length, for plots and files.
     clock : float or None
@@ -209,6 +211,7 @@ class System:
                              "and the scene damping(modal=...) or damping(mass=...)")
         self._rest_modes = rest_modes
         self.items: tuple[Any, ...] | None = None
+        self.derivatives: Any = None
         self.units: tuple[str, str] | None = None
         self.clock: float | None = None
         self._varying: list[Any] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -103,6 +103,77 @@ class MaterialPoints(NearMisses):
         return found.angular_velocity(self.u[..., s], self.v[..., s])
 
 
+class Derivatives:
+    """Methods of states for derivatives of static solutions by parameters."""
+
+    system: Any
+
+    def gradient(self, J: Any, wrt: Sequence[Any]) -> list[Array]:
+        """Derivatives of a reading of this static solution by parameters of its scene.
+
+        One linear system for all parameters; fields of parameters cost about as much as numbers.
+
+        Parameters
+        ----------
+        J
+            The name of a sensor of the scene, a :class:`~skfem_ancf.Sensor`, or a function of the
+            State that returns a number or an array; see :class:`~skfem_ancf.Design`. A function is
+            also called with states of changed beams: it names these by number or name.
+        wrt
+            Parameters as ``(object, name)``: a beam, material, rigid body or item of the scene, and
+            an argument of it that is a number or an array. Beams have the arguments of their
+            material and mesh, too. ``(beam, "height", "nodes")`` and ``(beam, "height",
+            "elements")`` are fields; "E" and "width" may be fields as well.
+
+        Returns
+        -------
+        list of ndarray
+            For each parameter an array of its shape; with the first axis of J if J is an array.
+
+        Examples
+        --------
+        The deflection of a cantilever, 4 F L^3 / (E b h^3), and where the height matters:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, PointForce, Scene
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3), width=0.01)
+        >>> force = PointForce((0, -1e-4), at=(1, 0))
+        >>> state = Scene(beam).clamp("left").add(force).solve_static()
+        >>> def tip(state):
+        ...     return state.displacement((1, 0))[1]
+        >>> by_h, by_F, by_nodes = state.gradient(
+        ...     tip, [(beam, "height"), (force, "force"), (beam, "height", "nodes")])
+        >>> bool(abs(by_h * 0.01 / tip(state) + 3) < 1e-4)
+        True
+        >>> by_F.shape, (by_nodes / by_nodes.sum()).round(2).tolist()
+        ((2,), [0.32, 0.43, 0.2, 0.05, 0.0])
+        """
+        return self._derivatives(wrt, [J]).of_readings()
+
+    def sensitivity(self, wrt: Sequence[Any]) -> list[Array]:
+        """Derivatives of all displacements of this static solution by few parameters.
+
+        Parameters
+        ----------
+        wrt
+            As for :meth:`gradient`.
+
+        Returns
+        -------
+        list of ndarray
+            For each parameter an array (N, ...) with the axes of the parameter.
+        """
+        return self._derivatives(wrt).of_displacements()
+
+    def _derivatives(self, wrt, readings=()):
+        if self.system.derivatives is None:
+            raise InputError("this state does not know its scene, as after a pickle: solve it "
+                             "again, or use a skfem_ancf.Design")
+        return self.system.derivatives(self, wrt, readings)
+
+
 class SpringForces:
     """The method of states and histories for forces in springs."""
 
@@ -168,7 +239,7 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State(Immutable, MaterialPoints, SpringForces, Output):
+class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from ..actions.forces.base import derivative
 from ..core.errors import (ConvergenceError, InputError, NameUnknown, ask, ask_array,
@@ -17,6 +19,7 @@ from ..equations.matrices import matrices_of
 from ..results.state import State
 from .eigen_readings import EigenReading, residual
 from .linear_model import Bordered, rows_of
+from .parameters import Parameters
 
 #: Step of the parameters, relative to their size, and a stencil of fourth order.
 STEP = 1e-3
@@ -27,8 +30,10 @@ STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.
 CHANGED = 1e-9
 #: Relative difference of a change by all parameters from the sum of those by each.
 AGREE = 1e-3
+#: The same for more than MANY parameters, of second order.
+MANY_STEP, MANY, PAIR = 1e-4, 20, ((-1.0, -0.5), (1.0, 0.5))
 #: Step of displacements for readings that are functions, relative to the size of the scene.
-ASIDE = 1e-6
+ASIDE = 1e-4
 
 
 class Design:
@@ -48,7 +53,7 @@ class Design:
         user-defined energies may depend on them, but not the number of degrees of freedom.
     readings
         Names of sensors of that scene, or functions of the State that return a number or an array.
-        Functions are derived by differences by each degree of freedom: for small scenes. Or a
+        Functions cost a solution of the tangent and four values for each parameter. Or a
         :class:`~skfem_ancf.Frequency`, :class:`~skfem_ancf.BucklingLoad` or
         :class:`~skfem_ancf.CriticalLoad`.
     sizes
@@ -96,7 +101,7 @@ class Design:
         self._groups: list[tuple[Array, Array]] | None = None
         self._static = not all(isinstance(one, EigenReading) and not one.loaded
                                for one in self.readings)
-        self.state: State | None = None
+        self.state: Any = None
 
     def __call__(self, p: ArrayLike) -> tuple[Array, Array]:
         """Values of the readings (r,), and their derivatives by the parameters, (r, n)."""
@@ -133,10 +138,12 @@ class Design:
     def _solve(self, p):
         """Find the readings at p, unless it is the last one."""
         p = np.atleast_1d(require_finite("p", p)).astype(float)
-        if self._p is not None and np.array_equal(self._p, p):
-            return
-        scene = self._scene(p)
-        state = self._solved(scene) if self._static else None
+        if self._p is None or not np.array_equal(self._p, p):
+            scene = self._scene(p)
+            self._begin(p, scene, self._solved(scene) if self._static else None)
+
+    def _begin(self, p, scene, state):
+        """Take the state at p."""
         self._p, self._built, self.state, self._J = p, scene, state, None
         self._found = [(one, *one._find(scene, state if one.loaded else None))
                        for one in self.readings if isinstance(one, EigenReading)]
@@ -165,119 +172,90 @@ class Design:
 
     def _read(self, scene, state):
         """Values of the readings; those of eigenvalues are the ones found."""
-        values, self._places, at = [np.zeros(0)], [], 0
+        values: list[Array] = [np.zeros(0)]
+        self._places: list[int] = []
         for one in self._sensors(scene):
             if isinstance(one, EigenReading):
                 value = self._found[len(self._places)][1]
-                self._places.append(at)
+                self._places.append(sum(map(len, values)))
             elif isinstance(one, Sensor):
                 value = read(one, locate(one, state.system), state)
             else:
                 value = ask_array("a reading", None, one, state)
             values.append(np.ravel(value))
-            at += len(values[-1])
+        self._counts = [len(one) for one in values[1:]]
         return np.concatenate(values)
 
     # derivatives
 
     def _jacobian(self, p, scene, state):
-        if state is not None and state.system.histories.dissipates:
-            raise InputError("forces of this scene depend on the path (friction, plasticity): the "
-                             "derivative of a reading depends on the direction, and is not defined")
+        if state is not None:
+            require_smooth(state)
         self._frozen = [one._freeze(scene, found) for one, _, found in self._found]
         c, first = scene.system.constraints, len(self._values)
         # the readings, then the rows of eigenvalues and those of their checks
         owners = [one for k, frozen in enumerate(self._frozen) for one in (
             self._places[k], first + k)[:1 if frozen.check is None else 2]]
         self._owners = np.concatenate([np.arange(first), np.repeat(owners, c.N + c.m)]).astype(int)
-        numbers, at, change = self._changes(p, state)
-        found = np.zeros((len(self._values) + len(self._frozen), len(p)))
+        P = self._changes(p, state)
+        out = np.zeros((first + len(self._frozen), len(p)))
         if state is not None:
-            adjoint = self._adjoint(scene, state)
-            n = adjoint.shape[1]
-            own = at < n
-            np.add.at(found[:len(self._values)].T, numbers[own],
-                      -(adjoint[:, at[own]] * change[own]).T)
-            numbers, at, change = numbers[~own], at[~own] - n, change[~own]
-        np.add.at(found, (self._owners[at], numbers), change)
-        for frozen, work in zip(self._frozen, found[len(self._values):]):
+            n = c.N + c.m
+            out[:first] = self._by_solution(scene, state, P[:n])
+            P = P[n:]
+        np.add.at(out, self._owners, P.toarray())
+        for frozen, work in zip(self._frozen, out[first:]):
             if frozen.check is not None:
                 frozen.check(work)
-        return found[:len(self._values)]
+        return out[:first]
 
-    def _adjoint(self, scene, state):
-        """The adjoint of each reading, (r, N + m)."""
-        system, found = state.system, matrices_of(state.system, state)
-        equations = Bordered([found.K], found.J, system.constraints, np.zeros((system.N, 0)))
-        return equations.adjoint([1.0], self._by_state(scene, state).T).T
+    def _by_solution(self, scene, state, P):
+        """The part of the derivatives by displacements and multipliers, (r, n).
 
-    def _by_state(self, scene, state):
-        """Derivatives of the readings by displacements and multipliers, (r, N + m)."""
-        n = state.system.N + state.system.constraints.m
-        rows, frozen = [np.zeros((0, n))], iter(self._frozen)
-        for one in self._sensors(scene):
+        Sensors and eigenvalues by the adjoint; functions by differences along the changes of the
+        solution.
+        """
+        by_state = np.zeros((len(self._values), P.shape[0]))
+        at, functions, eigenvalues = 0, [], iter(self._frozen)
+        for one, size in zip(self._sensors(scene), self._counts):
             if isinstance(one, EigenReading):
-                own = next(frozen).by_state
-                rows.append(np.zeros((1, n)) if own is None else own[None])
+                row = next(eigenvalues).by_state
+                by_state[at] = 0.0 if row is None else row
             elif isinstance(one, Sensor) and not callable(one.what):
                 row = rows_of(state.system, state, one)
-                rows.append(np.hstack([row.u, row.multipliers]))
+                by_state[at:at + size] = np.hstack([row.u, row.multipliers])
             else:
-                function = one.what if isinstance(one, Sensor) else one
-                rows.append(_differences(function, state))
-        return np.concatenate(rows)
+                functions.append((one.what if isinstance(one, Sensor) else one, at, size))
+            at += size
+        solver = tangent_of(state, P if functions else P[:, :0])
+        out = np.zeros((len(by_state), P.shape[1]))
+        if by_state.any():
+            out -= solver.adjoint([1.0], by_state.T).T @ P
+        if functions:
+            z = changes_of(solver, P, state.system.N)
+            for function, at, size in functions:
+                out[at:at + size] = np.array([_along(function, state, x) for x in z.T]).T
+        return out
 
     def _changes(self, p, state):
-        """Derivatives of equations and readings by parameters: numbers, places, values."""
+        """Derivatives of equations, readings and rows of eigenvalues by parameters, sparse."""
         sizes = np.abs(p) if self._sizes is None else self._sizes
         touching = state is not None and state.system.forces.contacts.obstacles
-        h = (TOUCHING if touching else STEP) * np.where(
-            sizes > 0.0, sizes, sizes.max() or 1.0)
-        before = self._equations(p, state)
-        noise = CHANGED * self._magnitudes(state, before)
+        step, stencil = (MANY_STEP, PAIR) if len(p) > MANY else (STEP, STENCIL)
+        h = (TOUCHING if touching else step) * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
+        rows = [frozen.rows(self._built) for frozen in self._frozen]
+        noise = CHANGED * self._magnitudes(state, rows)
+        known = isinstance(self.build, Parameters)
+        by = _Differences(lambda p: self._equations(p, state), p, h, stencil, noise)
+        if known:
+            return by.of(self.build.groups(len(noise)))
         if self._groups is not None:
-            found = self._of_groups(p, h, state)
-            if self._agree(found, p, h, state, noise):
+            found = by.of(self._groups)
+            if by.agree(found):
                 return found
         # parameters act elsewhere than they did at the last groups: contact, say
-        self._groups = self._grouped(p, h, state, before, noise)
-        return self._of_groups(p, h, state)
-
-    def _of_groups(self, p, h, state):
-        found = []
-        for members, of in self._groups:
-            moved = np.isin(np.arange(len(p)), members) * h
-            change = sum(c * self._equations(p + k * moved, state) for k, c in STENCIL)
-            at = np.flatnonzero(of >= 0)
-            found.append((of[at], at, change[at] / h[of[at]]))
-        return tuple(map(np.concatenate, zip(*found)))
-
-    def _agree(self, found, p, h, state, noise):
-        """True if derivatives add up to the change by all parameters, by steps of their own."""
-        numbers, at, values = found
-        moved = h * (1.0 + 0.5 * np.cos(np.arange(1.0, len(p) + 1.0)))
-        ends = [self._equations(p + sign * moved, state) for sign in (1.0, -1.0)]
-        parts, change = values * moved[numbers], 0.5 * (ends[0] - ends[1])
-        sums, sizes = (np.bincount(at, x, len(change)) for x in (parts, np.abs(parts)))
-        return np.all(np.abs(change - sums) <= AGREE * (sizes + np.abs(change))
-                      + 10.0 * noise)
-
-    def _grouped(self, p, h, state, before, noise):
-        """Parameters that change different equations, with the parameter of each equation."""
-        groups = []
-        for k in range(len(p)):
-            moved = p.copy()
-            moved[k] += h[k]
-            touched = np.abs(self._equations(moved, state) - before) > noise
-            for members, of in groups:
-                if not np.any(touched & (of >= 0)):
-                    break
-            else:
-                members, of = [], np.full(len(before), -1)
-                groups.append((members, of))
-            members.append(k)
-            of[touched] = k
-        return groups
+        self._groups = by.grouped()
+        return by.of(self._groups)
 
     def _equations(self, p, state):
         """The equations at the displacements and multipliers of a state, and the readings.
@@ -298,13 +276,11 @@ class Design:
                                            memory=state.memory))
         return np.concatenate([*parts, seen, *(frozen.rows(scene) for frozen in self._frozen)])
 
-    def _magnitudes(self, state, before):
+    def _magnitudes(self, state, rows):
         """Typical magnitudes of the terms in the equations, of the readings and their rows."""
-        c, own = self._built.system.constraints, np.abs(before[-len(self._owners):])
-        first = len(self._values)
-        rows = own[first:].reshape(-1, c.N + c.m)
-        largest = np.append(np.full(first, own[:first].max(initial=0.0)),
-                            np.repeat(rows.max(axis=1, initial=0.0), c.N + c.m))
+        c, values = self._built.system.constraints, np.abs(self._values)
+        largest = np.concatenate([np.full(len(values), values.max(initial=0.0)), *(
+            np.repeat(np.abs(row).reshape(-1, c.N + c.m).max(axis=1), c.N + c.m) for row in rows)])
         if state is None:
             return largest
         system, s = state.system, c.coordinate_sizes
@@ -314,17 +290,140 @@ class Design:
                                largest])
 
 
-def _differences(function, state):
-    """Derivatives of a function of the State by displacements and multipliers, (r, N + m)."""
-    system = state.system
-    steps = np.concatenate([ASIDE * system.constraints.coordinate_sizes,
-                            ASIDE * np.maximum(1.0, np.abs(state.multipliers))])
+class _Differences:
+    """Derivatives of equations by parameters p at a fixed state, by steps h."""
 
-    def at(k, step):
-        z = np.concatenate([state.u, state.multipliers])
-        z[k] += step
+    def __init__(self, equations: Any, p: Array, h: Array, stencil: Any, noise: Array) -> None:
+        self._equations, self._p, self._h = equations, p, h
+        self._stencil, self._noise = stencil, noise
+
+    def _change(self, members):
+        """The change by all of these parameters, relative to a step."""
+        moved = np.isin(np.arange(len(self._p)), members) * self._h
+        return sum(c * self._equations(self._p + k * moved) for k, c in self._stencil)
+
+    def of(self, groups: Any) -> Any:
+        """Derivatives, sparse (rows, n), by groups of parameters that change different rows."""
+        found: list[Any] = []
+        for members, of in groups:
+            change = self._change(members)
+            self._share(members, of, change, np.arange(len(change)), found)
+        numbers, at, values = map(np.concatenate, zip(*found))
+        return sparse.csr_array((values / self._h[numbers], (at, numbers)),
+                                shape=(len(self._noise), len(self._p)))
+
+    def _share(self, members, of, change, rows, found):
+        """Attribute changes of rows; where it is not known to which parameter, by halves."""
+        if len(members) == 1:
+            found.append((np.full(len(rows), members[0]), rows, change[rows]))
+            return
+        known = rows[of[rows] >= 0]
+        found.append((of[known], known, change[known]))
+        rows = rows[(of[rows] < 0) & (np.abs(change[rows]) > self._noise[rows])]
+        if len(rows):
+            none, half = np.full(len(of), -1), len(members) // 2
+            for part in (members[:half], members[half:]):
+                self._share(part, none, self._change(part), rows, found)
+
+    def agree(self, found: Any) -> bool:
+        """True if derivatives add up to the change by all parameters, by steps of their own."""
+        moved = self._h * (1.0 + 0.5 * np.cos(np.arange(1.0, len(self._p) + 1.0)))
+        ends = [self._equations(self._p + sign * moved) for sign in (1.0, -1.0)]
+        change = 0.5 * (ends[0] - ends[1])
+        return bool(np.all(np.abs(change - found @ moved) <= AGREE * (
+            abs(found) @ moved + np.abs(change)) + 10.0 * self._noise))
+
+    def grouped(self) -> list[tuple[list[int], Array]]:
+        """Parameters that change different equations, with the parameter of each equation."""
+        groups: list[tuple[list[int], Array]] = []
+        before = self._equations(self._p)
+        for k in range(len(self._p)):
+            moved = self._p.copy()
+            moved[k] += self._h[k]
+            touched = np.abs(self._equations(moved) - before) > self._noise
+            for members, of in groups:
+                if not np.any(touched & (of >= 0)):
+                    break
+            else:
+                members, of = [], np.full(len(before), -1)
+                groups.append((members, of))
+            members.append(k)
+            of[touched] = k
+        return groups
+
+
+class Gradient(Design):
+    """Derivatives by parameters by object and name in a state that is known.
+
+    Parameters
+    ----------
+    scene, state
+        The scene, and its static solution.
+    wrt
+        See :class:`~skfem_ancf.scene.parameters.Parameters`.
+    readings
+        As for :class:`Design`.
+    """
+
+    def __init__(self, scene: Any, state: State, wrt: Sequence[Any],
+                 readings: Sequence[Any] = ()) -> None:
+        if state.t is not None or state.base is not None:
+            raise InputError("derivatives are of static solutions, and this state is "
+                             + ("linear" if state.t is None else "an instant of a motion"))
+        if not all(a is b for a, b in zip_longest(scene.items, state.system.items or ())):
+            raise InputError("items were added to the scene since this state was found: solve it "
+                             "again")
+        self.build: Parameters = Parameters(scene, wrt)
+        super().__init__(self.build, readings)
+        self._begin(self.build.start, scene, state)
+
+    def _shaped(self, found):
+        return [found[..., one.at].reshape((*found.shape[:-1], *one.start.shape))
+                for one in self.build.each]
+
+    def of_readings(self) -> list[Array]:
+        """Of the readings, for each of ``wrt`` an array (r, ...); (...) of one number."""
+        found = self.jacobian(self.build.start)
+        return self._shaped(found[0] if len(found) == 1 else found)
+
+    def of_displacements(self) -> list[Array]:
+        """Of the displacement, for each of ``wrt`` an array (N, ...)."""
+        require_smooth(self.state)
+        self._frozen, self._owners = [], np.zeros(0, int)
+        P = self._changes(self._p, self.state)
+        found = changes_of(tangent_of(self.state, P), P, self.state.system.N)
+        return self._shaped(found[:self.state.system.N])
+
+
+def require_smooth(state: State) -> None:
+    """Raise InputError if forces depend on the path."""
+    if state.system.histories.dissipates:
+        raise InputError("forces of this scene depend on the path (friction, plasticity): the "
+                         "derivative of a reading depends on the direction, and is not defined")
+
+
+def tangent_of(state: State, P: Any) -> Bordered:
+    """The equations about a state, for changes P (N + m, n) of their residual, sparse."""
+    system, found = state.system, matrices_of(state.system, state)
+    prescribed, fixed = np.zeros((system.N, P.shape[1])), system.constraints.fixed
+    prescribed[fixed] = -P[fixed].toarray()
+    return Bordered([found.K], found.J, system.constraints, prescribed)
+
+
+def changes_of(solver: Bordered, P: Any, N: int) -> Array:
+    """The changes of displacements and multipliers, (N + m, n)."""
+    return np.concatenate(solver.solve([1.0], -P[:N].toarray(), -P[N:].toarray()))
+
+
+def _along(function, state, z):
+    """The derivative of a function of the State along a change (N + m,) of the solution, (r,)."""
+    system, N = state.system, state.system.N
+    size = np.abs(z[:N] / system.constraints.coordinate_sizes).max()
+    step = ASIDE / size if size > 0.0 else 1.0
+
+    def at(k):
         return np.ravel(ask_array("a reading", None, function, State(
-            system, z[:system.N], state.load, multipliers=z[system.N:], memory=state.memory)))
+            system, state.u + k * step * z[:N], state.load, memory=state.memory,
+            multipliers=state.multipliers + k * step * z[N:])))
 
-    return np.array([(at(k, step) - at(k, -step)) / (2.0 * step)
-                     for k, step in enumerate(steps)]).T
+    return sum(c / step * at(k) for k, c in STENCIL)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from copy import copy
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
@@ -403,3 +404,11 @@ class Model(NearMisses):
         scene._damping, scene._units = self._damping, self._units
         scene._put(*added)
         return scene
+
+    def _rebuilt(self, beams, bodies, items):
+        """The same on other beams, with other bodies and items in the same order."""
+        other = copy(self)
+        other.layout = Layout(*self.beams, *bodies, *self.domains)
+        other._entries = tuple(entry._replace(given=item)
+                               for entry, item in zip(self._entries, items))
+        return other._on(beams)

@@ -41,6 +41,7 @@ from ..visuals.explore import Explorer, explorer
 from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
 from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
+from .design import Gradient
 from .linear_model import LinearModel
 from .model import Entry, Model
 from .plan import Plan, make_plan
@@ -125,6 +126,7 @@ class Scene(Model):
             if self._system is None:
                 self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
                 self._system.items = self.items
+                self._system.derivatives = partial(Gradient, self)
             self._system.units = self._units
             return self._system
 
