@@ -17,8 +17,7 @@ from ..core.types import Place
 from ..mesh.places import is_point, node_of
 from .item import Item
 from .symbols import Symbol, supports_of
-from .joints.weld import Hinge
-from .joints.prescribed import PlaneSection, PrescribedDisplacement
+from .joints.weld import Hinge, PlaneSection, PrescribedDisplacement
 
 
 class Support(Item):

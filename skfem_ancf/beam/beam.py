@@ -17,8 +17,7 @@ from ..core.errors import (InputError, NameUnknown, require_finite, require_flag
 from ..core.immutable import Immutable, cached_property, read_only
 from ..core.types import Array, Place
 from ..elements import ElementBeam, choose_element
-from ..formulations import get_formulation
-from ..formulations.base import Formulation, Term
+from ..formulations import Formulation, Term, get_formulation
 from ..materials import Material
 from ..materials.damping import KelvinVoigt
 from ..mesh.mesh_beam import MeshBeam, reach

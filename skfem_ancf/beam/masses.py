@@ -11,7 +11,7 @@ import numpy as np
 from ..core.linalg import BandMatrix
 from ..core.quadrature import gauss, product_rule, tensor
 from ..core.types import Array, Rule
-from ..formulations.base import AXIS
+from ..formulations import AXIS
 
 #: Additional points along an element of variable section.
 MORE = 4

@@ -11,8 +11,7 @@ from numpy.polynomial.chebyshev import chebder, chebvander
 from numpy.polynomial.polynomial import polyval
 
 from ..core.types import Array, Law, Rule
-from ..formulations import COMPONENTS
-from ..formulations.base import Term
+from ..formulations import COMPONENTS, Term
 from .remembered import has_history, stress_of_layer
 
 

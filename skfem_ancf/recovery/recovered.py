@@ -37,7 +37,7 @@ from ..beam.strains import on_grid, stress_at
 from ..core.immutable import cached_property
 from ..core.linear import angle_of, first_order, largest, unwrapped
 from ..core.types import Array, Law
-from ..formulations.base import EnhancedContinuum
+from ..formulations import EnhancedContinuum
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from ..mesh.numbering import by_element

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actions.contact.contacts import YIELDS
 from ..actions.contact.tables import STIFFNESS
-from ..actions.joints.prescribed import PrescribedDisplacement
+from ..actions.joints.weld import PrescribedDisplacement
 from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP

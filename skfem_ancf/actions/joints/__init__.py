@@ -6,9 +6,9 @@ from typing import Any
 
 from ...core.errors import require_option
 from .base import Joint, bind_joint
-from .prescribed import Motor, PlaneSection, PrescribedAngle, PrescribedPosition, PrescribedTurn
 from .sliders import OnCircle, OnLine, Sleeve, Slot
-from .weld import Glue, Hinge, Weld
+from .weld import (Glue, Hinge, Motor, PlaneSection, PrescribedAngle, PrescribedPosition,
+                   PrescribedTurn, Weld)
 
 #: The joints by name.
 JOINTS = {

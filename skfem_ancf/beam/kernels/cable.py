@@ -20,7 +20,7 @@ from ...core.errors import InputError
 from ...core.linear import first_order
 from ...core.quadrature import gauss
 from ...core.types import Array
-from ...formulations.base import Formulation
+from ...formulations import Formulation
 from ...materials.history import AtRest
 from ...sections import Across
 from .kernel import ElementKernel, strains

@@ -13,7 +13,7 @@ import numpy as np
 from ...core.quadrature import product_rule
 from ...core.types import Array
 from ...elements.base import ElementBeam
-from ...formulations.base import Formulation, Term
+from ...formulations import Formulation, Term
 from ...mesh.mesh_beam import MeshBeam
 from ...sections import Across, Layer
 from .kernel import ElementKernel
