@@ -179,7 +179,51 @@ def end_of(layout: Layout, place: Any) -> Vector:
     return point(layout, which, at)
 
 
-class Spring(ForceElement):
+class ElasticElement(ForceElement):
+    """A force ``k(q) + damping(dq / dt)`` against a coordinate q, an elongation or an angle.
+
+    A subclass defines :meth:`coordinate` and :meth:`mean_slope`.
+    """
+
+    k: Proportional | Law
+    damping: Proportional | Law
+    #: Reference coordinate for the difference step of a law.
+    _scale = 1.0
+
+    def coordinate(self, x: Array) -> tuple[float, Array]:
+        """q and its derivative by the links, (n, 2)."""
+        raise NotImplementedError
+
+    def mean_slope(self, x: Array, y: Array) -> Array:
+        """G (n, 2) with ``G . (y - x) = q(y) - q(x)``."""
+        raise NotImplementedError
+
+    def amount(self, x: Array, v: Array) -> float:
+        """Tension or moment."""
+        q, g = self.coordinate(x)
+        return float(self.k(q) + self.damping(float(np.sum(g * v))))
+
+    def rate(self, x: Array) -> Array:
+        """Derivative of the amount at rest by the links, (n, 2)."""
+        q, g = self.coordinate(x)
+        return self.k.slope(q, self._scale) * g
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        return -self.amount(x, v) * self.coordinate(x)[1]
+
+    def potential(self, x: Array) -> float:
+        return self.k.potential(self.coordinate(x)[0])
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        mean = self.k.mean(self.coordinate(x)[0], self.coordinate(y)[0])
+        return -mean * self.mean_slope(x, y)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        g = self.coordinate(x)[1]
+        return -self.damping.slope(float(np.sum(g * v)), STILL) * np.multiply.outer(g, g)
+
+
+class Spring(ElasticElement):
     """A spring between two points, with a parallel dashpot.
 
     The tension is ``k (l - length) + damping dl / dt`` with the distance l, or
@@ -222,7 +266,7 @@ class Spring(ForceElement):
             raise InputError(f"the spring between {shown(self.between)} has length zero, and so no "
                              "direction: name two different points, or give length=0 for a spring "
                              "that pulls them together")
-        self._length = distance if self.length is None else self.length
+        self._length = self._scale = distance if self.length is None else self.length
         return [self._link]
 
     def parts(self) -> list[KernelElement] | None:
@@ -231,40 +275,19 @@ class Spring(ForceElement):
         return [KernelElement(SPRING, self._link, Vector(np.zeros(2)),
                      (self.k, self._length, self.damping, 0.0, 0.0))]
 
-    def _along(self, x):
+    def coordinate(self, x: Array) -> tuple[float, Array]:
         length = max(float(np.hypot(*x[0])), TINY)
-        return length, x[0] / length
+        return length - self._length, x / length
 
-    def amount(self, x: Array, v: Array) -> float:
-        """The tension."""
-        length, n = self._along(x)
-        return float(self.k(length - self._length) + self.damping(v[0] @ n))
-
-    def rate(self, x: Array) -> Array:
-        """Derivative of the tension at rest by the vector, (1, 2)."""
-        length, n = self._along(x)
-        return self.k.slope(length - self._length, self._length) * n[None]
-
-    def force(self, x: Array, v: Array, t: float) -> Array:
-        return -self.amount(x, v) * self._along(x)[1][None]
-
-    def potential(self, x: Array) -> float:
-        return self.k.potential(self._along(x)[0] - self._length)
-
-    def mean_force(self, x: Array, y: Array, t: float) -> Array:
-        a, b = self._along(x)[0], self._along(y)[0]
-        return -self.k.mean(a - self._length, b - self._length) / (a + b) * (x + y)
+    def mean_slope(self, x: Array, y: Array) -> Array:
+        return (x + y) / sum(max(float(np.hypot(*one[0])), TINY) for one in (x, y))
 
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
-        length, n = self._along(x)
-        s, along = length - self._length, np.outer(n, n)
-        K = self.k.slope(s, self._length) * along + self.k(s) / length * (np.eye(2) - along)
+        q, (n,) = self.coordinate(x)
+        along = np.outer(n, n)
+        K = self.k.slope(q, self._length) * along + self.k(q) / (q + self._length) * (
+            np.eye(2) - along)
         return -K.reshape(1, 2, 1, 2)
-
-    def resistance(self, x: Array, v: Array, t: float) -> Array:
-        _, n = self._along(x)
-        c = self.damping.slope(float(v[0] @ n), STILL)
-        return -c * np.outer(n, n).reshape(1, 2, 1, 2)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield Symbol("spring", tuple(end_of(layout, place) for place in self.between),
@@ -274,7 +297,7 @@ class Spring(ForceElement):
         return f"<Spring {self.k!r} between {shown(self.between)}>"
 
 
-class TorsionalSpring(ForceElement):
+class TorsionalSpring(ElasticElement):
     """A torsional spring on a section, with a parallel dashpot.
 
     The moment is ``k (phi - angle) + damping dphi / dt``, phi the rotation from the reference
@@ -344,36 +367,15 @@ class TorsionalSpring(ForceElement):
         turned(np.array(self.numbers)[:, None], x.reshape(4, 1), np.array([self._last]), out)
         return float(out[0])
 
-    @staticmethod
-    def _turning(x):
-        """Derivative of the angle by both directions, (2, 2)."""
-        out = np.empty((4, 1))
-        turning(x.reshape(4, 1), out)
-        return out.reshape(2, 2)
+    def coordinate(self, x: Array) -> tuple[float, Array]:
+        g = np.empty((4, 1))
+        turning(np.reshape(x, (4, 1)), g)
+        return self.angle_of(np.asarray(x)), g.reshape(2, 2)
 
-    def amount(self, x: Array, v: Array) -> float:
-        """The moment against the rotation."""
-        return float(self.k(self.angle_of(x)) + self.damping(float(np.sum(self._turning(x) * v))))
-
-    def rate(self, x: Array) -> Array:
-        """Derivative of the moment at rest by both directions, (2, 2)."""
-        return self.k.slope(self.angle_of(x)) * self._turning(x)
-
-    def force(self, x: Array, v: Array, t: float) -> Array:
-        return -self.amount(x, v) * self._turning(np.asarray(x))
-
-    def potential(self, x: Array) -> float:
-        return self.k.potential(self.angle_of(x))
-
-    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+    def mean_slope(self, x: Array, y: Array) -> Array:
         g = np.empty((4, 1))
         mean_turning(x.reshape(4, 1), y.reshape(4, 1), g)
-        return -self.k.mean(self.angle_of(x), self.angle_of(y)) * g.reshape(2, 2)
-
-    def resistance(self, x: Array, v: Array, t: float) -> Array:
-        g = self._turning(np.asarray(x))
-        c = self.damping.slope(float(np.sum(g * v)), STILL)
-        return -c * np.multiply.outer(g, g)
+        return g.reshape(2, 2)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield Symbol("torsional spring", (section(layout, self.beam, self.at)[0],),
@@ -385,13 +387,13 @@ class TorsionalSpring(ForceElement):
 
 def spring_of(elements: Sequence[ForceElement], which: Any) -> Any:
     """A bound spring, by itself or by its number among the springs and torsional springs."""
-    springs = [one for one in elements if isinstance(one, (Spring, TorsionalSpring))]
+    springs = [one for one in elements if isinstance(one, ElasticElement)]
     for one in springs:
         if one is which:
             return one
     if not springs:
         raise InputError("the scene has no springs")
-    if isinstance(which, (Spring, TorsionalSpring)):
+    if isinstance(which, ElasticElement):
         raise InputError(f"{which!r} is not one of scene.elements: name it by its number among the "
                          f"{len(springs)} springs of the scene, in the order they were added")
     return springs[require_integer("the number of a spring", which, 0, len(springs) - 1)]
