@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,10 @@ from ..core.errors import (InputError, require_finite, require_finite_scalar, re
 from ..core.immutable import Immutable, is_builtin, rebuilt
 from ..core.quadrature import gauss
 from ..core.types import Array, HasShear, Law
+from .library import values_of
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 PLANES = ("stress", "strain")
 
@@ -67,6 +71,8 @@ class Material(Immutable):
         If ``plane`` or ``shear_correction`` is a name that is not known.
     """
 
+    _title = ""
+
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0,
                  strength: float | tuple[float, float] | None = None) -> None:
@@ -90,6 +96,50 @@ class Material(Immutable):
                              require_positive("strength", compression))
         elif strength is not None:
             self.strength = require_positive("strength", strength)
+
+    @classmethod
+    def named(cls, name: str, units: tuple[str, str] = ("N", "m"), **changes: Any) -> Self:
+        """A material of this law with the values of a common one.
+
+        E, nu, density, thermal expansion and strength (yield or proof stress) are those of
+        :mod:`skfem_ancf.materials.library`: steels "S235", "S275", "S355", "S460", "1.4301",
+        "spring steel"; "EN AW-6060 T66", "EN AW-6082 T6", "EN AW-7075 T6"; "brass", "Ti-6Al-4V";
+        "POM", "PA 6", "PA 66 GF30", "PC", "ABS", "PP", "PETG", "PLA", "silicone". Those that are
+        typical say so in :attr:`title`: ask the data sheet before you rely on them.
+
+        Parameters
+        ----------
+        name
+            The name.
+        units
+            Units of force and length, as of :meth:`Scene.units <skfem_ancf.Scene.units>`; the
+            density is that of time in seconds.
+        **changes
+            Other arguments of the law, which replace those of the name.
+
+        Raises
+        ------
+        NameUnknown, InputError
+            If the name, or the units, are not known.
+
+        Examples
+        --------
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> steel = StVenantKirchhoff.named("S235", ("N", "mm"))
+        >>> round(steel.E), round(steel.strength), round(steel.density, 12), steel.title
+        (210000, 235, 7.85e-09, 'S235')
+        >>> StVenantKirchhoff.named("POM").title
+        'POM, typical values'
+        """
+        values, title = values_of(name, units)
+        made = cls(**{**values, **changes})
+        made._title = title if not changes.keys() & values.keys() else ""
+        return made
+
+    @property
+    def title(self) -> str:
+        """The name of :meth:`named`, and that its values are typical; else ""."""
+        return self._title
 
     @property
     def graded(self) -> bool:
@@ -229,7 +279,8 @@ class Material(Immutable):
 
     def __repr__(self):
         E = shown(self.E) if callable(self.E) else f"{self.E:g}"
-        return (f"{type(self).__name__}(E={E}, nu={self.nu:g}, density={self.density}, "
+        title = f"{self.title!r}: " if self.title else ""
+        return (f"{title}{type(self).__name__}(E={E}, nu={self.nu:g}, density={self.density}, "
                 f"plane={self.plane!r}, shear_correction={self.shear_correction!r})")
 
 

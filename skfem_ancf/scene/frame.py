@@ -186,10 +186,10 @@ class Frame(Scene):
             ModelWarning that lists merged points and points that are nearly as close. With 0
             nothing is merged.
         height
-            Of the section: a number, or for tapered lines a function of s (n,), from 0 to 1 along
-            each line from its first point to its second, that returns heights (n,), with kinks at
-            nodes of the elements; or a list with one of these for each line, in ``sections`` for
-            each line of the group.
+            Of the section, by default that of a standard profile: a number, or for tapered lines a
+            function of s (n,), from 0 to 1 along each line from its first point to its second, that
+            returns heights (n,), with kinks at nodes of the elements; or a list with one of these
+            for each line, in ``sections`` for each line of the group.
         material, width, section, element, formulation, damping, compiled
             As for :class:`~skfem_ancf.Beam`; the element is ``ElementBeamCable(5)`` by default. The
             material coordinate x of functions (x, y) is s.
@@ -286,6 +286,8 @@ class Frame(Scene):
         beams = []
         for name, lines in groups.items():
             given = {**options, **sections.get(name, {})}
+            if given["height"] is None:
+                given["height"] = getattr(given["section"], "height", None)
             if given["height"] is None:
                 raise InputError("the lines need a height of their section: give height=, or one "
                                  f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")

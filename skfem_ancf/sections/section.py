@@ -22,8 +22,10 @@ from ..core.quadrature import gauss
 from ..core.types import Array, Rule
 from ..elements.base import ElementBeam
 from ..materials import Material
+from ..materials.library import LENGTHS
 from ..materials.plane_sections import PlaneSections
 from ..mesh.mesh_beam import MeshBeam
+from .library import pieces_of
 
 #: Additional points where the width is not a polynomial of Y.
 MORE = 4
@@ -368,8 +370,14 @@ class Section(Immutable):
     has_fields = True
 
     @staticmethod
-    def profile(name: str, scaled: bool = False, **sizes: float) -> Section:
-        """A profile of one material whose height is that of the mesh.
+    def profile(name: str, scaled: bool = False, unit: str = "m", **sizes: float) -> Section:
+        """A profile of one material: by its standard name, or by sizes with the mesh's height.
+
+        Standard profiles have their root radii and tapers, and a ``height``, for the mesh: "IPE
+        200", "HEA 200", "HEB 200", "UPN 200" (EN 10365), "L 50x50x5" (EN 10056-1), "T 50" (EN
+        10055), "RHS 100x50x4", "SHS 100x5" and "CHS 60.3x3.2" (EN 10210), "CFRHS", "CFSHS" and
+        "CFCHS" (cold formed, EN 10219). They stand upright and bend about their horizontal axis; an
+        L is taken as guided sideways.
 
         The rules across are Gauss rules of the width, exact to round-off for the polynomials of the
         element: see :class:`~skfem_ancf.sections.section.Weighted`. The axis is at half the height,
@@ -378,13 +386,15 @@ class Section(Immutable):
         Parameters
         ----------
         name
-            "rectangle" (width), "I" and "T" (width, web, flange; the flange of a T is at the top),
-            "box" (width, wall), "tube" (wall) or "circle".
+            A standard name; or "rectangle" (width), "I" and "T" (width, web, flange; the flange of
+            a T is at the top), "box" (width, wall), "tube" (wall) or "circle".
         scaled
             For tapered meshes. False: flanges and walls keep their thickness. True: sizes are those
             at the largest height, and the thickness of flanges and of the lower and upper walls of
             a box is proportional to the height; webs and widths are constant. A tube is scaled as a
             whole, a circle always.
+        unit
+            Unit of length of a standard profile: "m", "cm", "mm" or "in".
         **sizes
             Overall width, thickness of the web, of a flange and of the walls, in units of length.
 
@@ -405,7 +415,13 @@ class Section(Immutable):
         ...             section=Section.profile("I", width=0.05, web=0.005, flange=0.008))
         >>> round(beam.total_mass, 6)  # (2 * 0.05 * 0.008 + 0.084 * 0.005) * 2 * 7850
         19.154
+        >>> ipe = Section.profile("IPE 200")
+        >>> beam = beam.replace(mesh=MeshBeam.init_line([0, 1], ipe.height), section=ipe)
+        >>> round(beam.total_mass, 2)  # 22.4 kg per metre in the standard
+        22.36
         """
+        if name not in SIZES and any(c.isdigit() for c in str(name)):
+            return Standard(name, unit, **sizes)
         return Profile(name, scaled, **sizes)
 
     @staticmethod
@@ -731,6 +747,40 @@ class Profile(Section):
     def __repr__(self) -> str:
         sizes = "".join(f", {k}={v:g}" for k, v in self.sizes.items())
         return f"Section.profile({self.name!r}{', scaled=True' * self.scaled}{sizes})"
+
+
+class Standard(Section):
+    """A profile by its standard name, see :meth:`Section.profile`.
+
+    Attributes
+    ----------
+    height
+        Height in the given unit of length.
+    """
+
+    def __init__(self, name: str, unit: str = "m", **sizes: float) -> None:
+        if sizes:
+            raise CallError(f"{name!r} has its sizes by its name, got {', '.join(sizes)}: for "
+                            'others take Section.profile("I", width=..., web=..., flange=...)')
+        self.name, self.unit = name, require_option("unit", unit, tuple(LENGTHS))
+        self.height, pieces = pieces_of(name, unit)
+        self._pieces = [Piece(*piece) for piece in pieces]
+
+    def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
+        if mesh.heights is not None or abs(mesh.height - self.height) > FILLS * self.height:
+            raise InputError(
+                f"{self.name} is {self.height:g} {self.unit} high, and the mesh {mesh.height:g}"
+                f"{' with a taper' * (mesh.heights is not None)}: make it by height=section.height,"
+                " and give the unit of length of the mesh, as Section.profile("
+                f'{self.name!r}, unit="mm")')
+        measure = Weighted(self._pieces)
+        widths = [np.max(piece.width(np.linspace(*piece[:2], 9))) if callable(piece.width) else
+                  piece.width for piece in self._pieces]
+        return [layer_of(material, measure.mean, measure, outer=float(max(widths)),
+                         face=(float(widths[0]), float(widths[-1])))]
+
+    def __repr__(self) -> str:
+        return f"<{self.name}>"
 
 
 def _chord(h, inner, eta):
