@@ -84,7 +84,8 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_deg
         # spurious strains on a finer one, and is a poor start
         coarse, state = rounds.scene, rounds.state or solve_static(
             rounds.scene.system, None, None, find)
-        fine = rounds.finer()
+        fine = _changed(coarse, [np.arange(b.mesh.nelements) for b in coarse.beams],
+                        [rounds.raised(k) for k in range(len(coarse.beams))])
         better = solve_static(fine.system, None, None, find)
         estimate, errors = _compare(coarse, state, fine, better)
         better = better.replace(error_estimate=estimate, scene=fine,
@@ -109,7 +110,7 @@ class _Rounds:
         self._before: dict[int, float] = {}
         self._refinements: tuple[Refinement, ...] = ()
 
-    def _raised(self, k):
+    def raised(self, k: int) -> Any:
         """The element of a beam of the next degree; None if its elements are to be halved."""
         element = self.scene.beams[k].element
         # the axis on a curve is cubic: a higher degree does not improve the geometry
@@ -119,11 +120,6 @@ class _Rounds:
 
     def _small(self, error):
         return error <= 0.1 * self.tol
-
-    def finer(self) -> Any:
-        """The scene to compare with."""
-        return _changed(self.scene, [np.arange(b.mesh.nelements) for b in self.scene.beams],
-                        [self._raised(k) for k in range(len(self.scene.beams))])
 
     def done(self, errors: list[float], scene: Any) -> tuple[Refinement, ...]:
         """All refinements, with those from the current scene to another one."""
@@ -137,7 +133,7 @@ class _Rounds:
         """Find beams that gain little from a higher degree; False if that is unknown or new."""
         sure = True
         for k, error in enumerate(errors):
-            if self._raised(k) is None:
+            if self.raised(k) is None:
                 continue
             before = self._before.get(k)
             if before is None:
@@ -152,9 +148,9 @@ class _Rounds:
         """Raise degrees where that pays; halve the elements that matter in other beams."""
         beams = self.scene.beams
         split = [new.mesh.nelements > old.mesh.nelements for old, new in zip(beams, fine.beams)]
-        raised = [None if self._small(error) and k in self._before else self._raised(k)
+        raised = [None if self._small(error) and k in self._before else self.raised(k)
                   for k, error in enumerate(errors)]
-        self._before = {k: e for k, e in enumerate(errors) if self._raised(k) is not None}
+        self._before = {k: e for k, e in enumerate(errors) if self.raised(k) is not None}
         if all(e is not None for e in raised):
             scene, solved = fine, better
         else:
@@ -227,37 +223,6 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
     return tuple(out)
 
 
-def _prolong(old, marked, u):
-    """The same displacement on the mesh with the marked elements halved: the spaces are nested."""
-    nodes = u.reshape(-1, old.element.nodal_dofs, 2)
-    marked = np.unique(marked)
-    t = old.mesh.t[:, marked]
-    q = np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1)
-    middle = np.einsum("eij,ejc->eic", _halving(old, marked), q)
-    return np.insert(nodes, t[1], middle, axis=0).ravel()
-
-
-def _collect(old, marked, force):
-    """Restrict a force from the refined mesh: the transpose of :func:`_prolong`.
-
-    By node, (n, nb, 2), with the new nodes of the finer mesh.
-    """
-    nb, t = old.element.nodal_dofs, old.mesh.t[:, marked]
-    there = np.insert(np.zeros(old.mesh.p.shape[1], dtype=bool), t[1], True)
-    nodes = force.reshape(-1, nb, 2)
-    out = nodes[~there]
-    shares = np.einsum("eij,eic->ejc", _halving(old, marked), nodes[there])
-    np.add.at(out, t[0], shares[:, :nb])
-    np.add.at(out, t[1], shares[:, nb:])
-    return out, there
-
-
-def _halving(beam, marked):
-    nb, slope = beam.element.nodal_dofs, np.array([f[1] for f in beam.element.functionals])
-    L = beam.mesh.lengths[marked][:, None, None]
-    return (beam.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]
-
-
 def _compare(coarse, state, fine, better):
     """The estimate, and the contribution of each beam to the larger of its parts."""
     total, changes, energies = better.strain_energy, [], []
@@ -275,8 +240,9 @@ def _compare(coarse, state, fine, better):
 def _mark(coarse, state, fine, better, split):
     """Elements of the coarse mesh with most of the difference in the energy norm.
 
-    Only beams that are ``split`` have any. Where the loads of both meshes differ, as those that
-    jump within an element, the work of their difference is included.
+    Only beams that are ``split``, whose elements the fine mesh has halved, have any. Where the
+    loads of both meshes differ, as those that jump within an element, the work of their difference
+    is included.
     """
     before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
     errors = []
@@ -284,14 +250,25 @@ def _mark(coarse, state, fine, better, split):
         if not s:
             errors.append(np.zeros(a.mesh.nelements))
             continue
-        u, v, every = state.u_of(a), better.u_of(b), np.arange(a.mesh.nelements)
-        d = v - _prolong(a, every, u)
-        force, new = _collect(a, every, after[fine.system.of(b)])
-        gap = force - before[coarse.system.of(a)].reshape(force.shape)
-        work = np.abs(np.sum(gap * d.reshape(len(new), *gap.shape[1:])[~new], axis=(1, 2)))
+        v, t, nb = better.u_of(b), a.mesh.t, a.element.nodal_dofs
+        slope = np.array([f[1] for f in a.element.functionals])
+        L = a.mesh.lengths[:, None, None]
+        halving = (a.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]
+        # the same displacement on the finer mesh: the spaces are nested
+        u = state.u_of(a).reshape(-1, nb, 2)
+        middle = np.einsum("eij,ejc->eic", halving, np.concatenate([u[t[0]], u[t[1]]], axis=1))
+        d = v - np.insert(u, t[1], middle, axis=0).ravel()
+        # the force on the finer mesh, restricted to the coarse one by the transpose
+        new = np.insert(np.zeros(len(u), dtype=bool), t[1], True)
+        force = after[fine.system.of(b)].reshape(-1, nb, 2)
+        gap, shares = force[~new], np.einsum("eij,eic->ejc", halving, force[new])
+        np.add.at(gap, t[0], shares[:, :nb])
+        np.add.at(gap, t[1], shares[:, nb:])
+        gap -= before[coarse.system.of(a)].reshape(gap.shape)
+        work = np.abs(np.sum(gap * d.reshape(force.shape)[~new], axis=(1, 2)))
         d = b.kernel.gather(d).reshape(b.mesh.nelements, -1)
         local = np.abs(np.einsum("ei,eij,ej->e", d, b.kernel.tangents(v), d))
-        errors.append(local.reshape(-1, 2).sum(axis=1) + 0.5 * work[a.mesh.t].sum(axis=0))
+        errors.append(local.reshape(-1, 2).sum(axis=1) + 0.5 * work[t].sum(axis=0))
     chosen = _largest(np.concatenate(errors), [len(e) for e in errors])
     return [c if s else np.arange(0) for c, s in zip(chosen, split)]
 
