@@ -9,7 +9,7 @@ from skfem_ancf import (Beam, CallbackError, Circle, ConvergenceError, ElementBe
                         ModelWarning, NameUnknown, Ramp, Scene, Section, StepHistory, Steps,
                         StVenantKirchhoff, SupportError)
 from skfem_ancf.scene import quasistatic
-from skfem_ancf.solvers.outcome import StepFailed
+from skfem_ancf.solvers.outcome import LoadStepFailed
 
 SOFT = StVenantKirchhoff(2e8, 0.3, 7800)
 
@@ -379,7 +379,7 @@ def slow_path(monkeypatch, whole):
         if smallest and not whole:
             raise ConvergenceError("none", None)
         if not smallest and t - last.t > 2e-4:
-            raise StepFailed("far")
+            raise LoadStepFailed("far")
         return follow(system, last, t, rules, stable, smallest)
 
     monkeypatch.setattr(quasistatic, "_next", only_small)

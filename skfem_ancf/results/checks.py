@@ -74,6 +74,11 @@ class Checks:
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
+def _of(beam):
+    """Whose it is, in words."""
+    return "" if beam.name is None else f" of beam {beam.name!r}"
+
+
 def check(state: Any) -> Checks:
     """The :class:`Checks` of a state."""
     values, found = [], []
@@ -82,9 +87,13 @@ def check(state: Any) -> Checks:
         ratio, stretches = kinematics.deformation(beam, state._places[state.system.of(beam)])
         values.append((np.min(ratio), np.min(stretches), np.max(stretches),
                        turning(beam, u, base)))
-        found += (_findings(beam, values[-1][1], values[-1][3])
-                  + _strained(state, beam, *values[-1][1:3]) if base is None else
-                  _linear_findings(beam, u, base))
+        if base is None:
+            _, least, most, by = values[-1]
+            found += _findings(beam, least, by) + _strained(state, beam, least, most)
+        elif (by := np.max(np.abs(_turns(beam, u, base) - _turns(beam, base)))) > SMALL:
+            found.append(
+                f"the axis{_of(beam)} turns by {by:.3g} rad, and what is linear leaves out what "
+                f"is of the order of the square of that; beyond {SMALL:g} rad use solve_static()")
     found += pushed_points(state.system) + state._not_recovered
     worst = None
     if any(layer.material.strength is not None for b in state.beams for layer in b.across.layers):
@@ -95,8 +104,12 @@ def check(state: Any) -> Checks:
                          "breaks there. Use a larger section, a stronger material or less load")
     if state.base is None:
         found += _yields(state)
-    if state.t is None and state.base is None:
-        found += _slips(state)
+    if state.t is None and state.base is None and state.system.forces.contacts.anchored:
+        found += [f"points slip on {one!r}, and friction depends on the path: solve_static goes "
+                  "from start to end in one step, along which every point slips straight on. Use "
+                  "scene.run with the path of loads, supports and obstacles"
+                  for one in state._equations.forces.contacts.slipping(
+                      np.array(state.u), state.load)]
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found), worst)
@@ -109,7 +122,7 @@ def _yields(state):
     soft = any(group.firmest > 1.0 for _, group in contacts.groups)
     if not soft or system.constraints.missing_supports:
         return
-    t = state.load if state.t is None else state.t
+    t = state._time
     respond = response(system, state.u, state.load, t, state.multipliers, state.t)
     yields = contacts.yielding(state.u, t, respond) if system.solver.stays() else []
     for k, share in enumerate(yields):
@@ -121,17 +134,6 @@ def _yields(state):
                    "the displacement. solve_static and scene.run stiffen it; for motions and "
                    f"continuation give stiffness={2.0 * firm * share / YIELDS:.2g}, and small "
                    "steps where it touches")
-
-
-def _slips(state):
-    """Findings of friction: a static solution knows no path."""
-    contacts = state._equations.forces.contacts
-    if not contacts.anchored:
-        return
-    for one in contacts.slipping(np.array(state.u), state.load):
-        yield (f"points slip on {one!r}, and friction depends on the path: solve_static goes from "
-               "start to end in one step, along which every point slips straight on. Use scene.run "
-               "with the path of loads, supports and obstacles")
 
 
 #: Length over height from which on the reaction of a pushed point is right to 0.2 %.
@@ -183,13 +185,12 @@ def pushed_points(system: Any) -> list[str]:
             end = np.sum(beam.mesh.t == node) == 1 and (node, 1 - c) not in places
             first, along = s.start + node * beam.nd + c, abs(beam.mesh.p_X[c, node])
             if end and along > 0.5 and known.isdisjoint(first + 2 * k for k in slopes):
-                who = "" if beam.name is None else f" of beam {beam.name!r}"
                 out.append(
-                    f"a support moves one point of an end face{who} along the axis: sections of "
-                    f"order {beam.element.order} deform there, and the reaction is too small, by "
-                    'up to 17 % if the beam is short. Keep the face plane, by scene.joint("plane", '
-                    'at="right") or "left"; where it has to turn, use a cable or '
-                    "ElementBeamANCF(1), whose faces are rigid")
+                    f"a support moves one point of an end face{_of(beam)} along the axis: sections "
+                    f"of order {beam.element.order} deform there, and the reaction is too small, "
+                    "by up to 17 % if the beam is short. Keep the face plane, by "
+                    'scene.joint("plane", at="right") or "left"; where it has to turn, use a cable '
+                    "or ElementBeamANCF(1), whose faces are rigid")
     return out
 
 
@@ -209,38 +210,30 @@ def _kinks(state):
         t, k = beam.mesh.t, round(station)
         if at_node and (not 0 < k < t.shape[1] or t[1, k - 1] != t[0, k]):
             continue  # an end
-        sides = [k - 1, k] if at_node else [int(station)] * 2
-        found = _kink(state._with_history(beam), state.u_of(beam), force, sides)
-        if found is not None:
-            angle, reach, length = found
-            who = "of a beam" if beam.name is None else f"of beam {beam.name!r}"
-            yield (f"a force at a point inside {who} bends its axis by {angle:.2g} rad within "
-                   f"sqrt(EI / N) = {reach:.2g}, and elements there are {length:.2g} long: their "
-                   "axis is smooth, so that the deflection is off by up to some per cent, and "
-                   "converges slowly. Let the beam end at the point and join another to it by "
-                   "scene.hinge, or use ElementBeamCable(3) with a node there, or elements as "
-                   "short as that")
-
-
-def _kink(beam, u, force, sides):
-    """Angle of a kink, its length due to bending stiffness, and that of the elements; or None."""
-    t = beam.mesh.t
-    r = (beam.mesh.p.T + u.reshape(-1, beam.nd // 2, 2)[:, 0])[t[:, sides]]
-    chord = (r[1] - r[0]) / np.hypot(*(r[1] - r[0]).T)[:, None]
-    left, right = np.split(beam.kernel.forces(u)[sides], 2, axis=1)
-    N = min(-left[0, 0] @ chord[0], right[1, 0] @ chord[1])
-    along = chord[0] + chord[1]
-    side = abs(along[0] * force[1] - along[1] * force[0]) / np.hypot(*along)
-    if N <= 0.0 or side < KINKED * N:
-        return None
-    EI = beam.across.bending
-    reach = sqrt(float(EI[min(max(sides), len(EI) - 1)]) / N)
-    length = float(np.max(beam.mesh.lengths[sides]))
-    return (2.0 * atan(0.5 * side / N), reach, length) if reach < FOLLOWED * length else None
+        sides, u = [k - 1, k] if at_node else [int(station)] * 2, state.u_of(beam)
+        r = (beam.mesh.p.T + u.reshape(-1, beam.nd // 2, 2)[:, 0])[t[:, sides]]
+        chord = (r[1] - r[0]) / np.hypot(*(r[1] - r[0]).T)[:, None]
+        left, right = np.split(state._with_history(beam).kernel.forces(u)[sides], 2, axis=1)
+        N = min(-left[0, 0] @ chord[0], right[1, 0] @ chord[1])
+        along = chord[0] + chord[1]
+        lateral = abs(along[0] * force[1] - along[1] * force[0]) / np.hypot(*along)
+        if N <= 0.0 or lateral < KINKED * N:
+            continue
+        # the length of the kink due to bending stiffness, and that of the elements
+        EI, length = beam.across.bending, float(np.max(beam.mesh.lengths[sides]))
+        reach = sqrt(float(EI[min(max(sides), len(EI) - 1)]) / N)
+        if reach < FOLLOWED * length:
+            who = " of a beam" if beam.name is None else _of(beam)
+            yield (f"a force at a point inside{who} bends its axis by "
+                   f"{2.0 * atan(0.5 * lateral / N):.2g} rad within sqrt(EI / N) = {reach:.2g}, "
+                   f"and elements there are {length:.2g} long: their axis is smooth, so that the "
+                   "deflection is off by up to some per cent, and converges slowly. Let the beam "
+                   "end at the point and join another to it by scene.hinge, or use "
+                   "ElementBeamCable(3) with a node there, or elements as short as that")
 
 
 def _findings(beam, stretch, turn):
-    who = "" if beam.name is None else f" of beam {beam.name!r}"
+    who = _of(beam)
     out = []
     if stretch < COMPRESSED and beam.has_sections and beam.kernel.linear:
         out.append(f"a fibre{who} is compressed to {stretch:.3g} of its length; below "
@@ -261,19 +254,10 @@ def _strained(state, beam, low, high):
     strain, hooke = max(high - 1.0, 1.0 - low), beam.kernel.linear
     if strain <= (HOOKE if hooke else UNITS) or state._eigenstrains(beam):
         return []
-    who = "" if beam.name is None else f" of beam {beam.name!r}"
     law = (f": Hooke's law, as in St. Venant-Kirchhoff, is meant for at most {HOOKE:g}, and metals "
            "yield before (ElasticPlastic); for rubber use NeoHookean" if hooke else "")
-    return [f"the strain{who} is {strain:.3g}{law}. Are E and the lengths in the same units, as Pa "
-            "and m, or MPa and mm?"]
-
-
-def _linear_findings(beam, u, base):
-    turn = np.max(np.abs(_turns(beam, u, base) - _turns(beam, base)))
-    who = "" if beam.name is None else f" of beam {beam.name!r}"
-    return [] if turn <= SMALL else [
-        f"the axis{who} turns by {turn:.3g} rad, and what is linear leaves out what is of the "
-        f"order of the square of that; beyond {SMALL:g} rad use solve_static()"]
+    return [f"the strain{_of(beam)} is {strain:.3g}{law}. Are E and the lengths in the same units, "
+            "as Pa and m, or MPa and mm?"]
 
 
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:

@@ -116,33 +116,28 @@ class Modes(NearMisses):
         >>> round(abs(float(state.displacement("right")[1])), 6)
         0.02
         """
+        state, system = self.state, self.state.system
         i = require_index("i", i, len(self.shapes))
         if amplitude is not None and displacement is not None:
             raise InputError("give amplitude or displacement, not both")
         if amplitude is None:
-            largest = (0.1 * self.state.system.size if displacement is None else
+            largest = (0.1 * system.size if displacement is None else
                        require_finite_scalar("displacement", displacement))
-            at_nodes = self.shapes[i].real[position_weights(self.state.system) > 0.0]
+            at_nodes = self.shapes[i].real[position_weights(system) > 0.0]
             amplitude = largest / np.hypot(*at_nodes.reshape(-1, 2).T).max()
-        amplitude = require_finite_scalar("amplitude", amplitude)
-        system, d = self.state.system, amplitude * self.shapes[i].real
+        d = require_finite_scalar("amplitude", amplitude) * self.shapes[i].real
         acceleration = -self.eigenvalues[i].real * d
-        inertia = system.mass.multiply(acceleration)
-        return State(system, self.state.u + d, acceleration=acceleration, inertia=inertia,
-                     load=self.state.load, message=f"mode {i}", base=self.state,
-                     multipliers=self.state.multipliers + self._joint_forces(d, inertia))
-
-    def _joint_forces(self, d, inertia):
-        """Changes of the multipliers due to a displacement and its inertia, (m,)."""
-        state, system = self.state, self.state.system
-        if not system.constraints.m:
-            return np.zeros(0)
-        u, load, t = np.array(state.u), state.load, state.load if state.t is None else state.t
-        rest = (linear_force(system, u, d, load) - system.internal_force(u, None, load) + inertia
-                - load * (linear_external_force(system, u, d) - system.external_force(u))
-                + system.constraints.curvature(u, t, state.multipliers) @ d)
-        J = system.constraints.sparse_jacobian(u, t)[:, system.constraints.free].tocsr()
-        return -spsolve((J @ J.T).tocsc(), J @ rest[system.constraints.free])
+        inertia, multipliers, c = system.mass.multiply(acceleration), state.multipliers, (
+            system.constraints)
+        if c.m:  # which balance the displacement and its inertia
+            u, load, t = np.array(state.u), state.load, state._time
+            rest = (linear_force(system, u, d, load) - system.internal_force(u, None, load)
+                    + inertia + c.curvature(u, t, multipliers) @ d
+                    - load * (linear_external_force(system, u, d) - system.external_force(u)))
+            J = c.sparse_jacobian(u, t)[:, c.free].tocsr()
+            multipliers = multipliers - spsolve((J @ J.T).tocsc(), J @ rest[c.free])
+        return State(system, state.u + d, acceleration=acceleration, inertia=inertia,
+                     load=state.load, message=f"mode {i}", base=state, multipliers=multipliers)
 
 
 @dataclass(repr=False)

@@ -25,7 +25,7 @@ from ..results.state import State
 from ..solvers.increment import Increment, Options, Route
 from ..solvers.newton import Search
 from ..solvers.newton import Steps as Rules
-from ..solvers.outcome import StaticResult, StepFailed
+from ..solvers.outcome import StaticResult, LoadStepFailed
 from .solve import displacement
 
 logger = logging.getLogger(__name__)
@@ -242,7 +242,7 @@ def run(system: System, steps: Steps | ArrayLike, increments: int = 20,
             for instant in follow(system, ends, increments, begin, rules, stable):
                 bar.update(instant.t - made.t)
                 made.add(instant)
-    except (StepFailed, ConvergenceError) as failure:
+    except (LoadStepFailed, ConvergenceError) as failure:
         raise ConvergenceError(
             f"no equilibrium found after t = {made.t:.6g}: {failure}. The error's state is the "
             "history up to there; a motion with damping (scene.integrate) goes through what has "
@@ -282,7 +282,7 @@ def _begin(system, t, start, u, rules, stable):
         if search.stabilised_by_loads:
             try:
                 result, way = search.at_rest(), AT_REST
-            except StepFailed:
+            except LoadStepFailed:
                 logger.debug("t = %.6g: not at rest", t)
         if result is None:
             result = search.find()
@@ -303,7 +303,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
     for, they take the next one as a whole, with a ModelWarning, so that the work is bounded.
 
     ``ends`` are increasing times; ``increments`` is the number of instants of a grid between two of
-    them. Increments end at each of these instants, also after cuts. Raises StepFailed or
+    them. Increments end at each of these instants, also after cuts. Raises LoadStepFailed or
     ConvergenceError.
     """
     yield begin
@@ -327,7 +327,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             smallest = stalled or size <= least
             try:
                 found = _next(system, begin, t, rules, stable, smallest)
-            except (StepFailed, ConvergenceError) as failure:
+            except (LoadStepFailed, ConvergenceError) as failure:
                 if smallest and (begin.way != AT_REST or size < 2.0 * LAST_AT_REST * most):
                     raise
                 logger.info("t = %.6g failed (%s), increment cut", t, failure)
@@ -335,8 +335,8 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
                 continue
             jumps = jumps + 1 if found.way.startswith(JUMPED) else 0
             if jumps > JUMPS:
-                raise StepFailed(f"at t = {t:.6g} even the smallest increments do not lead from "
-                                 "one equilibrium to the next")
+                raise LoadStepFailed(f"at t = {t:.6g} even the smallest increments do not lead "
+                                     "from one equilibrium to the next")
             slow = slow + 1 if size < SLOW * most else 0
             if found.result.iterations <= FEW * rules.max_iterations:
                 size = min(LARGER * size, most)
@@ -363,18 +363,18 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
         for method in ("mixed", "descent" if bounded else "newton"):
             try:
                 if method == "descent":
-                    result = search.descent("mixed", most=BOUNDED)
+                    result = search.descent(most=BOUNDED)
                 else:
                     step = Increment(system, start, 1.0, Options(
                         route, method, rules.tol, rules.max_iterations, method == "mixed", True))
                     with np.errstate(all="ignore"):  # overflow shows in the residual
                         result = step.reached(step.solve(stable))
-            except StepFailed as failure:
+            except LoadStepFailed as failure:
                 failed = failure
                 continue
             moved = largest_displacement(system, result.u - last.result.u)
             if moved > far and not smallest:
-                failed = StepFailed(f"a node moves by {moved:.3g}")
+                failed = LoadStepFailed(f"a node moves by {moved:.3g}")
                 continue
             if method == "descent":
                 result.rubbed += last.result.rubbed

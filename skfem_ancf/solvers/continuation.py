@@ -21,7 +21,7 @@ from ..results.path import CriticalPoint
 from ..results.state import MaterialPoints, State
 from .increment import rules_of
 from .iteration import CLOSED
-from .outcome import StepFailed
+from .outcome import LoadStepFailed
 
 logger = logging.getLogger(__name__)
 #: Largest number of steps.
@@ -154,12 +154,12 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
             try:
                 point, bend = _step(tracer, start, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
-                    raise StepFailed("the path turns")
+                    raise LoadStepFailed("the path turns")
                 last = abs(point.load) >= limit
                 if last:
                     point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
                 found = _between(tracer, start, point, locate) if locate and straight else []
-            except (StepFailed, ConvergenceError) as failure:  # that of a law
+            except (LoadStepFailed, ConvergenceError) as failure:  # that of a law
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
                 if step < SHORTEST * ds:
@@ -234,7 +234,7 @@ class Tracer:
             if system.symmetric:
                 point.negative = system.solver.inertia().negative
         except NO_FACTORS:
-            raise StepFailed("the tangent is singular") from None
+            raise LoadStepFailed("the tangent is singular") from None
         return drive
 
     def set_tangent(self, point: Point, after: Point | None = None) -> Point:
@@ -244,7 +244,8 @@ class Tracer:
         dF[self.system.constraints.fixed] += self.unit
         size = np.hypot(self.norm(dF), self.of_load)
         if not size > 0 or not np.isfinite(size):
-            raise StepFailed("the loads move nothing" if size == 0 else "the tangent is singular")
+            raise LoadStepFailed("the loads move nothing" if size == 0 else
+                                 "the tangent is singular")
         if after is not None and (self.weights * dF) @ (point.u - after.u) + self.of_load**2 * (
                 point.load - after.load) < 0:
             size = -size
@@ -286,7 +287,7 @@ class Tracer:
                 force, stresses = system.assemble(u, load, independent)
                 external = system.external_force(u)
             if not np.all(np.isfinite(force)):
-                raise StepFailed("the strain is not finite")
+                raise LoadStepFailed("the strain is not finite")
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.jacobian(u, load)
@@ -303,15 +304,15 @@ class Tracer:
                 dR, mR = system.solver.solve(residual, -phi)
                 dF, mF = system.solver.solve(drive, gap)
             except NO_FACTORS:
-                raise StepFailed("the tangent is singular") from None
+                raise LoadStepFailed("the tangent is singular") from None
             dF[system.constraints.fixed] += self.unit
             dl = increment(step, load - start.load, dR, dF)
             du, dm = dR + dl * dF, mR + dl * mF
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
-                raise StepFailed("the iteration leaves the path")
+                raise LoadStepFailed("the iteration leaves the path")
             work = np.sqrt(abs((residual * system.constraints.free) @ du) + abs(phi @ dm)
                            + abs(dl * (external @ du)))
-        raise StepFailed(f"no convergence in {rules.iterations} iterations")
+        raise LoadStepFailed(f"no convergence in {rules.iterations} iterations")
 
 
 def _start(tracer, branch, side):
@@ -327,7 +328,7 @@ def _start(tracer, branch, side):
     tracer.of_load = forces / system.scales.energy_of_strains if forces > 0 else 0.0
     try:
         tracer.set_tangent(point)
-    except StepFailed as failure:
+    except LoadStepFailed as failure:
         raise ConvergenceError(f"the path cannot begin: {failure}", ([point], [])) from None
     motion = tracer.norm(point.tangent)
     if motion > STILL * tracer.of_load * point.rate:

@@ -17,7 +17,7 @@ from ..core.types import Array
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, verdict)
 from ..equations.system import System
-from .outcome import Equilibrium, StaticResult, StepFailed
+from .outcome import Equilibrium, StaticResult, LoadStepFailed
 
 logger = logging.getLogger(__name__)
 
@@ -130,9 +130,19 @@ class Descent:
         small = (self._shift > 0.0 and np.max(np.abs(found[0] / self._sizes)) < SMALL
                  and not self.system.constraints.missing_supports)  # no rigid motion
         self._small = self._small + 1 if small else 0
-        if self._small == STALLED:
-            found, self._small = (found[0] + self._softest(R, found[0]), found[1]), 0
-        du[:], dm[:] = self._held_back(t, u, *found)
+        du[:], dm[:] = found
+        if self._small == STALLED:  # leave an unstable point along the softest direction
+            v, none = du, np.zeros(self.system.constraints.m)
+            for _ in range(POWERS):
+                v = self.system.solver.solve(v / self._sizes**2, none)[0]
+                v = v / (np.max(np.abs(v / self._sizes)) or 1.0)
+            du += KICK * (v if R @ v >= 0.0 else -v)
+            self._small = 0
+        for _ in range(HALVED):  # until nothing passes through an obstacle
+            if self.system.forces.passed((u, t), (u + du, t)) is None:
+                break
+            du *= 0.5
+            dm *= 0.5
         now, before = du / self._sizes, self._before
         along = now @ before / (np.sqrt(now @ now * (before @ before)) or 1.0)
         if along < -0.2:
@@ -141,22 +151,6 @@ class Descent:
             self._radius = min(1.5 * self._radius, self._largest)
         self._before = now
         return True
-
-    def _softest(self, R, v):
-        """A step along the softest direction, which leaves an unstable point."""
-        none = np.zeros(self.system.constraints.m)
-        for _ in range(POWERS):
-            v = self.system.solver.solve(v / self._sizes**2, none)[0]
-            v = v / (np.max(np.abs(v / self._sizes)) or 1.0)
-        return KICK * (v if R @ v >= 0.0 else -v)
-
-    def _held_back(self, t, u, du, dm):
-        """Shorten a correction until nothing passes through an obstacle."""
-        for _ in range(HALVED):
-            if self.system.forces.passed((u, t), (u + du, t)) is None:
-                break
-            du, dm = 0.5 * du, 0.5 * dm
-        return du, dm
 
     def _bounded(self, factorize, R, phi):
         """The correction with the smallest shift that suffices, to a factor of ten."""
@@ -251,7 +245,7 @@ def way_down(increment: Any) -> tuple[Equilibrium | None, bool]:
 
         try:
             found = descend(increment, iterate, descent)
-        except (StepFailed, *NO_FACTORS) as failure:
+        except (LoadStepFailed, *NO_FACTORS) as failure:
             logger.info("no descent at load %.6g: %s", level, failure)
             continue
         if (not options.route.proportional or start.load == 0.0
@@ -282,7 +276,7 @@ def descend(increment: Any, iterate: Callable[..., Equilibrium],
         v = directions[0][0]
         v = KICK * system.size / np.max(np.abs(v)) * v
         u = u + _side(system, descent, v, u, start.u, load) * v
-    raise StepFailed("no stable equilibrium found along the unstable directions")
+    raise LoadStepFailed("no stable equilibrium found along the unstable directions")
 
 
 def _side(system, descent, v, u, last, load):

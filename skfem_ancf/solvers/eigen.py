@@ -18,7 +18,7 @@ from ..results.modes import ROUND_OFF, Buckling, Modes
 from ..results.state import State
 from .increment import Route
 from .newton import Search, Steps
-from .outcome import StepFailed
+from .outcome import LoadStepFailed
 
 DENSE = 600  # largest number of free DOFs for the dense solver
 WINDOW = 1e-8  # smallest relative eigenvalue that is taken from an inverse
@@ -76,26 +76,22 @@ def rest_modes(system: System, k: int) -> tuple[Array, Array]:
 
 def _warn_of_turning(state, values, rigid):
     """Give a ModelWarning if the state rotates at a speed comparable with a frequency."""
-    speed = _angular_velocity(state) if np.any(state.v) else 0.0
-    values = values[values > max(rigid, TURNING * speed**2)]  # of vibrations
-    if values.size and speed**2 > TURNING * values.min():
-        warn(f"the state rotates at {speed:.3g} rad/s, and modes neglect centrifugal and Coriolis "
-             "forces, which change the square of a frequency by about the square of that speed. "
-             "Use the state at rest in a rotating frame with the centrifugal force "
-             "(docs/modes.md, Rotating beams)", ModelWarning)
-
-
-def _angular_velocity(state):
-    """The largest mass-weighted angular velocity of a beam or body."""
-    system, speeds = state.system, []
-    for member, s in zip(system.members, system.slices):
+    system, speeds = state.system, [0.0]
+    for member, s in zip(system.members, system.slices) if np.any(state.v) else ():
+        # the mass-weighted angular velocity of a beam or body
         B, v = np.zeros((system.N, 3)), np.zeros(system.N)
         x, y = state.q[s].reshape(-1, 2).T
         B[s], v[s] = member.rigid_motions(), state.v[s]
         B[s, 2] = np.column_stack([-y, x]).ravel()
         MB = np.column_stack([system.mass.multiply(b) for b in B.T])
         speeds.append(abs(np.linalg.solve(B.T @ MB, MB.T @ v)[2]))
-    return max(speeds)
+    speed = max(speeds)
+    values = values[values > max(rigid, TURNING * speed**2)]  # of vibrations
+    if values.size and speed**2 > TURNING * values.min():
+        warn(f"the state rotates at {speed:.3g} rad/s, and modes neglect centrifugal and Coriolis "
+             "forces, which change the square of a frequency by about the square of that speed. "
+             "Use the state at rest in a rotating frame with the centrifugal force "
+             "(docs/modes.md, Rotating beams)", ModelWarning)
 
 
 def _free_mass(system, tangent):
@@ -127,7 +123,7 @@ def _negative(tangent, state, shift):
     if shift < 0.0 and not system.solver.coupled:  # mostly indefinite: no factors needed
         fix(system.K.band, system.constraints.fixed)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
-    system.solver.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
+    system.solver.factorize(state.u, state._time, state.multipliers)
     return system.solver.inertia().negative
 
 
@@ -335,7 +331,7 @@ def _prestressed(system):
     search = Search(system, None, None, Steps("newton", 1e-8, 30, 1.0, 1e-4), True, False)
     try:
         found = search.load_steps("newton", Route(zero, loads=(0.0, 0.0), times=(0.0, 0.0)))
-    except StepFailed as failure:
+    except LoadStepFailed as failure:
         raise InputError("no equilibrium without loads was found for what springs and energies "
                          f"push then: {failure}. Give buckling() a state") from None
     return State(system, found.u, 0.0, found.force, multipliers=found.multipliers)

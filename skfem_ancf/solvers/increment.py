@@ -16,7 +16,8 @@ from ..equations.system import System
 from . import descent
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
                         Start, find_equilibrium)
-from .outcome import Diverging, Equilibrium, LoadStep, Soft, StaticResult, StepFailed, Unstable
+from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
+                      StaticResult, Unstable)
 from .touching import SOON, found_touching
 
 logger = logging.getLogger(__name__)
@@ -86,12 +87,12 @@ class Increment:
         self.record = LoadStep(level)
 
     def solve(self, stable: bool) -> Equilibrium:
-        """The equilibrium, a stable one if requested; raises StepFailed."""
+        """The equilibrium, a stable one if requested; raises LoadStepFailed."""
         system, start, route = self.system, self.start, self.options.route
         found = self._augmented()
         passed = system.forces.passed((start.u, route.acting(start.load)[1]), (found.u, self.time))
         if passed:
-            raise StepFailed(passed)
+            raise LoadStepFailed(passed)
         if not stable or start.unstable:
             return found
         if not stability.not_unstable(system, found.u, self.load, found.multipliers, self.time):
@@ -147,8 +148,8 @@ class Increment:
                     1.0 + contacts.firmness) - 1.0
                 contacts.harden(np.minimum(firmness, STIFFEST), found.u, self.time)
             found = self.iterate(found)
-        raise StepFailed(f"the penetration of obstacles is above its tolerance after {AUGMENTED} "
-                         "corrections of the pressure")
+        raise LoadStepFailed("the penetration of obstacles is above its tolerance after "
+                             f"{AUGMENTED} corrections of the pressure")
 
     def _touching(self):
         """Iterate, with obstacles by :mod:`skfem_ancf.solvers.touching`."""
@@ -165,7 +166,7 @@ class Increment:
         before = self.start.u, options.route.acting(self.start.load)[1]
         return found_touching(contacts, before, self.time, solve,
                               lambda u: self.system.strain_energy(u, self.time), self._response,
-                              StepFailed, options.close)
+                              LoadStepFailed, options.close)
 
     def _response(self, found):
         """The response at an equilibrium."""
@@ -183,13 +184,13 @@ class Increment:
             return self.iterate(options=options)
         try:
             return self.iterate(options=options, wary=True)
-        except StepFailed as failed:
+        except LoadStepFailed as failed:
             failure = failed
         try:
             close = self.iterate(options=options._replace(tol=max(options.tol, NEAR)),
                                  backend=backend)
             return self.iterate(close, options)
-        except StepFailed:
+        except LoadStepFailed:
             self.start.diverging = True
         if isinstance(failure, Diverging):
             return self.iterate(options=options)
@@ -197,7 +198,7 @@ class Increment:
 
     def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
                 backend: Any = None, wary: bool = False) -> Equilibrium:
-        """Iterate to equilibrium from ``begin``, by default the last one; raises StepFailed.
+        """Iterate to equilibrium from ``begin``, by default the last one; raises LoadStepFailed.
 
         ``solver`` solves the linear systems, such as a
         :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws; ``wary``
@@ -215,16 +216,16 @@ class Increment:
                 x = find_equilibrium(backend, target, rules, by, start, factors,
                                      backend.tables.at(self.time))
         except (ConvergenceError, np.linalg.LinAlgError) as failure:  # of a law
-            raise StepFailed(str(failure)) from None
+            raise LoadStepFailed(str(failure)) from None
         n = len(x.works)
         self.record.iterations += n
         self.record.force_residuals += x.residuals
         self.record.energy_residuals += x.works
         self._require_converged(x.status, n, rules)
         if system.inverted(x.u):
-            raise StepFailed("an element is turned inside out")
+            raise LoadStepFailed("an element is turned inside out")
         if lost := system.constraints.lost(x.u):
-            raise StepFailed(lost)
+            raise LoadStepFailed(lost)
         if n == 0:
             self._take_tangent(backend, target, x)
         return Equilibrium(x.u, x.multipliers, x.force)
@@ -271,14 +272,14 @@ class Increment:
             return
         if status == NOT_CONVERGED and n < rules.iterations:
             if rules.wary == WATCHED and n == 2:
-                raise Soft("the first correction is far too large")
+                raise FirstStepTooLarge("the first correction is far too large")
             raise Diverging("the first corrections do not decrease" if rules.wary == FIRST else
                             f"the corrections do not decrease in {n} iterations")
-        raise StepFailed({
+        raise LoadStepFailed({
             SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
             NOT_CONVERGED: f"no convergence in {rules.iterations} iterations"}[status])
 
-    def rescue(self, failure: StepFailed) -> Equilibrium | None:
+    def rescue(self, failure: LoadStepFailed) -> Equilibrium | None:
         """A stable equilibrium if the path has lost its stability, else None."""
         system, start, route = self.system, self.start, self.options.route
         unstable = isinstance(failure, Unstable)

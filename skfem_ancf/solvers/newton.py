@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +22,8 @@ from ..equations.system import System
 from . import descent
 from .continuation import continuation
 from .increment import Increment, Options, Route
-from .outcome import Attempt, Away, Equilibrium, Soft, StaticResult, StepFailed, Unstable
-from .strategies import STABILISED_BY_LOADS, STRATEGIES, Strategy
+from .outcome import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
+                      Unstable)
 from .touching import SOON
 
 logger = logging.getLogger(__name__)
@@ -42,23 +44,18 @@ SURE = 6
 FOLDED = 2.5
 #: Largest number of steps along the path to a limit point.
 PATH = 100
-#: "auto" tries the strategies of :mod:`skfem_ancf.solvers.strategies`, others a single iteration.
-METHODS = ("mixed", "newton", "auto")
-_NAMES = {"mixed": "the mixed iteration", "newton": "Newton's method"}
+#: Methods and their names; "auto" tries several strategies, the others are a single iteration.
+METHODS = {"mixed": "the mixed iteration", "newton": "Newton's method", "auto": ""}
 
 
 class Steps(NamedTuple):
-    """Options of load steps, see :func:`solve_static`.
-
-    With ``few``, they stop after :data:`FEW` iterations, or if the first :data:`CUT` steps fail.
-    """
+    """Options of load steps, see :func:`solve_static`."""
 
     method: str
     tol: float
     max_iterations: int
     first_step: float
     min_step: float
-    few: bool = False
 
 
 def solve_static(system: System, u: Array | None = None, method: str = "auto", tol: float = 1e-8,
@@ -67,13 +64,13 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
                  memory: Array | None = None) -> StaticResult:
     """Find the equilibrium at full load.
 
-    By default the strategies of :data:`~skfem_ancf.solvers.strategies.STRATEGIES` are tried in
-    order, first the mixed iteration in one step, until one finds a stable equilibrium; the message
-    of the result says which. ``method="mixed"`` and ``method="newton"`` use one iteration and load
-    steps: the first is ``first_step`` of the load, a failed step is cut to a quarter, an easy step
-    doubles the next. An iteration has converged when the work ``R . du`` of the correction is below
-    ``tol^2`` times the work done, and the residual in the norm ``sqrt(sum R_i^2 / K_ii)`` is below
-    ``tol`` times that of the forces; the round-off of the strain is a lower bound of both.
+    By default several strategies are tried in order, first the mixed iteration in one step, until
+    one finds a stable equilibrium; the message of the result says which. ``method="mixed"`` and
+    ``method="newton"`` use one iteration and load steps: the first is ``first_step`` of the load, a
+    failed step is cut to a quarter, an easy step doubles the next. An iteration has converged when
+    the work ``R . du`` of the correction is below ``tol^2`` times the work done, and the residual
+    in the norm ``sqrt(sum R_i^2 / K_ii)`` is below ``tol`` times that of the forces; the round-off
+    of the strain is a lower bound of both.
 
     Parameters
     ----------
@@ -130,29 +127,33 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
 
 
 class Search:
-    """The search for an equilibrium: initial state, options, and methods for strategies.
+    """The search for an equilibrium: initial state, options, and its strategies.
 
-    ``u`` (N,) and ``memory`` (n,) are initial displacement and history, or None; ``steps`` the
+    ``u`` (N,) and ``memory`` (n,) are initial displacement and history, or None; ``rules`` the
     options of load steps; ``span`` the time that passes for materials. ``stabilised_by_loads`` is
     True if the supports leave a rigid motion free, so that only loads or obstacles stabilise the
-    scene; ``loose`` is an unstabilised motion in words. ``soft`` is True if the second correction
-    of the mixed iteration did far more work than the loads, as for a slack rope. ``attempts`` lists
-    the strategies tried.
+    scene; ``touches`` if there are obstacles, or members that may touch. ``attempts`` lists the
+    strategies tried.
     """
 
-    def __init__(self, system: System, u: Array | None, memory: Array | None, steps: Steps,
+    def __init__(self, system: System, u: Array | None, memory: Array | None, rules: Steps,
                  stable: bool, progress: bool | None, span: float = 0.0) -> None:
         self.system = system = system.after(memory, span)
-        self.rules, self.stable, self.progress, self._span = steps, stable, progress, span
+        self.rules, self.stable, self.progress, self._span = rules, stable, progress, span
+        contacts, clock = system.forces.contacts, system.clock
         self.stabilised_by_loads = bool(system.constraints.missing_supports)
+        self.touches = bool(contacts.obstacles or system.forces.changing)
+        self._has_friction = bool(contacts.anchored)
+        self._auto, self._at_once = rules.method == "auto", rules.first_step == 1.0
         self.attempts: list[Attempt] = []
-        self.soft, self.loose = False, ""
-        self.furthest: StaticResult | None = None
-        self.other: StaticResult | None = None
+        #: The first correction of the mixed iteration was far too large, as for a slack rope.
+        self._too_large = False
+        self._loose = ""  # an unstabilised motion in words
+        self._furthest: StaticResult | None = None
+        self._other: StaticResult | None = None
         self._folded: StaticResult | None = None
         self._failure: Exception | None = None
         self._spent, self._unstabilised, self._unstable = 0, 0, False
-        contacts, clock = system.forces.contacts, system.clock
         times = (0.0, 1.0) if clock is None else (clock, clock)
         memory = system.histories.begin(np.zeros(system.N) if u is None else u,
                                         times[u is not None], memory is None)
@@ -172,41 +173,79 @@ class Search:
 
     def find(self) -> StaticResult:
         """The first equilibrium that a strategy finds; raises ConvergenceError if none does."""
-        for strategy in self._strategies():
+        for name, solve in self._strategies():
             self._spent = 0
             try:
-                result = strategy.run(self)
-                if result:
-                    self._require_good(result)
+                result = solve()
+                self._require_good(result)
             except KeyboardInterrupt:
-                result = self.furthest or self._beginning(self.route)
+                result = self._furthest or self._beginning(self.route)
                 raise Interrupted(f"stopped at the load level {result.load:.6g}; the exception's "
                                   "state is what has converged", result) from None
-            except StepFailed as failure:
-                self._note(strategy.name, str(failure))
+            except LoadStepFailed as failure:
+                self._note(name, str(failure))
                 self._unstable = self._unstable or isinstance(failure, Unstable)
                 self._failure = failure
-                if self._exhausted or isinstance(failure, Away):
+                if self._exhausted or isinstance(failure, UnboundedMotion):
                     break
-                if self._unstabilised == UNSTABILISED and not self.rubs:
+                if self._unstabilised == UNSTABILISED and not self._has_friction:
                     break
                 continue
-            if result:
-                self._note(strategy.name)
-                return self._done(result)
+            self._note(name)
+            return self._done(result)
         if self._folded is not None:
             return self._done(self._folded)
-        if self.other is not None:
-            self.other.doubt = self.other.doubt or (
+        if self._other is not None:
+            self._other.doubt = self._other.doubt or (
                 "there may be several stable equilibria, and the loads may lead to another one")
-            return self._done(self.other)
+            return self._done(self._other)
         raise self._lost()
 
-    def _strategies(self):
-        method = self.rules.method
-        if method != "auto":
-            return [Strategy(_NAMES[method], lambda search: search.load_steps(method))]
-        return STABILISED_BY_LOADS if self.stabilised_by_loads else STRATEGIES
+    def _strategies(self) -> Iterator[tuple[str, Callable[[], StaticResult]]]:
+        """Names and functions of strategies, in order; what applies depends on those before.
+
+        Each stops after some iterations but the last, load steps as small as may be.
+        """
+        rules, system, at_once = self.rules, self.system, self._at_once
+        if not self._auto:
+            yield METHODS[rules.method], partial(self.load_steps, rules.method)
+            return
+        size = 0.25 if at_once else rules.first_step  # smaller, if the whole load has failed
+        down = "descent", self.descent
+        newton = METHODS["newton"], partial(self.one_step, "newton")
+        loads_first = "loads before supports", self._loads_first
+        moves = at_once and self.route.proportional and (
+            system.constraints.moves or system.constraints.drives)
+        # if contacts open and close, a descent needs fewer corrections than load steps
+        early = self.stabilised_by_loads or (at_once and self.touches)
+        if self.stabilised_by_loads:  # the tangent at rest is singular
+            if moves:
+                yield loads_first
+        elif at_once:
+            yield METHODS["mixed"], partial(self.one_step, "mixed")
+            # The first correction of a slack rope is far too large. The stress of the strain
+            # corrects that, the independent stress does not.
+            if self._too_large:
+                yield newton
+        if early and self.stable:
+            yield down
+        if at_once and self.stabilised_by_loads:
+            yield newton
+        prestressed = self.route.proportional and bool(np.any(
+            system.internal_force(self.route.u, 0.0, 0.0) * system.constraints.mask))
+        if not prestressed:  # by springs
+            yield "smaller load steps", partial(self.load_steps, "mixed", size=size, few=True)
+        if self.stabilised_by_loads:
+            yield "smaller load steps of Newton's method", partial(
+                self.load_steps, "newton", size=size, few=True)
+            return
+        if at_once and not self._too_large:
+            yield newton
+        if moves:
+            yield loads_first
+        if self.stable and not early:
+            yield down
+        yield "load steps as small as may be", partial(self.load_steps, "mixed")
 
     def _note(self, name, failure=""):
         self.attempts.append(Attempt(name, self._spent, failure))
@@ -215,9 +254,32 @@ class Search:
             logger.info("%s: %s", self.attempts[-1], failure)
 
     def _done(self, result):
-        own = any(hasattr(load, "psi") for load in self.system.loads)
-        if not result.doubt and (len(self.attempts) > 1 or (own and result.iterations > SURE)):
-            result.doubt = self._limit()
+        """The result with its message.
+
+        If it was not found easily, the path from the reference configuration is followed: has the
+        load a maximum below 1?
+        """
+        system, loads = self.system, [0.0]
+        own = any(hasattr(load, "psi") for load in system.loads)
+        if (not result.doubt and (len(self.attempts) > 1 or (own and result.iterations > SURE))
+                and self._auto and self.stable and self.route.proportional
+                and not (self.stabilised_by_loads or self.touches) and system.clock is None):
+
+            def turned(point: Any) -> bool:
+                loads.append(point.load)
+                return point.load < loads[-2] or point.stable is False
+
+            try:
+                _, critical = continuation(system, PATH, max_load=1.0, until=turned, locate=1e-6,
+                                           progress=False)
+            except (AncfError, *NO_FACTORS):
+                critical = []
+            limits = [x.load for x in critical if x.kind == "limit" and x.load > 0.0]
+            if limits and limits[0] < 1.0:
+                result.doubt = (
+                    "the path from the reference configuration has a limit point at the load level "
+                    f"{limits[0]:.4g}; the equilibrium found lies beyond it, and need not be the "
+                    "only one")
         result.converged, result.attempts = True, tuple(self.attempts)
         result.message = (f"converged in {len(result.steps)} load steps, {result.iterations} "
                           f"iterations, by {self.attempts[-1].strategy}")
@@ -227,40 +289,23 @@ class Search:
             result.message += f"; {result.doubt}"
         return result
 
-    def _limit(self):
-        """Doubt about an equilibrium that was not found easily, or "".
-
-        The path from the reference configuration is followed: has the load a maximum below 1?
-        """
-        system, loads = self.system, [0.0]
-        if (self.rules.method != "auto" or not (self.stable and self.route.proportional)
-                or self.stabilised_by_loads or self.touches or system.clock is not None):
-            return ""
-
-        def turned(point: Any) -> bool:
-            loads.append(point.load)
-            return point.load < loads[-2] or point.stable is False
-
-        try:
-            _, critical = continuation(system, PATH, max_load=1.0, until=turned, locate=1e-6,
-                                       progress=False)
-        except (AncfError, *NO_FACTORS):
-            return ""
-        limits = [point.load for point in critical if point.kind == "limit" and point.load > 0.0]
-        return "" if not limits or limits[0] >= 1.0 else (
-            f"the path from the reference configuration has a limit point at the load level "
-            f"{limits[0]:.4g}; the equilibrium found lies beyond it, and need not be the only one")
-
     def _lost(self):
         """The ConvergenceError of a search that failed."""
-        result = self.furthest or self._beginning(self.route)
+        result = self._furthest or self._beginning(self.route)
         failure, load = self._failure, getattr(self._failure, "load", 1.0)
         text = (f"no equilibrium found beyond the load level {result.load:.6g}: {failure} at "
                 f"{load:.6g}; the smallest step is {self.rules.min_step:g}. ")
-        if self.rules.method == "auto":
+        if self._auto:
             text += f"Tried: {_listed(self.attempts)}. "
         if self.stabilised_by_loads:
-            text = f"{self._missing()}. Tried: {_listed(self.attempts)}"
+            text = (f"{self.system.constraints.missing_supports}. No stable equilibrium was found "
+                    "in which the loads hold what is free")
+            if self._loose:
+                text += f": nothing holds {self._loose}"
+            if self.touches and not self._has_friction:
+                text += (". Obstacles without friction hold nothing along their surface: friction= "
+                         "does")
+            text += f". Tried: {_listed(self.attempts)}"
         elif isinstance(failure, Unstable):
             text += ("No stable equilibrium was found from there: stable=False accepts the "
                      "unstable one, scene.continuation() follows the path")
@@ -269,72 +314,25 @@ class Search:
                      "increments; or a larger max_iterations")
         else:
             text += ("Beyond a limit point there is none: use scene.continuation(). Otherwise more "
-                     "elements or a larger max_iterations may help")
+                     "elements or a larger max_iterations may help, or scene.run() with loads and "
+                     "supports that grow in another order")
         result.message, result.attempts = text, tuple(self.attempts)
         return ConvergenceError(text, result)
-
-    def _missing(self):
-        """What could stabilise a scene that neither supports nor loads stabilise, in words."""
-        text = self.system.constraints.missing_supports
-        text += ". No stable equilibrium was found in which the loads hold what is free"
-        if self.loose:
-            text += f": nothing holds {self.loose}"
-        if self.touches and not self.rubs:
-            text += ". Obstacles without friction hold nothing along their surface: friction= does"
-        return text
 
     @property
     def _exhausted(self):
         """True if all strategies together have reached :data:`MOST`."""
         spent = self._spent + sum(attempt.iterations for attempt in self.attempts)
-        return self.touches and self.at_once and self.rules.method == "auto" and spent >= MOST
+        return self.touches and self._at_once and self._auto and spent >= MOST
 
-    # for strategies
-
-    @property
-    def at_once(self) -> bool:
-        """True if the whole load may be applied in one step."""
-        return self.rules.first_step == 1.0
-
-    @property
-    def prestressed(self) -> bool:
-        """True if springs are prestressed."""
-        force = self.system.internal_force(self.route.u, 0.0, 0.0)
-        return self.route.proportional and bool(np.any(force * self.system.constraints.mask))
-
-    @property
-    def touches(self) -> bool:
-        """True if there are obstacles, or bodies that may touch."""
-        return bool(self.system.forces.contacts.obstacles or self.system.forces.changing)
-
-    @property
-    def rubs(self) -> bool:
-        """True if there is friction."""
-        return bool(self.system.forces.contacts.anchored)
-
-    @property
-    def smaller_step(self) -> float:
-        """The first load step after the whole load has failed."""
-        return 0.25 if self.at_once else self.rules.first_step
-
-    @property
-    def supports_move(self) -> bool:
-        """True if supports have displacements, so that loads can be applied first."""
-        moves = self.system.constraints.moves or self.system.constraints.drives
-        return self.route.proportional and moves
+    # strategies
 
     def at_rest(self) -> StaticResult:
-        """The initial displacement, if it is an equilibrium; raises StepFailed."""
+        """The initial displacement, if it is an equilibrium; raises LoadStepFailed."""
         result = self._beginning(self.route)
         step = Increment(self.system, result, 1.0, self._options(self.route, "mixed")._replace(
             most=0))
         return step.reached(step.resting() or step.iterate())
-
-    def load_steps(self, method: str, route: Route | None = None,
-                   start: StaticResult | None = None, **changes: Any) -> StaticResult:
-        """The equilibrium at the end of a route by load steps, with changed options."""
-        rules = self.rules._replace(method=method, **changes)
-        return self._load_steps(route or self.route, start, rules)
 
     def one_step(self, method: str, route: Route | None = None) -> StaticResult:
         """The equilibrium at the end of a route in one step."""
@@ -347,56 +345,60 @@ class Search:
         try:
             with np.errstate(all="ignore"):  # overflow shows in the residual
                 found = step.solve(self._wanted(route))
-            if self._elsewhere(route, found):
-                self.other = self.other or step.reached(found)
+            # a later strategy may find an equilibrium on the side away from the load
+            if (self.attempts and self.stable and route.proportional
+                    and not (self.stabilised_by_loads or self.touches)
+                    and not descent.heads_on(self.system, result, found.u, 1.0)):
+                self._other = self._other or step.reached(found)
                 raise Unstable("the equilibrium found lies on the side away from the load", found)
-        except Soft:
-            self.soft = True
+        except FirstStepTooLarge:
+            self._too_large = True
             raise
         finally:
             self._spent += step.record.iterations
         return step.reached(found)
 
-    def descent(self, method: str, eased: bool = False, route: Route | None = None,
-                most: int = descent.DESCENT) -> StaticResult:
+    def _loads_first(self):
+        """Apply the loads with fixed supports, then move the supports."""
+        loaded = self.route._replace(times=(0.0, 0.0))
+        start = self.descent(loaded) if self.stabilised_by_loads else (
+            self.one_step("newton", loaded))
+        moved = self.route._replace(u=start.u, loads=(1.0, 1.0))
+        start.load = 0.0
+        return self.load_steps("newton", moved, start, few=True)
+
+    def descent(self, route: Route | None = None, most: int = descent.DESCENT) -> StaticResult:
         """The equilibrium at full load by a descent of ``most`` iterations.
 
-        ``eased``: starting from the equilibrium without friction.
+        It goes to a minimum of the potential, by a trust-region method.
         """
         route = route or self.route
-        result, options = self._beginning(route), self._options(route, method)
+        result, options = self._beginning(route), self._options(route, "mixed")
         step = Increment(self.system, result, 1.0, options)
-        system, contacts = step.system, step.system.forces.contacts
-        if (not (system.symmetric or self.stabilised_by_loads or self.rubs)
+        system = step.system
+        if (not (system.symmetric or self.stabilised_by_loads or self._has_friction)
                 and not stability.has_potential(system, route.u, 1.0)):
-            raise StepFailed("the loads have no potential")
+            raise LoadStepFailed("the loads have no potential")
         down, far = descent.Descent(system), options._replace(
             most=min(most, 7 * self.rules.max_iterations))
         # descents start where obstacles have moved to
         times = (route.acting(level)[1] for level in (0.0, 1.0))
         if passed := system.forces.passed(*((result.u, t) for t in times)):
-            raise StepFailed(passed)
-
-        def iterate(begin: Any) -> Equilibrium:
-            return step.iterate(begin, far, down)
+            raise LoadStepFailed(passed)
 
         try:
             with np.errstate(all="ignore"):
-                if eased:
-                    with contacts.eased():
-                        found = iterate((result.u, result.multipliers))
-                else:
-                    found = descent.descend(step, iterate, down)
-                if contacts.obstacles:
+                found = descent.descend(step, lambda begin: step.iterate(begin, far, down), down)
+                if system.forces.contacts.obstacles:
                     found = self._firm(found, step)
         except NO_FACTORS as error:
-            raise StepFailed("a tangent has no factors") from error
-        except StepFailed as failure:
+            raise LoadStepFailed("a tangent has no factors") from error
+        except LoadStepFailed as failure:
             away = down.onward() if self.stabilised_by_loads else None
             if away is None:
                 raise
-            self.loose = stability.motion_in_words(system, *away)
-            raise Away(f"{failure}, and the scene goes on") from None
+            self._loose = stability.motion_in_words(system, *away)
+            raise UnboundedMotion(f"{failure}, and the scene goes on") from None
         finally:
             self._spent += step.record.iterations
         return step.reached(found)
@@ -404,8 +406,7 @@ class Search:
     # implementation
 
     def _options(self, route, method, watched=False):
-        watched = (watched and method == "mixed" and self.rules.method == "auto"
-                   and not self.touches)
+        watched = watched and method == "mixed" and self._auto and not self.touches
         return Options(route, method, self.rules.tol, self.rules.max_iterations, watched)
 
     def _wanted(self, route):
@@ -413,41 +414,29 @@ class Search:
         return self.stable and route.acting(1.0) == (1.0, self.route.times[1])
 
     def _require_good(self, result):
-        """Raise StepFailed if a rigid motion is not stabilised, or an axis is folded."""
-        if self.stabilised_by_loads and not stability.is_stabilised(
-                self.system.after(result.memory), result.u, result.multipliers):
-            self.loose, self._unstabilised = self._loose(result.u), self._unstabilised + 1
-            raise StepFailed("the loads do not hold what the supports leave free" + (
-                f": nothing holds {self.loose}" if self.loose else ""))
-        if self.rules.method == "auto" and self._folds(result):
-            again = self._folded is not None and np.allclose(
-                result.u, self._folded.u, rtol=0.0, atol=1e-6 * self.system.size)
-            self._folded = self._folded or result
-            if not again:  # if two strategies find it, the mesh is too coarse: a warning says so
-                raise StepFailed("the axis folds back within an element")
-
-    def _folds(self, result):
-        """True if an axis folds back, or turns too far, within an element."""
+        """Raise LoadStepFailed if a rigid motion is not stabilised, or an axis is folded."""
         system = self.system
+        if self.stabilised_by_loads and not stability.is_stabilised(
+                system.after(result.memory), result.u, result.multipliers):
+            self._loose, self._unstabilised = "", self._unstabilised + 1
+            try:  # from the last factors
+                for v, _ in descent.Descent(system).directions(1):
+                    self._loose = stability.motion_in_words(system, result.u, v)
+            except NO_FACTORS:
+                pass
+            raise LoadStepFailed("the loads do not hold what the supports leave free" + (
+                f": nothing holds {self._loose}" if self._loose else ""))
+        if not self._auto:
+            return
         bends = [bent(beam, result.u[s]) for beam, s in zip(system.beams, system.slices)]
         result.turns = [turn for turn, _ in bends]
-        return any(folded or (turn > FOLDED and beam.element.axis_degree <= 7)
-                   for beam, (turn, folded) in zip(system.beams, bends))
-
-    def _loose(self, u):
-        """An unstabilised motion of an equilibrium, in words, from the last factors."""
-        try:
-            directions = descent.Descent(self.system).directions(1)
-        except NO_FACTORS:
-            return ""
-        return stability.motion_in_words(self.system, u, directions[0][0]) if directions else ""
-
-    def _elsewhere(self, route, found):
-        """True if a later strategy found an equilibrium on the side away from the load."""
-        if (not (self.attempts and self.stable and route.proportional) or self.stabilised_by_loads
-                or self.touches):
-            return False
-        return not descent.heads_on(self.system, self._beginning(route), found.u, 1.0)
+        if any(folded or (turn > FOLDED and beam.element.axis_degree <= 7)
+               for beam, (turn, folded) in zip(system.beams, bends)):
+            again = self._folded is not None and np.allclose(
+                result.u, self._folded.u, rtol=0.0, atol=1e-6 * system.size)
+            self._folded = self._folded or result
+            if not again:  # if two strategies find it, the mesh is too coarse: a warning says so
+                raise LoadStepFailed("the axis folds back within an element")
 
     def _firm(self, found, step):
         """Solve again with contact that is stiff enough."""
@@ -464,13 +453,20 @@ class Search:
                             np.zeros(system.N), [], False, "no load step has converged",
                             memory=self._memory)
 
-    def _load_steps(self, route, result, rules):
-        stable = self._wanted(route)
-        result = result or self._beginning(route)
-        size, cuts, spent = rules.first_step, 0, 0
-        if size < self.rules.first_step:  # a strategy has tried the larger step
+    def load_steps(self, method: str, route: Route | None = None,
+                   result: StaticResult | None = None, size: float | None = None,
+                   few: bool = False) -> StaticResult:
+        """The equilibrium at the end of a route by load steps, from a result on.
+
+        The first one has a ``size``. With ``few``, they stop after :data:`FEW` iterations, or if
+        the first :data:`CUT` steps fail.
+        """
+        rules, route = self.rules, route or self.route
+        stable, result = self._wanted(route), result or self._beginning(route)
+        size, cuts, spent = size or rules.first_step, 0, 0
+        if size < rules.first_step:  # a strategy has tried the larger step
             result.rejected, cuts = 1, int(self._unstable)
-        options = self._options(route, rules.method, watched=rules.few)
+        options = self._options(route, method, watched=few)
         patience = 3 if self.touches else 1
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
             while result.load < 1.0:
@@ -481,15 +477,15 @@ class Search:
                 try:
                     with np.errstate(all="ignore"):  # overflow shows in the residual
                         found = step.solve(stable)
-                except StepFailed as failure:
+                except LoadStepFailed as failure:
                     result.rejected += 1
                     cuts += isinstance(failure, Unstable)
                     logger.info("load %.6g failed (%s), step cut", load, failure)
                     size, found = 0.25 * (load - result.load), None
-                    many = rules.few and spent + step.record.iterations >= FEW * patience
+                    many = few and spent + step.record.iterations >= FEW * patience
                     if stable and (cuts > descent.CUTS or size < rules.min_step or many):
                         found = step.rescue(failure)
-                    none = rules.few and not result.steps and result.rejected > CUT
+                    none = few and not result.steps and result.rejected > CUT
                     none = none or self._exhausted
                     if found is None and (size < rules.min_step or many or none):
                         failure.load = load
@@ -503,17 +499,17 @@ class Search:
                 bar.update(size)
                 # one assignment, so that an interrupt finds the old or the new result
                 result = step.reached(found)
-                if route is self.route and (self.furthest is None
-                                            or result.load > self.furthest.load):
-                    self.furthest = result  # for errors
+                if route is self.route and (self._furthest is None
+                                            or result.load > self._furthest.load):
+                    self._furthest = result  # for errors
                 cuts = 0
                 logger.info("load %.6g converged in %d iterations", load, step.record.iterations)
                 if step.record.iterations <= patience * max(8, rules.max_iterations // 3):
                     size *= 2.0
-                many = rules.few and spent >= FEW * patience and not (
+                many = few and spent >= FEW * patience and not (
                     result.doubt and not self.touches)
                 if result.load < 1.0 and (many or self._exhausted):
-                    raise StepFailed(f"the full load was not reached in {spent} iterations")
+                    raise LoadStepFailed(f"the full load was not reached in {spent} iterations")
         return result
 
 

@@ -101,25 +101,25 @@ class Equilibrium(NamedTuple):
     force: Array
 
 
-class StepFailed(Exception):
+class LoadStepFailed(Exception):
     """A load step did not converge; the message says why, ``load`` at which level."""
 
     load = 1.0
 
 
-class Diverging(StepFailed):
+class Diverging(LoadStepFailed):
     """The first corrections of a load step did not decrease."""
 
 
-class Away(StepFailed):
+class UnboundedMotion(LoadStepFailed):
     """A descent goes on in a motion that nothing restrains."""
 
 
-class Soft(StepFailed):
+class FirstStepTooLarge(LoadStepFailed):
     """The second correction of the mixed iteration did far more work than the loads."""
 
 
-class Unstable(StepFailed):
+class Unstable(LoadStepFailed):
     """A load step ended at an unstable equilibrium, ``found``."""
 
     def __init__(self, message: str, found: Equilibrium) -> None:
