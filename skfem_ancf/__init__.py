@@ -41,6 +41,7 @@ from .results.output import Extreme
 from .results.state import Reaction, State
 from .scene.design import Design
 from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
+from .scene.motion_design import MotionDesign
 from .scene.frame import Frame
 from .scene.plan import Plan
 from .scene.linear_model import LinearModel, StateSpace
@@ -117,6 +118,7 @@ __all__ = [
     "MissingExtra",
     "ModelWarning",
     "Modes",
+    "MotionDesign",
     "Motor",
     "MovingForce",
     "NameUnknown",

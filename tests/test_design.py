@@ -11,7 +11,7 @@ from skfem_ancf import (Beam, Circle, Design, ElementBeamANCF, ElementBeamANCFCu
 S = np.linspace(0, 1, 5)
 
 
-def difference(design, p, step=2e-3):
+def difference(design, p, step=2e-3, kind=Design):
     """Of whole solutions, of fourth order, (r, n)."""
     out = []
     for k, x in enumerate(p):
@@ -20,7 +20,7 @@ def difference(design, p, step=2e-3):
         for factor, weight in ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12)):
             q = np.array(p, dtype=float)
             q[k] += factor * h
-            parts.append(weight / h * Design(design.build, design.readings).values(q))
+            parts.append(weight / h * kind(design.build, design.readings).values(q))
         out.append(sum(parts))
     return np.array(out).T
 

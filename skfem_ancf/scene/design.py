@@ -99,7 +99,7 @@ class Design:
         self._values: Any = None
         self._J: Any = None
         self._groups: list[tuple[Array, Array]] | None = None
-        self._static = not all(isinstance(one, EigenReading) and not one.loaded
+        self._static = not readings or not all(isinstance(one, EigenReading) and not one.loaded
                                for one in self.readings)
         self.state: Any = None
 
@@ -390,9 +390,9 @@ class Gradient(Design):
         """Of the displacement, for each of ``wrt`` an array (N, ...)."""
         require_smooth(self.state)
         self._frozen, self._owners = [], np.zeros(0, int)
-        P = self._changes(self._p, self.state)
-        found = changes_of(tangent_of(self.state, P), P, self.state.system.N)
-        return self._shaped(found[:self.state.system.N])
+        P, N = self._changes(self._p, self.state), self.state.system.N
+        P = P[:N + self.state.system.constraints.m]
+        return self._shaped(changes_of(tangent_of(self.state, P), P, N)[:N])
 
 
 def require_smooth(state: State) -> None:

@@ -1,0 +1,108 @@
+"""Derivatives of motions by parameters."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt,
+                        MeshBeam, MotionDesign, NameUnknown, RigidBody, Scene, StVenantKirchhoff)
+from tests.test_design import S, beam_of, difference
+
+
+def agree(design, p, rtol=1e-6):
+    values, found = design(p)
+
+    def other(build, readings):
+        return MotionDesign(build, readings, design.t_end, design.dt, design.scheme, design.static)
+
+    exact = difference(design, p, 1e-3, other)
+    assert values.shape == (len(found),) and found.shape == exact.shape
+    gap = np.abs(found - exact).max(axis=0) / np.abs(exact).max(axis=0)
+    assert np.all(gap < rtol), gap
+
+
+def test_mass_on_a_spring():
+    """u = v / omega sin(omega t), and its derivatives by stiffness, mass and velocity."""
+    def build(p):
+        k, mass, v = p
+        body = RigidBody(mass=mass, inertia=1.0, name="mass")
+        scene = Scene(body).initial_velocity(lambda x: np.array([v + 0 * x[0], 0 * x[0]]), body)
+        scene.spring(k, (("mass", (0, 0)), ("ground", (-1e4, 0))))
+        return scene.sensor("u", "displacement", at=body)
+
+    k, m, v = p = [8.0, 2.0, 0.5]
+    design = MotionDesign(build, ["u"], 0.6, 0.02, "newmark")
+    values, found = design(p)
+    t, w = design.history.t, np.sqrt(k / m)
+    u = v / w * np.sin(w * t)
+    by_w = -u / w + v / w * t * np.cos(w * t)
+    assert np.allclose(values.reshape(len(t), 2)[:, 0], u, atol=1e-4)
+    expected = np.column_stack([by_w * w / (2 * k), -by_w * w / (2 * m), u / v])
+    assert np.allclose(found.reshape(len(t), 2, 3)[:, 0], expected, atol=2e-4)
+    agree(MotionDesign(build, ["u"], 0.1, 0.02, "hht"), p)
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
+def test_a_damped_pendulum(element):
+    def build(p):
+        E, height, density, g, damping = p
+        beam = Beam(MeshBeam.init_line([0, 0.5, 1], height), element,
+                    StVenantKirchhoff(E, 0.3, density), width=0.02, damping=KelvinVoigt(damping))
+        scene = Scene(beam).pin("left").gravity((0, -g))
+        return scene.sensor("tip", "displacement", at=(1, 0)).sensor("v", "velocity", at=(1, 0))
+
+    agree(MotionDesign(build, ["tip", "v"], 0.24, 0.03), [1e6, 0.05, 1000.0, 9.81, 1e-3])
+
+
+def test_a_cantilever_released_with_joints():
+    """From a static solution that depends on the parameters, with a body welded to the end."""
+    def build(p):
+        E, mass, F = p
+        beam = Beam(MeshBeam.init_line(S, 0.05), ElementBeamANCF(2),
+                    StVenantKirchhoff(E, 0.3, 1000.0), width=0.02, name="beam")
+        body = RigidBody(mass=mass, inertia=0.01, position=(1.1, 0.0), name="body")
+        scene = Scene(beam, body).clamp("left", "beam")
+        scene.weld(("beam", "right"), (body, (1.0, 0.0)))
+        scene.point_force((0, -F), at=(0.5, 0), beam="beam", amplitude=lambda t: np.cos(20 * t))
+        return scene.sensor("body", "position", at=body)
+
+    agree(MotionDesign(build, ["body"], 0.2, 0.01, static=True), [2e6, 0.2, 4.0])
+
+
+def test_a_fit_of_damping_and_modulus():
+    def build(p):
+        beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.02), ElementBeamCable(5),
+                    StVenantKirchhoff(1e6 * p[0], 0.3, 1000.0), width=0.02,
+                    damping=KelvinVoigt(1e-2 * p[1]))
+        scene = Scene(beam).clamp("left").point_force((0, -0.02), at=(1, 0))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    design = MotionDesign(build, ["tip"], 0.6, 0.05)
+    measured = design.values([2.0, 0.7])
+    found = least_squares(lambda p: design.values(p) - measured, [1.5, 1.0], design.jacobian)
+    assert np.allclose(found.x, [2.0, 0.7], rtol=1e-4)
+
+
+def test_what_has_no_derivative_is_said():
+    def build(p):
+        scene = Scene(beam_of(p[0])).clamp("left").gravity((0, -9.81))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    with pytest.raises(InputError, match="'generalized-alpha'"):
+        MotionDesign(build, ["tip"], 0.1, 0.01, "energy-momentum")
+    with pytest.raises(NameUnknown, match="tip"):
+        MotionDesign(build, ["tap"], 0.1, 0.01).values([2e6])
+
+    def moved(p):
+        scene = Scene(beam_of()).fix("left", "r^1").fix("right", "r^2")
+        scene.fix("left", "r^2", lambda t: p[0] * t**2)
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    with pytest.raises(InputError, match="prescribed motion"):
+        MotionDesign(moved, ["tip"], 0.03, 0.01)([0.1])
+
+    def touching(p):
+        return build(p).obstacle(Circle((0.5, -0.3), 0.1))
+
+    with pytest.raises(InputError, match="smooth forces"):
+        MotionDesign(touching, ["tip"], 0.03, 0.01)([2e6])
