@@ -315,7 +315,7 @@ class Segment:
             self.stretch = self.stretch + change
             if self.stress_given:
                 self.S[0] += E * self.stretch * change
-            if np.all(largest(change, EACH) < 1e-12 * largest(self.eps[0], EACH)):
+            if (largest(change, EACH) < 1e-12 * largest(self.eps[0], EACH)).all():
                 break
 
     def _turn(self):
@@ -389,15 +389,15 @@ class Segment:
                                cross(P2, self.rY) / det - viscous[1]])
             self._shear()
             self.change = largest(self.stretch - before, EACH)
-            if np.all(self.change <= largest(self.stretch - 1.0, EACH) * (
-                    SETTLED if k < ROUNDS - 1 else SLOWLY)):
+            if (self.change <= largest(self.stretch - 1.0, EACH) * (
+                    SETTLED if k < ROUNDS - 1 else SLOWLY)).all():
                 break
         self._balance()
         self._take_samples()
         self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
         self.strain = self._fibres(self.S / self.grade)[0] if self.rigid else (
             self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0))
-        if not np.all(np.isfinite(self.strain)):
+        if not np.isfinite(self.strain).all():
             raise NotFound(DIVERGED)
 
     # step 4
@@ -444,19 +444,19 @@ def _turned(f, angle):
     return np.array([c * f[0] + s * f[1], c * f[1] - s * f[0]])
 
 
-def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
+def strain_of_stress(law: Law, stress: Array, strain: Array,
+                     unknown: tuple[int, ...] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
     """The strain with a given stress under a law, by Newton's method; both (3, ...).
 
     Only the consecutive components ``unknown`` of ``strain`` are solved for.
     """
-    k = list(unknown)
     if isinstance(law, LinearLaw):
-        gap, some = stress - law.stress(strain), slice(k[0], k[-1] + 1)
-        strain = strain.astype(gap.dtype)
-        strain[some] += (law.compliance(tuple(unknown)) @ gap[some].reshape(len(k), -1)).reshape(
-            gap[some].shape)
+        gap, some = stress - law.stress(strain), slice(unknown[0], unknown[-1] + 1)
+        strain, C = strain.astype(gap.dtype), law.compliance(unknown)
+        strain[some] += C.dot(gap[some].reshape(C.shape[1], -1)).reshape(gap[some].shape)
         return strain
+    k = list(unknown)
     strain = np.array(strain, dtype=np.result_type(strain, stress, float))
     with np.errstate(all="ignore"):
         for _ in range(30):
@@ -564,7 +564,8 @@ class Recovery:
         """dS_xx / deps_xx at constant S_yy and S_xy, at strains (3, n, m)."""
         return self.by_law(_axial, strain)
 
-    def strain_of(self, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2)) -> Array:
+    def strain_of(self, stress: Array, strain: Array, unknown: tuple[int, ...] = (0, 1, 2)
+                  ) -> Array:
         """:func:`strain_of_stress` with the law of each point, shapes (3, n, m)."""
         return self.by_law(partial(strain_of_stress, unknown=unknown), stress, strain)
 
@@ -627,5 +628,5 @@ class Recovery:
         for k in np.unique(segment):
             on = segment == k
             values = self.segments[k].result(s[on])[:, rows]
-            out[:, on] = np.einsum("nrm,nm->rn", values, weights[on])
+            out[:, on] = (values @ weights[on][..., None])[..., 0].T
         return out

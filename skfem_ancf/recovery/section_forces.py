@@ -74,8 +74,7 @@ class ArcLength:
 
     def at(self, e: Array, xi: Array) -> Array:
         """Arc length at xi of elements e, both of shape (n,)."""
-        return self.nodes[e] + np.einsum("...k,...k->...", chebvander(
-            2.0 * xi - 1.0, ALONG), self._inside[e])
+        return self.nodes[e] + (chebvander(2.0 * xi - 1.0, ALONG) * self._inside[e]).sum(axis=-1)
 
 
 class Interval(NamedTuple):
@@ -111,8 +110,8 @@ class Interval(NamedTuple):
         x, w = gauss(len(self.nodes) * (2 if self.curved else 1))
         s = ends[:, None] * x
         slope = 0.5 * np.pi * np.sin(np.pi * s) if self.curved else 1.0 + 0.0 * s
-        return (self.high - self.low) * np.einsum("kg,kgn->kn", ends[:, None] * w * slope,
-                                                  self.weights(s))
+        w = ends[:, None] * w * slope
+        return (self.high - self.low) * (w[:, None] @ self.weights(s))[:, 0]
 
 
 class AcrossPoints(NamedTuple):
@@ -236,10 +235,19 @@ class Sections:
         self.beam, self.e, eta = beam, e, np.atleast_1d(eta)
         shape = len(e), eta.shape[-1]
         self.X = np.array([np.broadcast_to(xi[:, None], shape), np.broadcast_to(eta, shape)])
-        self.J = (mapping or beam.mesh.mapping()).DF(self.X, e)
-        self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
+        self._mapping = mapping or beam.mesh.mapping()
         self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(
             *Sections(beam, e, xi).J[:, 0]) if lifted else None
+
+    @cached_property
+    def J(self) -> Array:
+        """Derivatives of the reference position by xi and eta, (2, 2, n, k)."""
+        return self._mapping.DF(self.X, self.e)
+
+    @property
+    def volume(self) -> Array:
+        """The determinant of :attr:`J`."""
+        return cross(self.J[:, 0], self.J[:, 1])
 
     @cached_property
     def _functions(self):
@@ -366,7 +374,7 @@ class SectionForces:
                      np.asarray(t, dtype=float)[:, None, None])
                 force = t * np.hypot(*at.J[:, 0])
             on = on + factor * load.faces[side][e][:, None] * force
-        if np.any(on):  # a circle has no face
+        if on.any():  # a circle has no face
             breadth = self.beam.across.face(side, at.X, e)
             on = breadth * on
         return at, on + self.sampled(at, side)
@@ -381,7 +389,7 @@ class SectionForces:
         for layer, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
             inside = Sections(beam, e, xi, eta, self.lifted)
             body = self.body(inside)
-            if np.any(body):
+            if body.any():
                 volume = inside.volume if beam.mesh.is_straight else (
                     beam.mesh.mapping().full_volume(inside.X, e))  # of sections of full height
                 size = beam.across.breadth(layer, inside.X, e) * v * volume
@@ -417,7 +425,7 @@ class SectionForces:
 
     def _size(self, R, M):
         """The largest force times the height, plus the largest moment."""
-        return np.max(np.abs(R)) * self.beam.mesh.height + np.max(np.abs(M))
+        return np.abs(R).max() * self.beam.mesh.height + np.abs(M).max()
 
     def viscous_middles(self) -> tuple[Array, Array]:
         """Viscous force (2, ne) and moment (ne,) in the middle of elements."""
@@ -448,8 +456,8 @@ class SectionForces:
         for end, weights in ((0, till), (1, till - w)):
             R = self.R[end][e].T
             M = (self.M[end][e] + cross(self.q[e, end * self.q.shape[1] // 2].T - r, R)
-                 - np.sum(weights * turning, axis=-1))
-            out.append((R - np.sum(weights * f, axis=-1), M))
+                 - (weights * turning).sum(axis=-1))
+            out.append((R - (weights * f).sum(axis=-1), M))
         (R0, M0), (R1, M1) = out
         for k, station, f in self._points:
             on = e == k
@@ -468,8 +476,9 @@ class SectionForces:
         ne = mesh.nelements
         stations = list(stations) + [s for _, load in loads for s in load.stations]
         self._acted = _snapped(stations)
-        ends = np.setdiff1d(mesh.t[0], mesh.t[1]), np.setdiff1d(mesh.t[1], mesh.t[0])
-        stations += [0.0, ne, *(station_of_node(mesh, k) for k in np.concatenate(ends)),
+        begins, ends = np.zeros((2, mesh.p.shape[1]), dtype=bool)
+        begins[mesh.t[0]], ends[mesh.t[1]] = True, True
+        stations += [0.0, ne, *(station_of_node(mesh, k) for k in np.flatnonzero(begins != ends)),
                      *(np.nonzero(mesh.t[1, :-1] != mesh.t[0, 1:])[0] + 1.0), *across.jumps]
         for _, load in self._faces:
             for side, face in enumerate(load.faces):
@@ -505,8 +514,8 @@ class SectionForces:
         R[mesh.t[0]] -= self.R[0]
         M[mesh.t[0]] -= self.M[0]
         size = max(self._size(self.R, self.M), BALANCED * self._pushed)
-        places = np.max(np.abs((self.q.imag if self.small else self.q)[:, 0]))
-        round_off = UNLOADED * places / np.min(mesh.lengths) * (
+        places = np.abs((self.q.imag if self.small else self.q)[:, 0]).max()
+        round_off = UNLOADED * places / mesh.lengths.min() * (
             beam.kernel.scale / mesh.lengths.sum() * mesh.height)
         if size <= round_off:
             raise NotRecovered("the beam has no load")
@@ -514,10 +523,10 @@ class SectionForces:
         place[mesh.t[0]], place[mesh.t[1]] = np.arange(ne), 1.0 + np.arange(ne)
         jump = (np.abs(R).max(axis=-1) * mesh.height + np.abs(M)) / size
         jump[np.isin(place, self._acted)] = 0.0
-        if np.max(jump) > (UNBALANCED if self._acceleration is None else UNBALANCED_MOTION):
+        if jump.max() > (UNBALANCED if self._acceleration is None else UNBALANCED_MOTION):
             raise NotRecovered(
                 "the state is not an equilibrium under the loads of the scene: at node "
-                f"{np.argmax(jump)} the section force jumps by {np.max(jump):.1%} of its largest "
+                f"{jump.argmax()} the section force jumps by {jump.max():.1%} of its largest "
                 "value")
 
 

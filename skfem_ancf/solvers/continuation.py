@@ -173,9 +173,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                                   "the path up to there", (points, critical)) from None
             for kind, one, change in found:
                 one.history = _history_at(one, start)
-                critical.append(CriticalPoint(
-                    kind, one.load, one.arc, one.state.replace(message=f"{kind} point"),
-                    one.tangent, change, one))
+                critical.append(CriticalPoint(kind, one.load, one.arc, one.state.replace(
+                    message=f"{kind} point"), one.tangent, change, one))
             point.history = _history_at(point, start)
             tracer.system = system.after(point.history)
             points.append(point)
