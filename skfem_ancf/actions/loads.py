@@ -354,32 +354,27 @@ class Traction(Load):
             functions = beam.element.of_mesh(mapping, one.X, one.elements)[0]
             forces.append(density * one.areas)
             add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions, forces[-1]), vector)
-        if not beam.has_sections:
-            _warn_of_lever(beam, found, forces)
+        if not beam.has_sections:  # warn where the moment that it leaves out is large
+            length, lost, kept, size = np.sum(beam.mesh.lengths), dict[int, Any](), 0.0, 0.0
+            for one, force in zip(found, forces):
+                frame = mapping.frame(one.X, one.elements)
+                along, across = np.einsum("ikep,iep->kep", frame, force)
+                moment = np.sum(along * mapping.offset(one.X, one.elements), axis=1)
+                lost[one.side] = lost.get(one.side, 0.0) + moment  # of an end's layers together
+                kept += length * np.sum(np.abs(across))
+                size += beam.mesh.height * np.sum(np.hypot(along, across))
+            left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
+            if left_out > LEVER * kept + ROUND_OFF * size:
+                warn(f"a traction on {beam!r} acts on its axis: it leaves out a moment of "
+                     f"{left_out:.3g} by the distance of the face. Use an element with sections, "
+                     "as ElementBeamANCF(2), or give an end its moment by scene.moment",
+                     ModelWarning)
         return DeadLoad(beam, vector, self.amplitude, on_facets(
             beam.mesh, np.concatenate([one.facets for one in found]), traction=t))
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         for at, _, _ in faces_of(layout, layout.beam(self.beam), self.boundary):
             yield force_symbol(at, values_at(self.t, at))
-
-
-def _warn_of_lever(beam, surfaces, forces):
-    """Warn (ModelWarning) if forces on a cable, (2, nf, np) each, have a large neglected moment."""
-    mapping, length = beam.mesh.mapping(), np.sum(beam.mesh.lengths)
-    lost, kept, size = {}, 0.0, 0.0
-    for one, force in zip(surfaces, forces):
-        along, across = np.einsum("ikep,iep->kep", mapping.frame(one.X, one.elements), force)
-        moment = np.sum(along * mapping.offset(one.X, one.elements), axis=1)
-        lost[one.side] = lost.get(one.side, 0.0) + moment  # of the layers of an end together
-        kept += length * np.sum(np.abs(across))
-        size += beam.mesh.height * np.sum(np.hypot(along, across))
-    left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
-    if left_out > LEVER * kept + ROUND_OFF * size:
-        warn(
-            f"a traction on {beam!r} acts on its axis: it leaves out a moment of {left_out:.3g} by "
-            "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or "
-            "give an end its moment by scene.moment", ModelWarning)
 
 
 class DeadLoad(Load):

@@ -316,7 +316,14 @@ class Assumed(Formulation):
                 f"strain as nu goes to 1/2, by 2 % at {NEAR:g}: nu is {material.nu:g}. Use "
                 "ElementBeamANCFCubic(2), or a cable")
         if element.order > 1:
-            return self._volumetric_apart(whole, element, material, factor) or [whole]
+            laws = material.volumetric_split(factor) if sampling.volume else None
+            if laws is None:
+                return [whole]
+            # the volumetric term has few points along the axis
+            points = tuple(axis[0])
+            return [Term(laws[0], axis, section, samples),
+                    Term(laws[1], gauss(sampling.volume), section,
+                         {"xx": points, "xy": points, **samples})]
         refuse_rigid_sections(element, material, law)
         if not isinstance(law, LinearLaw) or isinstance(law, AtRest):
             return [whole]
@@ -334,19 +341,6 @@ class Assumed(Formulation):
         if type(self).terms is not Assumed.terms:  # of a subclass
             return super().points_along(element, material)
         return element.sampling.points
-
-    @staticmethod
-    def _volumetric_apart(whole: Term, element: ElementBeam, material: Material,
-                          factor: float) -> list[Term] | None:
-        """The term split in two, the volumetric one with few points along the axis; or None."""
-        volume = element.sampling.volume
-        laws = material.volumetric_split(factor) if volume else None
-        if laws is None:
-            return None
-        points = tuple(whole.axis[0])
-        samples = {"xx": points, "xy": points, **whole.samples}
-        return [Term(laws[0], whole.axis, whole.section, whole.samples),
-                Term(laws[1], gauss(volume), whole.section, samples)]
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:

@@ -113,7 +113,16 @@ def shear_factor(layers: Sequence[Layer], order: int) -> float:
     """
     t, w = gauss(SHEAR_POINTS)
     till = np.array([b * (gauss(SHEAR_POINTS)[1] @ lagrange(t, b * t)) for b in t])
-    y, dy, b, E, G = (np.array(rows) for rows in zip(*_points(layers, np.pi * t, np.pi * w)))
+    found, one = [], np.ones(SHEAR_POINTS)
+    for layer in layers:  # points in each interval with weights, widths and moduli
+        law, m = layer.material, layer.measure
+        for low, high, width in m.pieces:
+            half = 0.5 * (high - low)
+            eta = 0.5 * (low + high) - half * np.cos(np.pi * t)
+            width = (width(eta) if callable(width) else width) * layer.width / m.mean
+            found.append((eta, half * np.sin(np.pi * t) * np.pi * w, width * one,
+                          law.axial_modulus * one, law.G * one))
+    y, dy, b, E, G = (np.array(rows) for rows in zip(*found))
     EA = np.sum(dy * b * E)
     first = E * b * (y - np.sum(dy * b * E * y) / EA)
     S = np.cumsum(np.append(0.0, np.sum(dy * first, axis=1)))[:-1, None] + (
@@ -122,18 +131,6 @@ def shear_factor(layers: Sequence[Layer], order: int) -> float:
     A = p.T @ ((dy * b * G).ravel()[:, None] * p)
     r = p.T @ (dy * b * tau).ravel()
     return float(r @ np.linalg.solve(A, r) / np.sum(dy * b * tau**2 / G))
-
-
-def _points(layers, t, w):
-    """Points in each interval with weights, widths and moduli."""
-    for layer in layers:
-        law, m = layer.material, layer.measure
-        for low, high, width in m.pieces:
-            half = 0.5 * (high - low)
-            eta, one = 0.5 * (low + high) - half * np.cos(t), np.ones(len(t))
-            width = (width(eta) if callable(width) else width) * layer.width / m.mean
-            yield (eta, half * np.sin(t) * w, width * one,
-                   law.axial_modulus * one, law.G * one)
 
 
 #: Points across a layer for areas and moments.
@@ -453,20 +450,20 @@ class Across(Immutable):
         """Shear factor for the element; None for a rectangle of one material."""
         if self.plain or self.element.order == 0 or any(s.varies for s in self.layers):
             return None
-        return self._mean_shear() if self.moving else shear_factor(self.layers, self.element.order)
+        if not self.moving:
+            return shear_factor(self.layers, self.element.order)
 
-    def _mean_shear(self):
-        """Constant factor with the shear compliance of the varying sections under a uniform shear
-        force.
-        """
-        def at(height):
+        # a constant factor with the shear compliance of the varying sections under a uniform shear
+        # force
+        def at(height: float) -> tuple[float, float]:
             layers = [replace(s, measure=m, width=s.width * m.mean) for s, m in (
                 (s, s.measure.at(height)) for s in self.layers)]
             return shear_factor(layers, self.element.order), height * sum(
                 s.material.G * s.width for s in layers)
 
+        heights: Any = self.mesh.heights
         high = self.mesh.height
-        low = min(float(np.min(self.mesh.heights)), (1.0 - 1e-6) * high)
+        low = min(float(np.min(heights)), (1.0 - 1e-6) * high)
         factor, GA = (chebinterpolate(np.vectorize(partial(
             lambda z, k: at(low + (high - low) * (z + 1.0) / 2.0)[k], k=k)), HEIGHTS)
             for k in range(2))

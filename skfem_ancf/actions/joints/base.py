@@ -228,18 +228,15 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
         bound.bind(layout)
         bound._freeze()
         if not is_builtin(joint):
-            _try(bound, layout.N)
+            m, n, zero = len(bound.equations), layout.N, np.zeros(layout.N)
+            require_finite(f"value(u, t) of {bound!r}", bound.value(zero, 0.0), (m,))
+            require_finite(f"jacobian(u, t) of {bound!r}", bound.jacobian(zero, 0.0), (m, n))
+            second = bound.curvature(zero, 0.0, np.ones(m))
+            if second is not None:
+                i, j, values = second
+                require_entries(f"curvature of {bound!r}", i, j, values, n)
             beside(partial(require_derivatives, bound, layout.sizes), layout.sizes)
     return bound
-
-
-def _try(joint: Joint, n: int) -> None:
-    m, zero = len(joint.equations), np.zeros(n)
-    require_finite(f"value(u, t) of {joint!r}", joint.value(zero, 0.0), (m,))
-    require_finite(f"jacobian(u, t) of {joint!r}", joint.jacobian(zero, 0.0), (m, n))
-    found = joint.curvature(zero, 0.0, np.ones(m))
-    if found is not None:
-        require_entries(f"curvature of {joint!r}", *found, n)
 
 
 def require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
