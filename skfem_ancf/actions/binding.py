@@ -12,7 +12,7 @@ from ..beam.layout import Layout
 from ..core.errors import InputError, explained, require_finite, shown
 from ..core.types import Array
 from .forces.base import ForceElement, KernelElement, Unscaled, bind_force, derivative, try_force
-from .item import Item, beside, require_entries
+from .item import Item, at_generic_displacements, require_entries
 from .joints.base import Joint, bind_joint, require_derivatives
 from .loads import Load, bind_load
 from .places import Vector
@@ -158,7 +158,7 @@ class _Constraint(Joint):
         m = len(require_finite(f"constraint(u, t) of {item!r}", value, (None,)))
         self.equations = tuple(f"equation {k}" for k in range(m))
         require_finite(f"jacobian(u, t) of {item!r}", self.jacobian(zero, 0.0), (m, layout.N))
-        beside(partial(require_derivatives, self, layout.sizes), layout.sizes)
+        at_generic_displacements(partial(require_derivatives, self, layout.sizes), layout.sizes)
 
     def value(self, u: Array, t: float) -> Array:
         return np.asarray(self.item.constraint(u, t))

@@ -19,7 +19,7 @@ from ..core.errors import (InputError, MissingExtra, NameUnknown, ask, require_f
                            require_function, require_slope, shown)
 from ..core.quadrature import gauss, product_rule
 from ..core.types import Array, Place, TimeFunction
-from .item import Item, beside
+from .item import Item, at_generic_displacements
 from .loads import Load
 
 # loads given by densities at points, for all local functions at once
@@ -347,7 +347,7 @@ class Energy(Density):
             raise InputError(f"an Energy acts on elements with sections, as ElementBeamANCF(2), "
                              f"with positions linear in the degrees of freedom; not on {beam!r}")
         bound = self._with(beam=beam, _parts=self._points(beam))
-        beside(bound._require_derivatives, beam.sizes)
+        at_generic_displacements(bound._require_derivatives, beam.sizes)
         if self.check:
             bound._require_invariance()
         return bound

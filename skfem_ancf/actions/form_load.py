@@ -19,7 +19,7 @@ from ..core.errors import (CallbackError, InputError, explained, require_finite,
 from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
 from .energy import Density, points_of
-from .item import beside
+from .item import at_generic_displacements
 from .loads import DeadLoad
 
 logger = logging.getLogger(__name__)
@@ -131,7 +131,7 @@ class FormLoad(Density):
         if self.tangent is None:
             logger.info("%r has no tangent=: its derivative is found by differences", self)
         else:
-            beside(bound._require_tangent, beam.sizes)
+            at_generic_displacements(bound._require_tangent, beam.sizes)
         times = (0.0, OTHER) if "t" in used else (0.0,)
         return bound._with(symmetric=bound._is_conservative(times))
 

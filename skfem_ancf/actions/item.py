@@ -173,7 +173,7 @@ def takes_time(function: Any) -> bool:
                for p in kinds) == 3
 
 
-def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
+def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array) -> None:
     """Call a check of derivatives at two generic displacements.
 
     It may fail at one of them, where there may be a kink.

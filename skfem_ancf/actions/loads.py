@@ -28,7 +28,7 @@ from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
 from ..mesh.places import facets_of, node_of
 from ..sections.across import Pieces, pieces
-from .item import Item, beside, require_entries
+from .item import Item, at_generic_displacements, require_entries
 from .places import Vector, dense_entries, members_at, nearest_of, section
 from .symbols import (ARROWS, Symbol, arrows_along, at_node, faces_of, force_symbol, inside,
                       values_at)
@@ -232,7 +232,7 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
                                  "its class and define stiffness(u)")
 
         if bound.constant:
-            beside(require_constant, beam.sizes)
+            at_generic_displacements(require_constant, beam.sizes)
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
@@ -253,7 +253,7 @@ def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:
         k = int(np.argmax(far))
         raise InputError(f"the stiffness of {load!r} couples the nodes {low[k]} and {high[k]}: "
                          "only neighbours of the chain may be coupled, as they are in its elements")
-    beside(partial(_require_derivatives, bound), bound.beam.sizes)
+    at_generic_displacements(partial(_require_derivatives, bound), bound.beam.sizes)
     return bound
 
 

@@ -255,22 +255,18 @@ class ElementBeam(Immutable, Element):
     # local functions
 
     @cached_property
-    def _factors(self) -> Array:
-        """Factors of all local functions: row of the axis function (-1 for none), row of the
-        longitudinal factor of a section function, its number, and the powers of height and length.
-        """
-        m, n = self._along
-        return np.array([(m * node + slope if power == 0 else -1, n * node + slope,
-                          (k - m) % max(self.section.number, 1), power, slope)
-                         for node in (0, 1)
-                         for k, (_, slope, power) in enumerate(self.functionals)]).T
+    def _powers(self) -> Array:
+        """Powers of height and length of all local functions, shape (2, 2 nodal_dofs)."""
+        return np.array([(across, along) for _, along, across in self.functionals] * 2).T
 
     @cached_property
     def _places(self) -> tuple[Array, ...]:
         """Numbers of the axis functions and of the others, with the two factors of these."""
-        axis, node, number = self._factors[:3]
-        of_section, = (axis < 0).nonzero()
-        return (axis >= 0).nonzero()[0], of_section, node[of_section], number[of_section]
+        (m, n), (power, slope) = self._along, self._powers
+        node, k = np.divmod(np.arange(2 * self.nodal_dofs), self.nodal_dofs)
+        of_axis, of_section = (power == 0).nonzero()[0], power.nonzero()[0]
+        number = (k - m) % max(self.section.number, 1)
+        return of_axis, of_section, (n * node + slope)[of_section], number[of_section]
 
     def _unit(self, X: Array, i: Any = slice(None)) -> Array:
         """Functions for height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
@@ -302,7 +298,7 @@ class ElementBeam(Immutable, Element):
         slope
             The power of L that multiplies a function: the number of its derivatives along X.
         """
-        power, slope = self._factors[3:, i]
+        power, slope = self._powers[:, i]
         unit, axes = self._unit(X, i), 0 if type(h) is float else np.ndim(h)
         if not self.section.number:
             return *unit, slope
@@ -322,7 +318,7 @@ class ElementBeam(Immutable, Element):
         h, L
             Height and length of a straight element; several lengths have shape (..., 1).
         """
-        power, slope = self._factors[3:]
+        power, slope = self._powers
         return h**power * L**slope
 
     @property

@@ -100,11 +100,11 @@ class Axes:
     """The axes of chains, a Curve for parameters from 2 k to 2 k + 1 on chain k.
 
     ``arcs`` has the curves of chains by number. The others are straight, with starts ``start`` and
-    end-to-end vectors ``way``, (2, k).
+    end-to-end vectors ``chord``, (2, k).
     """
 
-    def __init__(self, arcs: Mapping[int, Curve], start: Array, way: Array) -> None:
-        self.arcs, self.start, self.way = dict(arcs), start, way
+    def __init__(self, arcs: Mapping[int, Curve], start: Array, chord: Array) -> None:
+        self.arcs, self.start, self.chord = dict(arcs), start, chord
 
     def _parts(self, s):
         chain = chain_of(s)
@@ -114,8 +114,8 @@ class Axes:
     def nodes(self, s: Array) -> tuple[Array, Array]:
         """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
         chain, s, parts = self._parts(s)
-        way = self.way[:, chain]
-        p, tangent = self.start[:, chain] + s * way, way / np.hypot(*way)
+        chord = self.chord[:, chain]
+        p, tangent = self.start[:, chain] + s * chord, chord / np.hypot(*chord)
         for arc, here in parts:
             p[:, here], tangent[:, here] = arc.nodes(s[here])
         return p, tangent
@@ -132,7 +132,7 @@ class Axes:
         """Arc lengths from parameters ``a`` to ``b`` on the same chains, all of shape (n,)."""
         chain, x, parts = self._parts(a)
         y = b - 2 * chain
-        out = (y - x) * np.hypot(*self.way[:, chain])
+        out = (y - x) * np.hypot(*self.chord[:, chain])
         for arc, here in parts:
             out[here] = arc.lengths(x[here], y[here])
         return out
@@ -140,7 +140,7 @@ class Axes:
     def moved(self, A: Array, shift: Array) -> Axes:
         """The axes ``A r(s) + shift``."""
         return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
-                    A @ self.start + shift[:, None], A @ self.way)
+                    A @ self.start + shift[:, None], A @ self.chord)
 
 
 #: Tolerance for a point that selects a node, relative to the size of the graph.

@@ -51,9 +51,9 @@ class Inverse:
             for d in range(c.shape[1])]) @ c for c in (axis, director))
         n, m = self.axis.shape[1], self.director.shape[1]
         #: Minus the cross product of both; the axial coordinate does not depend on the height.
-        self.beside = np.zeros((n + m - 1, axis.shape[2]))
+        self.crossed = np.zeros((n + m - 1, axis.shape[2]))
         for k in range(n):
-            self.beside[k:k + m] -= _cross(self.axis[:, k, None], self.director)
+            self.crossed[k:k + m] -= _cross(self.axis[:, k, None], self.director)
         self.largest, self.heights = height, heights
 
     def height(self, e: Any, xi: Array) -> Any:
@@ -67,14 +67,15 @@ class Inverse:
 
         Newton's method, from the middle of the elements.
         """
-        axis, director, beside = (c[..., e, None] for c in (self.axis, self.director, self.beside))
+        axis, director, crossed = (
+            c[..., e, None] for c in (self.axis, self.director, self.crossed))
         gap = x - self.start[:, e, None]
         # (point - axis) x director vanishes at the section through the point
-        beside = np.broadcast_to(beside, (len(beside), *gap.shape[1:])).copy()
-        beside[:director.shape[1]] += _cross(gap[:, None], director)
+        crossed = np.broadcast_to(crossed, (len(crossed), *gap.shape[1:])).copy()
+        crossed[:director.shape[1]] += _cross(gap[:, None], director)
         X = np.full(x.shape, 0.5)
         for _ in range(ITERATIONS):
-            value, slope = with_slope(beside, X[0])
+            value, slope = with_slope(crossed, X[0])
             change = value / slope
             X[0] -= np.clip(change, -1.0, 1.0)
             # the square of the last correction is left
@@ -123,7 +124,7 @@ class Finder:
         self.equal = 1e-8 * mesh.height
 
     @cached_property
-    def _beside(self):
+    def _neighbours(self):
         """The previous and the next element in the chain, (2, nelements); -1 at its ends."""
         left, right = self.mesh.t
         joined, e = right[:-1] == left[1:], np.arange(self.mesh.nelements)
@@ -287,7 +288,7 @@ class Finder:
             X[:, todo] = self.inverse(x[:, todo, None], e[todo])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)
             # a point of the section between two elements is one of the left
-            before, after = self._beside[:, e[todo]]
+            before, after = self._neighbours[:, e[todo]]
             other = np.where(X[0, todo] <= noise, before,
                              np.where(X[0, todo] > 1.0 + noise, after, -1))
             on, steps = (other >= 0) & (steps < WALK), steps + 1

@@ -41,7 +41,7 @@ from ..formulations import EnhancedContinuum
 from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from ..mesh.numbering import by_element
-from ..sections.across import SIDE, beside
+from ..sections.across import SIDE, off_ends
 from .section_forces import (AcrossPoints, ArcLength, Intervals, NotFound, NotRecovered,
                              SectionForces, Sections, Together)
 
@@ -194,7 +194,7 @@ class Segment:
         self.points = at = r.points(e, xi)
         sections = Sections(self.beam, e, xi, at.eta, self.forces.lifted, r.geometry)
         axis = Sections(self.beam, e, xi, mapping=r.geometry)
-        X, speed = beside(sections.X), np.hypot(*axis.J[:, 0, :, 0])
+        X, speed = off_ends(sections.X), np.hypot(*axis.J[:, 0, :, 0])
         h, slope = mapping.height(sections.X[0], e)
         slope = slope / speed[:, None]
         self.Y, self.span = h * (at.eta - 0.5), h * at.stretch

@@ -23,7 +23,7 @@ from ..core.quadrature import gauss, lagrange
 from ..core.types import Array
 from ..mesh.mapping import MappingBeam, cross
 from ..sections import Layer
-from ..sections.across import EDGE, beside, jumps, pieces
+from ..sections.across import EDGE, off_ends, jumps, pieces
 
 #: Quadrature points along an element for its loads.
 ALONG = 8
@@ -340,7 +340,7 @@ class SectionForces:
         if self._acceleration is not None:
             gravity = gravity - at.field(self._acceleration)
         if gravity.any():
-            across, X = self.beam.across, beside(at.X)
+            across, X = self.beam.across, off_ends(at.X)
             out = out + gravity * across.of_layers(
                 X, np.zeros(X.shape[1:]), lambda k: across.density(across.layers[k], X, at.e),
                 at.e, graded=False)
@@ -370,7 +370,7 @@ class SectionForces:
                 force = load.pressure * (1.0 - 2.0 * side) * np.array([-r[1], r[0]])
             else:
                 t = load.traction
-                t = (_traction(self.beam, t, beside(at.X), e) if callable(t) else
+                t = (_traction(self.beam, t, off_ends(at.X), e) if callable(t) else
                      np.asarray(t, dtype=float)[:, None, None])
                 force = t * np.hypot(*at.J[:, 0])
             on = on + factor * load.faces[side][e][:, None] * force

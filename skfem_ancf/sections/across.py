@@ -43,7 +43,7 @@ class Pieces(NamedTuple):
     end: Array
 
 
-def beside(X: Array) -> Array:
+def off_ends(X: Array) -> Array:
     """Reference points (2, ...), with those at element ends moved slightly inside."""
     return np.array([np.clip(X[0], SIDE, 1.0 - SIDE), X[1]])
 

@@ -17,7 +17,7 @@ from ...core.errors import (InputError, explained, require_finite, require_slope
                             warnings_as_errors)
 from ...core.immutable import is_builtin
 from ...core.types import Array
-from ..item import Item, beside
+from ..item import Item, at_generic_displacements
 from ..places import Vector
 
 #: Relative step of differences, where a force does not accept complex numbers.
@@ -412,12 +412,12 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
     K = _matrix(bound.stiffness(y, zero, 0.0), 2 * n)
     if own:
-        beside(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
+        at_generic_displacements(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
     if bound.symmetric and not abs(K - K.T).max() <= 1e-4 * abs(K).max():
         raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
                          "symmetric: it has no potential. Set symmetric = False in its class")
     if not hasattr(bound, "start") and bound.potential_at(y, 0.0) is not None:
-        beside(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
+        at_generic_displacements(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
 
 
 def _matrix(K, n):

@@ -16,7 +16,7 @@ from ...core.errors import InputError, explained, require_finite, require_slope,
 from ...core.immutable import is_builtin
 from ...core.types import Array
 from ...mesh.places import is_point
-from ..item import Item, beside, require_entries
+from ..item import Item, at_generic_displacements, require_entries
 from ..places import Vector, products
 
 
@@ -235,7 +235,8 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
             if second is not None:
                 i, j, values = second
                 require_entries(f"curvature of {bound!r}", i, j, values, n)
-            beside(partial(require_derivatives, bound, layout.sizes), layout.sizes)
+            at_generic_displacements(partial(require_derivatives, bound, layout.sizes),
+                                     layout.sizes)
     return bound
 
 

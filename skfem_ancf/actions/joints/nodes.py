@@ -53,13 +53,13 @@ class Settlements:
 
     def moves(self, k: int) -> bool:
         """True if a node is displaced in component k."""
-        return bool(np.any(self.numbers[:, k])) or any(way == k for _, way in self.at)
+        return bool(np.any(self.numbers[:, k])) or any(at == k for _, at in self.at)
 
     def by(self, nodes: Array, k: int, times: Array) -> Array:
         """Displacements of nodes at some times, shape (n, m)."""
         out = np.multiply.outer(times, self.numbers[nodes, k])
-        for sampled, (node, way) in zip(self._sampled, self.at):
-            if way == k:
+        for sampled, (node, at) in zip(self._sampled, self.at):
+            if at == k:
                 out[:, np.searchsorted(nodes, node)] = sampled(times)
         return out
 

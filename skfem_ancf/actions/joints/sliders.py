@@ -189,7 +189,7 @@ class Axis:
 
 # discrete gradients of the equations of a sleeve between two displacements
 
-#: Least ``way``, in elements, by which is divided.
+#: Least ``advance``, in elements, by which is divided.
 TINY = 1e-9
 
 
@@ -255,14 +255,14 @@ class VectorProduct:
 class Span(NamedTuple):
     """The equations of a sleeve between two displacements.
 
-    ``columns`` are numbers of DOFs, ``change`` is ``u_1 - u_0`` of these, (n,), ``way`` is
+    ``columns`` are numbers of DOFs, ``change`` is ``u_1 - u_0`` of these, (n,), ``advance`` is
     ``s_1 - s_0`` in elements, ``place`` the product G, zero at both ends, ``equations`` the other
     products, and ``shares`` ``f_s / G_s`` of each at both ends, (m, 2).
     """
 
     columns: Array
     change: Array
-    way: float
+    advance: float
     place: VectorProduct
     equations: list[VectorProduct]
     shares: Array
@@ -289,7 +289,7 @@ class Span(NamedTuple):
                                            - (share @ passing) * place.mixed())
             out += 0.5 * multiplier * row
             work += 0.5 * multiplier * float(D @ (v1 - v0) - row @ self.change)
-        if abs(self.way) > TINY:
+        if abs(self.advance) > TINY:
             out += work / float(place.row @ self.change) * place.row
         return out
 
