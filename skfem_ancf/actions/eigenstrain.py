@@ -17,10 +17,11 @@ from numpy.polynomial.legendre import legvander
 from ..beam.beam import Beam
 from ..beam.distribution import Distribution
 from ..beam.kernels.kernel import energy_at, strains, stresses_of
-from ..beam.kernels.law import LINEAR
+from ..beam.kernels.histories import fibre_points
+from ..beam.kernels.law import CUSTOM, HISTORY, LINEAR, POINTWISE
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
-from ..beam.remembered import remembers
+from ..beam.remembered import has_history, remembers
 from ..beam.strains import on_grid, strain_at, stretched
 from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from ..core.linear import stress_of
@@ -42,6 +43,8 @@ def energy_difference(beam: Beam, u: Array, eigen: Sequence[Array], factor: floa
     total = 0.0
     for e, E0 in zip(beam.kernel.elements, eigen):
         E = strains(e, u)
+        if e.t.law.kind == HISTORY:  # in its stored energy
+            continue
         if e.t.law.kind == LINEAR:
             total += factor * float(np.sum(stresses_of(e, E0).T * (E - 0.5 * factor * E0)))
         else:
@@ -190,23 +193,22 @@ class EigenStrain(Load):
     # the load
 
     def bind(self, beam: Beam) -> Load:
-        if remembers(beam):
-            raise InputError(f"temperature and eigenstrain do not act on {beam!r}: a material of "
-                             "it has a history, and its law takes the whole strain")
         bound = cast("EigenStrain", super().bind(beam))
         bound._distribution = Distribution(eigen=bound)
         function = getattr(self.amplitude, "function", None)
         if isinstance(function, Coefficient):
             bound.at_rest = function(1.0)
         kernel = beam.kernel
+        if remembers(beam):  # its elements have the strain minus the eigenstrain
+            bound._distribution = Distribution()
         if not beam.has_sections:
-            bound.eigen_stresses = [_resultants(beam, self)]
+            bound.eigen_stresses, bound._stresses = _of_fibres(beam, self)
             return bound
         bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
         bound._stresses = list(map(stresses_of, kernel.elements, bound._strains))
         bound.eigen_stresses = list(map(
             kernel_argument, kernel.elements, bound._strains, bound._stresses))
-        bound.grows = not kernel.linear
+        bound.grows = any(t.law.kind in (POINTWISE, CUSTOM) for t in kernel.tables)
         bound._size = bound.at_rest if bound.grows else 1.0
         return bound
 
@@ -223,7 +225,7 @@ class EigenStrain(Load):
 
     def small_forces(self, factor: float = 1.0) -> Array:
         """As :meth:`element_forces` at u = 0, linear in the strain."""
-        if not self.grows:
+        if not self.grows and not remembers(self.beam):
             return self.element_forces(np.zeros(self.beam.N), factor)
         return self.beam.kernel.forces_of([factor * T for T in self._stresses],
                                           np.zeros(self.beam.N))
@@ -250,7 +252,9 @@ class EigenStrain(Load):
                           for x in (0.0 * u, u))
             return start - now
         strain = self.beam.kernel.strain(u)
-        return -float(np.sum(self.eigen_stresses[0].T * strain.reshape(-1, strain.shape[2])))
+        return -sum(float(np.sum(T.T * strain.reshape(-1, strain.shape[2])))
+                    for t, T in zip(self.beam.kernel.tables, self.eigen_stresses)
+                    if t.law.kind == LINEAR)
 
     def distribution(self, u: Array) -> Distribution:
         return self._distribution
@@ -278,14 +282,15 @@ class EigenStrain(Load):
             E0[1] -= np.where(which == k, unmatched(beam, self, layer, X, e), 0.0)
         E = on_grid(strain_at, beam, u, X, e) if self.grows else 0.0 * factor * E0
         laws = [partial(stress_of, layer.law) for layer in beam.layers]
-        return beam.across.of_layers(X, E, lambda k: laws[k](E) - laws[k](E - factor * E0), e)
+        return beam.across.of_layers(X, E, lambda k: 0.0 * E if has_history(beam, k) else
+                                     laws[k](E) - laws[k](E - factor * E0), e)
 
     def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
         """Reduction of a cable's nominal stress, force per reference area, (3, n, m)."""
         E0 = factor * self.strain_at(X, e) * np.array([1.0, 0.0, 0.0])[:, None, None]
         layers = self.beam.across.layers
-        return self.beam.across.of_layers(
-            X, E0, lambda k: layers[k].material.axial_modulus * E0, e)
+        return self.beam.across.of_layers(X, E0, lambda k: 0.0 * E0 if has_history(
+            self.beam, k) else layers[k].material.axial_modulus * E0, e)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         for name in self.given:
@@ -359,12 +364,29 @@ def require_alone(loads: Sequence[Any]) -> None:
                 "function times a function of t")
 
 
-def _resultants(beam, eigen):
+def _of_fibres(beam, eigen):
+    """The kernel's arguments for a cable, and the linear stresses, a list for each table."""
+    rules, tables = list(beam.across.rules(8)), beam.kernel.tables
+    if len(tables) == 1 and tables[0].law.kind != HISTORY:
+        found = [_resultants(beam, eigen, rules)]
+        return found, found
+    given, stresses = [], []
+    for t, layer in zip(tables, beam.across.layers):
+        stresses.append(_resultants(beam, eigen, [one for one in rules if one[0] is layer]))
+        given.append(stresses[-1])
+        if t.law.kind == HISTORY:
+            X = fibre_points(layer, beam.kernel.points)[1]
+            E0 = eigen.of_layer(layer, *beam.across.coordinates(X))[0]
+            given[-1] = (E0 + np.zeros((beam.mesh.nelements, 1))).T[None]
+    return given, stresses
+
+
+def _resultants(beam, eigen, rules):
     """Weighted normal forces and moments of a cable's eigenstrain, (ne, 2 points)."""
     xi = beam.kernel.points
     out = np.zeros((2, beam.mesh.nelements, len(xi)))
     across = beam.across
-    for layer, (eta, w) in across.rules(8):
+    for layer, (eta, w) in rules:
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
         x, y = across.coordinates(X)
         size = (layer.material.axial_modulus * across.breadth(layer, X, times="grade")

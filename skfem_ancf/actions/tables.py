@@ -8,10 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy, mirror
-from ..beam.strain_energy import FlatBody, add_eigen_force, add_eigen_mean, add_eigen_tangent
+from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_mean, add_eigen_tangent,
+                                  put_eigenstrains)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import custom_force, custom_joints, custom_load_stiffness, custom_mean_force
 from ..core.source import F1, F2, I1, indices, primitive, source
+
+
+#: Number of ``lasting`` from which on materials have a history, see
+#: :class:`~skfem_ancf.equations.histories.Histories`.
+MATERIALS = 2
 
 
 class JointTables(NamedTuple):
@@ -174,6 +180,13 @@ def _eigenstrains(loads, factors):
         for i in indices(given.size):
             given[i] -= c * one[i]
     return given
+
+
+@source
+def carry_eigenstrains(loads, factors):
+    """Let the laws with a history have the eigenstrains of the loads."""
+    if loads.eigenstrains.shape[0] > 0:
+        put_eigenstrains(loads.eigenstrained, _eigenstrains(loads, factors))
 
 
 @source

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.types import Array
+from .kernels.histories import Past
 from ..materials import HistoryMaterial
 
 
@@ -25,7 +26,7 @@ def with_history(beam: Any, history: Array) -> Any:
     other = object.__new__(type(beam))
     vars(other).update({name: x for name, x in vars(beam).items()
                         if name not in ("layers", "terms", "basis", "interpolation")})
-    vars(other)["kernel"] = beam.kernel.remembering(history, np.zeros(1))
+    vars(other)["kernel"] = beam.kernel.remembering(Past(history, np.zeros(1), history))
     return other
 
 

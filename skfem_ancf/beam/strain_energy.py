@@ -8,15 +8,14 @@ import numpy as np
 from ..core.band import add_multiple, clear, copy
 from ..core.immutable import cached_property
 from ..core.source import I1, I2, primitive, shaped, source
-from ..core.types import Array
 from .beam import Beam
 from .kernels.elements import Elements
-from .kernels.histories import elements_of, remembering
+from .kernels.histories import Past, elements_of, remembering
 from .kernels.law import LINEAR
 from .kernels.runs import (add_changes, add_transposed, run_accept, run_eigen_force, run_eigen_mean,
-                           run_eigen_tangent, run_force, run_given,
-                           run_gradients, run_linearised, run_mean, run_mean_mixed, run_mixed,
-                           run_stress, run_tangent, run_unsymmetric, run_viscous)
+                           run_eigen_tangent, run_force, run_given, run_gradients, run_linearised,
+                           run_mean, run_mean_mixed, run_mixed, run_put, run_stress, run_tangent,
+                           run_unsymmetric, run_viscous)
 from .kernels.tables import CABLE, StrainTables, repeated, together
 
 #: Columns of the table of a body: begin and end of stresses; samples and DOFs of an element; begin
@@ -30,19 +29,20 @@ class Body:
     A ``kernel`` has the same tables.
     """
 
-    def __init__(self, packs: Sequence[StrainTables], table: Any, kernel: Any = None) -> None:
+    def __init__(self, packs: Sequence[StrainTables], table: Any, kernel: Any = None,
+                 elements: Sequence[Elements] | None = None) -> None:
         self.packs, self.table, self._kernel = tuple(packs), table, kernel
+        if elements is not None:
+            vars(self)["elements"] = elements
 
     @cached_property
     def elements(self) -> Sequence[Elements]:
         """Their :class:`~skfem_ancf.beam.kernels.elements.Elements`."""
         return list(map(elements_of, self.packs)) if self._kernel is None else self._kernel.elements
 
-    def after(self, history: Array, span: Array) -> "Body":
-        """A copy whose elements have views of a history (n,) and of a time span (1,)."""
-        other = Body(self.packs, self.table)
-        vars(other)["elements"] = remembering(self.elements, history, span)
-        return other
+    def after(self, past: Past) -> "Body":
+        """A copy whose elements have views of a history."""
+        return Body(self.packs, self.table, elements=remembering(self.elements, past))
 
 
 class FlatBody(NamedTuple):
@@ -86,7 +86,8 @@ def eigenstrain_body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> Bod
     """The Body of eigenstrains: stresses for tables of linear laws, else strains at the points."""
     return _body([[t._replace(start=t.start + s.start) for t in beam.kernel.tables]
                   for beam, s in zip(beams, slices)],
-                 lambda t: t.rows.shape[1] if t.law.kind == LINEAR else 3 * t.weights.shape[1])
+                 lambda t: t.rows.shape[1] if t.law.kind == LINEAR else
+                 (1 if t.kind == CABLE else 3) * t.weights.shape[1])
 
 
 def _body(tables, numbers, kernel=None):
@@ -307,6 +308,13 @@ def add_unsymmetric(body, u, v, U):
     """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
     for k in range(body.table.shape[0]):
         run_unsymmetric(tables_of(body, k), u, v, U.flat, U.ld)
+
+
+@source
+def put_eigenstrains(body, given):
+    """Set the eigenstrains of laws with a history, minus ``given``."""
+    for k in range(body.table.shape[0]):
+        run_put(tables_of(body, k), _stress(body, k, given))
 
 
 @source

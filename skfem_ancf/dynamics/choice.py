@@ -75,7 +75,7 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     asked = f"rtol = {rtol:g}"
     if system.forces.contacts.obstacles:
         return Choice(EnergyMomentum(), "obstacles: touching is a kink, and energy is kept")
-    if system.histories.of_beams.size:
+    if system.histories.lasting > 1:
         return Choice(EnergyMomentum(), "a material with a history")
     if system.mass_solver.by_nodes:
         return Choice(EnergyMomentum(), "a frame: its nodes are eliminated")

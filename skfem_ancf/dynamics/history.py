@@ -271,7 +271,7 @@ class History(MaterialPoints, SpringForces):
         """Strain energy and potential of force elements, shape (nt,)."""
         system, memories = self.system, self._columns["history"]
         out = np.zeros(len(self))
-        remembers = system.histories.of_beams.size > 0
+        remembers = system.histories.lasting > 1
         if not remembers:
             out += system.energy_of_beams(self.u)
         if system.forces.elements or remembers:

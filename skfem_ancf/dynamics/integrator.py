@@ -456,7 +456,7 @@ def _step_data(given: TimeValues, dt: float, system: System) -> StepData:
     joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
                           int(system.backend.tables.motion_varies))
     return StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
-                      given.supports[:, -1].copy(), joints)
+                    given.factors[:, -1].copy(), given.supports[:, -1].copy(), joints)
 
 
 def _coupled(A, system):

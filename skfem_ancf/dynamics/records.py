@@ -223,6 +223,7 @@ class StepData(NamedTuple):
     dt: float
     times: F2  # ends of the steps, and instants of their equations of motion, (n, 2)
     factors: F2  # of the loads, (n, l)
+    ends: F2  # the same at the ends of the steps
     supports: F3  # displacement, velocity, acceleration of fixed DOFs, else 0, (n, 3, N)
     joints: JointMotions
 
@@ -234,6 +235,7 @@ class Step(NamedTuple):
     t: float  # end of the step
     acting: float  # instant of the equation of motion
     factors: np.ndarray  # as in StepData
+    ends: np.ndarray
     supports: np.ndarray
     joints: JointMotion
     mass_factor: float
@@ -321,6 +323,7 @@ def step_of(joints, rule, course, n):
     kept = constant and g.shape[0] == 1 and n > 0
     joints_now = JointMotion(row_of(c, n), row_of(g, n), course.joints.drives)
     return Step(course.dt, course.times[n, 0], course.times[n, 1],
-                row_of(course.factors, n), row_of(course.supports, n), joints_now,
+                row_of(course.factors, n), row_of(course.ends, n), row_of(course.supports, n),
+                joints_now,
                 mass_factor(rule, course.dt), damping_factor(rule, course.dt),
                 0.5 if rule.conserving > 0 else 1.0, constant, kept)

@@ -16,8 +16,8 @@ from ..beam.strain_energy import (accept_body, add_force_by, add_viscous_stress,
 from ..actions.forces.kernels import (add_elastic_force, set_contact_rate, settle_contact,
                                       settle_elements)
 from ..core.source import indices, source
-from ..actions.tables import (add_constraint_rate, add_joint_force, constraint, external_force,
-                              joint_directions)
+from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, carry_eigenstrains,
+                              constraint, external_force, joint_directions)
 from .convergence import (DEPENDENT, DONE, FAILED, GO_ON, ITERATIONS, NOT_CONVERGED, RESTART,
                           SINGULAR, judged, round_off)
 from .records import (JointMotion, acceleration_of_joints, damping_beside, damping_force,
@@ -27,8 +27,6 @@ from .stage_tangent import factorize_stages, flat_points, join, solve_for
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
 #: steps.
 REUSED, MIXED, LASTING = 0.3, 0.5, 32
-#: ``e.lasting`` from which on materials have a history.
-MATERIALS = 2
 #: Newton corrections of the joints at the end of a step.
 CLOSINGS = 2
 
@@ -58,6 +56,9 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
         if e.lasting > 0:
             t = s.times[(k + 1) * (method.points.size + 1) - 1]
             e.span[0] = s.h
+            if e.lasting >= MATERIALS:
+                carry_eigenstrains(e.loads, row_of(
+                    s.factors, (k + 1) * (method.points.size + 1) - 1))
             settle_contact(e.forces, t, 0.0, w.y[0], w.y[0], taken)
             settle_elements(e.forces, t, w.before[0], w.y[0], w.y[1], taken)
             accept_body(e.body, w.before[0], w.y[0], taken)
@@ -101,7 +102,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             state.factorizations[0] += method.values.shape[1]
             state.factors[0], state.fresh[0] = 1, 1
             state.contraction[0], state.correction[0] = REUSED, -1.0
-        _internal(e, matrices, method, s.h, w, state)
+        _internal(e, matrices, method, s, w, state, step)
         for k in range(n):
             _residual(e, matrices, method, s, w, state, step, k)
         state.iterations[0] += n
@@ -190,6 +191,8 @@ def _balance(e, matrices, s, w, at):
     u, v, a, f, Q, scratch = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
     constrained, t = row_of(s.constrained, at), s.times[at]
     e.span[0] = s.h
+    if e.lasting >= MATERIALS:
+        carry_eigenstrains(e.loads, row_of(s.factors, at))
     copy(constrained[2], a)
     multiply(matrices.M, a, scratch)
     body_force(e.body, u, f)
@@ -288,7 +291,7 @@ def motion_at(joints, k):
 
 
 @source
-def _internal(e, matrices, method, h, w, state):
+def _internal(e, matrices, method, s, w, state, step):
     """Internal forces of all points, into R; independent stresses include viscous ones."""
     U, f, missing, constitutive = flat_points(w.U), flat_points(w.R), w.missing, w.constitutive
     independent = w.independent
@@ -303,7 +306,8 @@ def _internal(e, matrices, method, h, w, state):
         add_force_by(e.body, e.copies, w.B, missing, f)
     elif e.lasting >= MATERIALS:
         for k in range(w.U.shape[0]):
-            e.span[0] = h * method.points[k]
+            e.span[0] = s.h * method.points[k]
+            carry_eigenstrains(e.loads, row_of(s.factors, step * (w.U.shape[0] + 1) + k))
             body_force(e.body, w.U[k], w.R[k])
     else:
         body_force(e.copies, U, f)

@@ -18,7 +18,7 @@ import numpy as np
 from ..actions.contact.tables import PRESSURES
 from ..actions.forces.kernels import (augment_contact, set_contact_rate, settle_contact,
                                       settle_elements)
-from ..actions.tables import add_constraint_rate, constraint
+from ..actions.tables import MATERIALS, add_constraint_rate, carry_eigenstrains, constraint
 from ..beam.strain_energy import accept_body, body_linearised, body_stress, quadratic
 from ..core.band import clear, copy, dot, solve_joined, subtract_rows, total
 from ..core.callbacks import call_solver
@@ -139,11 +139,13 @@ def add_work(e, matrices, rule, s, w, state):
 
 
 @source
-def begin_step(e, dt):
-    """Pass the time step to what has a history."""
-    e.span[0] = dt
+def begin_step(e, s):
+    """Pass the time step, and eigenstrains at its end, to what has a history."""
+    e.span[0] = s.dt
+    if e.lasting >= MATERIALS:
+        carry_eigenstrains(e.loads, s.ends)
     if e.forces.contacts.lasting > 0:
-        set_contact_rate(e.forces, dt)
+        set_contact_rate(e.forces, s.dt)
 
 
 @source
@@ -212,7 +214,7 @@ def _iterate(e, matrices, rule, s, w, state):
     status, left, most = GO_ON, ITERATIONS, AUGMENTED
     _start(e, w, state)
     if e.lasting > 0:
-        begin_step(e, s.dt)
+        begin_step(e, s)
     while left > 0:
         left, most = left - 1, most - 1
         if state.factors[0] == 0:

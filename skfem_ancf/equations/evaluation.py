@@ -6,8 +6,8 @@ import numpy as np
 
 from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_tangent,
                                       contact_along, contact_work)
-from ..actions.tables import (add_joint_force, add_load_stiffness, constraint,
-                              external_force)
+from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
+                              constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
 from ..core.band import diagonal, dot, largest, weighted_square
@@ -83,6 +83,8 @@ def balance(e, target, factors, first, last, mixed, g, x, m, stresses):
     """
     u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
     gap, opened = x[GAP], 0.0
+    if e.lasting >= MATERIALS:
+        carry_eigenstrains(e.loads, factors[0])
     if last:
         force(e, u, target.at, f)
     else:

@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.contact.tables import TURNS
 from ..actions.forces.system import Forces
 from ..beam.beam import Beam
-from ..beam.kernels.histories import ElementsWithHistory, history_size
+from ..beam.kernels.histories import ElementsWithHistory, Past, history_size
 from ..beam.remembered import remembers, with_history
 from ..core.errors import InputError
 from ..core.types import Array
@@ -30,8 +30,8 @@ class Histories:
     ----------
     values
         The history, shape (n,), an array of these equations alone; its parts are ``of_forces``, of
-        obstacles and springs, ``of_beams``, and those of items with a memory. ``rest`` is that at
-        rest.
+        obstacles and springs, that of ``of_beams``, a :class:`Past`, and those of items with a
+        memory. ``rest`` is that at rest.
     span
         Time since then, shape (1,), for laws with rates; 0 at once.
     forces
@@ -62,12 +62,20 @@ class Histories:
     def _have(self, forces, first, history, span):
         """Make arrays for a history, and the force elements that have it."""
         self.values, self.span = np.array(self.rest if history is None else history), np.zeros(1)
-        self.of_forces, self.of_beams = self.values[:first], self.values[first:self._end]
+        self._now, self.of_forces = self.values.copy(), self.values[:first]
+        self.of_beams = self._past(slice(first, self._end))
         self._kernels: dict[int, Any] = {}
         self.span[0] = span
         self.forces = forces.after(self.of_forces, [
             (self.values[self._parts[item.element._key]], self.span)
             for item in forces.remembering])
+
+    def _past(self, part):
+        return Past(self.values[part], self.span, self._now[part])
+
+    def past(self, beam: Beam) -> Past | None:
+        """That of the laws of a beam; None for elastic ones."""
+        return self._past(self._parts[id(beam)]) if id(beam) in self._parts else None
 
     def after(self, history: Array | None, span: float = 0.0) -> Histories:
         """A copy with another history, by default that at rest, and the time since."""
@@ -77,11 +85,11 @@ class Histories:
 
     def kernel(self, beam: Beam) -> Any:
         """The kernel of a beam with this history."""
-        if id(beam) not in self._parts:
+        past = self.past(beam)
+        if past is None:
             return beam.kernel
         if id(beam) not in self._kernels:
-            self._kernels[id(beam)] = beam.kernel.remembering(
-                self.values[self._parts[id(beam)]], self.span)
+            self._kernels[id(beam)] = beam.kernel.remembering(past)
         return self._kernels[id(beam)]
 
     def beam(self, beam: Beam) -> Beam:
@@ -89,9 +97,8 @@ class Histories:
 
         It is the beam itself if its laws have no history.
         """
-        if id(beam) not in self._parts:
-            return beam
-        return with_history(beam, self.values[self._parts[id(beam)]])
+        past = self.past(beam)
+        return beam if past is None else with_history(beam, past.history)
 
     def get(self) -> Array | None:
         """A copy of the history; None if nothing has happened."""
@@ -102,6 +109,7 @@ class Histories:
     def put(self, history: Array | None) -> None:
         """Write a history into these arrays, as the kernels of steps do."""
         self.values[:], self.span[0] = self.rest if history is None else history, 0.0
+        self._now[:] = self.values
 
     def begin(self, u: Array, t: float, anew: bool) -> Array | None:
         """The history of a start at u and t; ``anew``, friction begins at u."""

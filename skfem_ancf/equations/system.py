@@ -19,6 +19,7 @@ from ..actions.forces.system import DomainForce, Forces
 from ..actions.joints.base import Joint, UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
+from ..actions.tables import MATERIALS, carry_eigenstrains
 from ..beam.beam import Beam
 from ..beam.domain import Domain
 from ..beam.kinematics import bent
@@ -342,11 +343,32 @@ class System:
         self._require_displacement(u)
         if not (u.any() or self.forces.elements) and all(b.kernel.linear for b in self.beams):
             return np.zeros(self.N)  # without round-off
+        self._carry(t, load)
         return self._force(evaluation.force, u, at=self._time(load, t))
 
     def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
         """The internal force (N,) whose work from u0 to u1 is the change of the strain energy."""
+        self._carry(t, 1.0)
         return self._force(evaluation.mean_force, u0, u1, at=self._time(1.0, t))
+
+    def accept(self, u0: Array, u: Array, load: float, t: float) -> tuple[Array | None, float]:
+        """The history after an increment in statics from u0 to u, and what it dissipates.
+
+        ``t`` is the time of obstacles and items.
+        """
+        self._carry(None, load)
+        return self.histories.accept(u0, u, t)
+
+    def _factors(self, t, load):
+        """Load factors (k,) at a time, or in statics."""
+        t, tables = self.clock if t is None else t, self.backend.tables
+        return tables.static_factors(load) if t is None else load * tables.factors(
+            np.array([t]))[0]
+
+    def _carry(self, t, load):
+        """Let materials with a history have the eigenstrains of the loads."""
+        if self.histories.lasting >= MATERIALS:
+            carry_eigenstrains(self.backend.tables.plain.loads, self._factors(t, load))
 
     def strain_energy(self, u: Array, t: float = 1.0) -> float:
         """Strain energy of beams and potential of force elements."""
@@ -484,6 +506,7 @@ class System:
             factors, time = tables.linear_factors(load), np.inf
         elif t is not None and self._varying:
             factors = load * tables.factors(np.array([t]))[0]
+        self._carry(t, load)
         given = tables.stresses if independent is None else independent
         with np.errstate(all="ignore"):
             self.backend.of(evaluation.tangent)(

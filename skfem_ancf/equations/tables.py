@@ -11,6 +11,7 @@ from ..core.immutable import cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
 from ..actions.forces.kernels import ForceTables
+from ..beam.kernels.histories import remembering
 from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
 from ..beam.kernels.tables import linearised
@@ -67,8 +68,8 @@ class Tables:
         self.turns = any(joint.turning for joint in system.constraints.joints)
         joints, histories = self._joints(), system.histories
         body = body_of(system.beams, system.slices, joined=not system.viscous)
-        if histories.of_beams.size:
-            body = body.after(histories.of_beams, histories.span)
+        if histories.of_beams.history.size:
+            body = body.after(histories.of_beams)
         self.plain = Equations(body, self._load_tables(), joints,
                                system.constraints.fixed, system.constraints.mask, system.K.band,
                                viscous_body_of(body, system.beams, system.retardation),
@@ -126,17 +127,30 @@ class Tables:
         tables = self.with_equations(plain)
         tables._system = ref(system)
         body = plain.body
-        if histories.of_beams.size:
-            body = body.after(histories.of_beams, histories.span)
+        loads = plain.loads._replace(eigenstrained=self._remembered(system))
+        if histories.of_beams.history.size:
+            body = body.after(histories.of_beams)
         if system.forces.custom:
             tables._user_defined = None
         forces = plain.forces._replace(
             contacts=system.forces.contacts.tables,
             custom=tables.handle if system.forces.custom else 0)
         tables.plain = plain._replace(
-            body=body, viscous=body if plain.viscous is plain.body else plain.viscous, copies=body,
-            forces=forces, history=histories.values, span=histories.span)
+            body=body, viscous=body if plain.viscous is plain.body else plain.viscous,
+            copies=body, loads=loads, forces=forces, history=histories.values,
+            span=histories.span)
         return tables
+
+    def _remembered(self, system):
+        """The beams with eigenstrains, with their histories."""
+        body, elements = self.plain.loads.eigenstrained, []
+        if not self._loads[3] or not system.histories.of_beams.history.size:
+            return body
+        for beam in self._eigenstrained:
+            some = body.elements[len(elements):len(elements) + len(beam.kernel.tables)]
+            past = system.histories.past(beam)
+            elements += some if past is None else remembering(some, past)
+        return Body(body.packs, body.table, elements=elements)
 
     def _forces(self):
         s = self.system
@@ -196,7 +210,7 @@ class Tables:
         if not loads:
             return _NO_BODY, _NO_EIGENSTRAINS
         of = {id(load.beam): load.beam for load in loads}
-        beams = list(of.values())
+        self._eigenstrained = beams = list(of.values())
         body = eigenstrain_body_of(beams, [self.system.of(beam) for beam in beams])
         first = np.cumsum([0, *(len(beam.kernel.tables) for beam in beams)])[:-1]
         begins = dict(zip(of, body.table[first, BEGIN]))

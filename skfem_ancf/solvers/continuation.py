@@ -339,8 +339,8 @@ def _start(tracer, branch, side):
 
 def _history_at(point, start):
     """The history at a point after another one."""
-    histories = start.system.after(start.history).histories
-    return histories.accept(start.u, point.u, point.load)[0]
+    system = start.system.after(start.history)
+    return system.accept(start.u, point.u, point.load, point.load)[0]
 
 
 def _step(tracer, start, ds):

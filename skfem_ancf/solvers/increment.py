@@ -119,7 +119,7 @@ class Increment:
     def reached(self, found: Equilibrium) -> StaticResult:
         """The result after the increment, with updated contact history."""
         start = self.start
-        memory, lost = self.system.histories.accept(start.u, found.u, self.time)
+        memory, lost = self.system.accept(start.u, found.u, self.load, self.time)
         return StaticResult(**vars(start) | {
             "steps": [*start.steps, self.record], "load": self.level,
             "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,

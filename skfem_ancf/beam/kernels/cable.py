@@ -133,9 +133,10 @@ class CableKernel(ElementKernel):
     def _with_fibres(self, mesh, element, same):
         """A table of fibres for each layer."""
         across = self._across
-        if mesh.heights is not None or any(callable(layer.grade) for layer in across.layers):
-            raise InputError("a cable whose law has a history needs a constant height and E: for a "
-                             "taper of the height use an element with sections")
+        if any(callable(layer.grade) for layer in across.layers):
+            raise InputError("a cable with a law that has a history needs a constant E in its "
+                             "other layers: give more layers in place of E(x, y), or use an "
+                             "element with sections")
         same = same and across.constant
         whole, n = self._table(mesh, element, same), self.points_number
         L, tind = mesh.lengths[:, None], None
@@ -144,8 +145,10 @@ class CableKernel(ElementKernel):
         (pattern, order), out = _samples(n, 3), []
         for layer in across.layers:
             Y, A = fibres(across, layer, self.points, tind)
-            along = np.concatenate([np.repeat(np.eye(n), len(Y), 0), np.kron(
-                np.eye(n), -Y[:, None])], axis=1)
+            every = np.repeat(np.eye(n), Y.shape[2], 0)
+            along = np.concatenate([np.broadcast_to(every, (len(Y), *every.shape)),
+                                    -Y.reshape(len(Y), -1, 1) * every], axis=2)
+            along = along[0] if len(along) == 1 else along
             weights = L * (self._rule[1][:, None] * A).reshape(len(A), -1)
             E = layer.material.axial_modulus
             H = np.concatenate([E * np.sum(A * Y**k, axis=-1) * (-1.0) ** k * L * self._rule[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -16,11 +16,25 @@ from .law import HISTORY, material_of
 from .tables import CABLE, StrainTables
 
 
+class Past(NamedTuple):
+    """A history (n,) at the start of an increment, and the time ``span`` (1,) since.
+
+    ``now`` (n,) has the eigenstrains at the end, where the history has those at the start.
+    """
+
+    history: Array
+    span: Array
+    now: Array
+
+
 def history_size(t: StrainTables) -> int:
-    """Number of history variables of tables; 0 for elastic laws."""
-    if t.law.kind != HISTORY:
-        return 0
-    return material_of(t.law).number * t.weights.shape[1] * len(t.start)
+    """Number of history variables and components of eigenstrain; 0 for elastic laws."""
+    return 0 if t.law.kind != HISTORY else _rows(t) * t.weights.shape[1] * len(t.start)
+
+
+def _rows(t):
+    """Variables of a point, and its components of strain: cables have fibres."""
+    return material_of(t.law).number + (1 if t.kind == CABLE else 3)
 
 
 def elements_of(t: StrainTables) -> Elements:
@@ -28,13 +42,13 @@ def elements_of(t: StrainTables) -> Elements:
     return ElementsWithHistory(t) if t.law.kind == HISTORY else Elements(t)
 
 
-def remembering(elements: Sequence[Elements], values: Array, span: Array) -> list[Elements]:
-    """The elements with consecutive parts of a history (n,), of which they have views."""
+def remembering(elements: Sequence[Elements], past: Past) -> list[Elements]:
+    """The elements with consecutive parts of a Past, of which they have views."""
     out, first = [], 0
     for e in elements:
         last = first + history_size(e.t)
-        out.append(e.remembering(values[first:last], span) if isinstance(
-            e, ElementsWithHistory) else e)
+        out.append(e.remembering(past.history[first:last], past.span, past.now[first:last])
+                   if isinstance(e, ElementsWithHistory) else e)
         first = last
     return out
 
@@ -46,33 +60,41 @@ SAME = 1e-12
 class ElementsWithHistory(Elements):
     """Elements of a :class:`~skfem_ancf.materials.HistoryMaterial`.
 
-    ``history`` (k, points, ne) is that at the start of an increment, ``span`` (1,) its time. Cables
-    have fibres: their points have one strain, along the axis.
+    ``history`` (k, points, ne) is that at the start of an increment, ``span`` (1,) its time;
+    ``before`` and ``now`` (c, points, ne) are the eigenstrains at its start and end. The law has
+    the strain minus these. Cables have fibres: their points have one strain, along the axis.
     """
 
     def __init__(self, t: StrainTables) -> None:
         super().__init__(t)
         self.material, self._fibres = material_of(t.law), t.kind == CABLE
-        self.history = np.zeros((self.material.number, t.weights.shape[1], self.ne))
-        self.span = np.zeros(1)
+        self._own(np.zeros(history_size(t)), np.zeros(1), np.zeros(history_size(t)))
         self._scale = t.law.scale.reshape(3, 1, 1)
-        self._known: Any = (np.zeros(0), None, np.zeros(0), np.nan)
+        self._known: Any = (np.zeros(0), None, np.zeros(0), np.zeros(0), np.nan)
 
-    def remembering(self, values: Array, span: Array) -> ElementsWithHistory:
-        """A copy with another history (n,) and time span."""
+    def _own(self, history, span, now):
+        shape, n = (_rows(self.t), self.t.weights.shape[1], self.ne), self.material.number
+        self.history, self.before = np.split(history.reshape(shape), [n])
+        self.now, self.span = now.reshape(shape)[n:], span
+
+    def remembering(self, history: Array, span: Array, now: Array) -> ElementsWithHistory:
+        """A copy with another history, time span and eigenstrains at the end, see :class:`Past`."""
         other = copy(self)
-        other.history, other.span = values.reshape(self.history.shape), span
+        other._own(history, span, now)
         return other
 
     def at_points(self, strain: Array) -> Array:
         """Strains (3 or 1, points, ne) at the integration points."""
-        return (self.t.along @ strain).reshape(-1, self.t.weights.shape[1], self.ne)
+        along = self.t.along  # of each element where the height of a cable varies
+        E = along @ strain if along.ndim == 2 else np.einsum("eps,se->pe", along, strain)
+        return E.reshape(-1, self.t.weights.shape[1], self.ne)
 
     def evaluate(self, E: Array, dt: float | None = None) -> tuple[Array, Array, Array]:
         """Stress (c, points, ne), moduli (c, c, points, ne) and history at strains at the points.
 
-        ``dt`` is the time since :attr:`history`, by default :attr:`span`.
+        They are at the end of the increment; with ``dt = 0`` at its start.
         """
+        E = E - (self.now if dt is None else self.before)
         dt = float(self.span[0]) if dt is None else dt
         if self._fibres:
             S, D, after = self.material.axial(E[0], self.history, dt)
@@ -81,14 +103,16 @@ class ElementsWithHistory(Elements):
         return self._scale * S, self._scale[:, None] * D * self._scale, after
 
     def energy(self, E: Array, history: Array | None = None) -> Array:
-        """Stored energy per volume (points, ne)."""
+        """Stored energy per volume (points, ne), at the end with its history, or at the start."""
+        E = E - (self.before if history is None else self.now)
         history = self.history if history is None else history
         if self._fibres:
             return self.material.axial_energy(E[0], history)
         return self.material.energy(self._scale * E, history)
 
     def _weighted(self, S):
-        return self.t.along.T @ (S * self.weights).reshape(-1, self.ne)
+        along, S = self.t.along, (S * self.weights).reshape(-1, self.ne)
+        return along.T @ S if along.ndim == 2 else np.einsum("eps,pe->se", along, S)
 
     def stress(self, strain: Array, change: Array | None = None, shift: Array | None = None
                ) -> Array:
@@ -102,6 +126,11 @@ class ElementsWithHistory(Elements):
         return self._weighted(0.5 * (self.evaluate(E - half, 0.0)[0] + self.evaluate(E + half)[0]))
 
     @cached_property
+    def _of_tapers(self):  # of cables of varying height
+        (s, z), along = self.t.pairs, self.t.along
+        return along[:, :, s] * along[:, :, z]
+
+    @cached_property
     def _to_moduli(self):
         (s, z), c = self.t.pairs, 1 if self._fibres else 3
         A = self.t.along.reshape(c, -1, self.ns)
@@ -112,18 +141,21 @@ class ElementsWithHistory(Elements):
 
     def _between(self, D):
         """Moduli (nq, ne) between samples, as if they were symmetric."""
-        return self._to_moduli @ (D * self.weights).reshape(-1, self.ne)
+        D = (D * self.weights).reshape(-1, self.ne)
+        return self._to_moduli @ D if self.t.along.ndim == 2 else np.einsum(
+            "epq,pe->qe", self._of_tapers, D)
 
     def stress_and_moduli(self, strain: Array) -> tuple[Array, Array]:
         S, D, _ = self.evaluate(self.at_points(strain))
         moduli = self._between(D)
-        self._known = strain.copy(), moduli, self.history.copy(), float(self.span[0])
+        self._known = (strain.copy(), moduli, self.now.copy(), self.history.copy(),
+                       float(self.span[0]))
         return self._weighted(S), moduli
 
     def moduli_at(self, strain: Array, shift: Array | None = None) -> Array:
-        E, moduli, history, dt = self._known  # often where an iteration has been
-        if dt == self.span[0] and np.array_equal(history, self.history) and np.max(
-                np.abs(strain - E)) <= SAME * np.max(np.abs(E)):
+        E, moduli, now, history, dt = self._known  # often where an iteration has been
+        if dt == self.span[0] and np.array_equal(now, self.now) and np.array_equal(
+                history, self.history) and np.max(np.abs(strain - E)) <= SAME * np.max(np.abs(E)):
             return moduli
         return self._between(self.evaluate(self.at_points(strain))[1])
 
@@ -136,15 +168,22 @@ class ElementsWithHistory(Elements):
         """Set the history at the end of an increment from u to v; returns what it dissipates."""
         E0, E1 = self.strain_at(u), self.strain_at(v)
         S0, (S1, _, after) = self.evaluate(E0, 0.0)[0], self.evaluate(E1)
-        work = np.sum(0.5 * (S0 + S1) * (E1 - E0), axis=0)
+        change = E1 - self.now - (E0 - self.before)  # eigenstrains do no work
+        work = np.sum(0.5 * (S0 + S1) * change, axis=0)
         lost = float(np.sum(self.weights * (work - self.energy(E1, after) + self.energy(E0))))
-        self.history[:] = after
+        self.history[:], self.before[:] = after, self.now
         return lost
 
 
-def fibres(across: Any, layer: Any, xi: Array, tind: Array | None) -> tuple[Array, Array]:
-    """Distances from the axis (m,), and areas at points xi (n,) of elements, (ne, n, m)."""
+def fibre_points(layer: Any, xi: Array) -> tuple[Array, Array]:
+    """Weights of the fibres of a layer, and their places at points xi (n,), (m,) and (2, n m)."""
     eta, w = layer.measure.gauss(max(getattr(layer.material, "points", 2), 2))
-    h, X = across.mesh.height, np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-    area = np.tile(w, len(xi)) * h * across.breadth(layer, X, tind) + np.zeros((1, X.shape[1]))
-    return (eta - 0.5) * h, area.reshape(-1, len(xi), len(eta))
+    return w, np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+
+
+def fibres(across: Any, layer: Any, xi: Array, tind: Array | None) -> tuple[Array, Array]:
+    """Distances from the axis and areas at points xi (n,) of elements, (ne or 1, n, m)."""
+    w, X = fibre_points(layer, xi)
+    h = across.heights(X[0], tind)
+    Y, A = (X[1] - 0.5) * h, np.tile(w, len(xi)) * h * across.breadth(layer, X, tind)
+    return tuple((x + np.zeros((1, X.shape[1]))).reshape(-1, len(xi), len(w)) for x in (Y, A))

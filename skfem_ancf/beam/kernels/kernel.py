@@ -13,7 +13,7 @@ from ...core.types import Array
 from ...elements.base import ElementBeam
 from ...mesh.mesh_beam import MeshBeam
 from .elements import Elements
-from .histories import ElementsWithHistory, elements_of, remembering
+from .histories import ElementsWithHistory, Past, elements_of, remembering
 from .law import LINEAR, law_evaluate
 from .runs import (run_eigen_force, run_eigen_mean, run_eigen_tangent, run_force, run_given,
                    run_gradients, run_mean, run_stress, run_tangent)
@@ -69,11 +69,11 @@ class ElementKernel:
         """True if all moduli are constant."""
         return all(t.law.kind == LINEAR for t in self.tables)
 
-    def remembering(self, history: Array, span: Array) -> ElementKernel:
-        """The kernel with a history (n,) of its laws, of which it has a view, and a time span."""
+    def remembering(self, past: Past) -> ElementKernel:
+        """The kernel with a history of its laws, of which it has views."""
         other = copy(self)
-        vars(other).update(elements=remembering(self.elements, history, span),
-                           _apart=remembering(self._apart, history, span))
+        vars(other).update(elements=remembering(self.elements, past),
+                           _apart=remembering(self._apart, past))
         return other
 
     def energy(self, u: Array) -> Any:

@@ -141,10 +141,22 @@ def run_unsymmetric(e, u, v, flat, ld):
 
 
 def _shift(e, given):
-    """Stresses of linear laws, or the shift of the strain of others; the other is None."""
+    """Stresses of linear laws, or the shift of the strain of others; the other is None.
+
+    Laws with a history have it in their strain, see :func:`run_put`, and no further stress.
+    """
     if e.t.law.kind == LINEAR:
         return _given(e, given), None
+    if e.t.law.kind == HISTORY:
+        return np.zeros((e.ns, e.ne)), None
     return None, given.reshape(3, -1, e.ne)
+
+
+@kernel
+def run_put(e, given):
+    """Set the eigenstrains of a law with a history, minus ``given`` at the points."""
+    if e.t.law.kind == HISTORY:
+        e.now[:] = -given.reshape(e.now.shape)
 
 
 @kernel
