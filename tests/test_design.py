@@ -1,12 +1,14 @@
 """Derivatives of static solutions by parameters, against differences of whole solutions."""
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize
 
 from skfem_ancf import (Beam, Circle, Design, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, Frame, InputError, MeshBeam, NameUnknown, NeoHookean,
-                        RigidBody, Scene, StVenantKirchhoff, Temperature)
+                        ElementBeamCable, Frame, InputError, MeshBeam, MissingExtra, NameUnknown,
+                        NeoHookean, RigidBody, Scene, StVenantKirchhoff, Temperature)
 
 S = np.linspace(0, 1, 5)
 
@@ -179,6 +181,24 @@ def test_objective_for_minimize():
         gradient[0], (goal([0.101])[0] - goal([0.099])[0]) / 2e-3, rtol=1e-4)
     found = minimize(goal, [0.1], jac=True)
     assert found.fun < 1e-6 < value
+
+
+def test_readings_for_jax(monkeypatch):
+    def build(p):
+        scene = Scene(beam_of(1e6 * p[0], element=ElementBeamCable(5))).clamp("left")
+        scene.point_force((0, -p[1]), at=(1, 0))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    design = Design(build, ["tip"])
+    with monkeypatch.context() as m:
+        m.setitem(sys.modules, "jax", None)
+        with pytest.raises(MissingExtra, match="autodiff"):
+            design.to_jax([2.0, 1.0])
+    jax = pytest.importorskip("jax")
+    readings, p = design.to_jax([2.0, 1.0]), jax.numpy.array([2.0, 1.0])
+    found = jax.jit(jax.grad(lambda p: jax.numpy.sum(readings(p * p)**2)))(p)
+    y, J = design([4.0, 1.0])
+    assert np.allclose(found, 2 * (y @ J) * 2 * np.array([2.0, 1.0]), rtol=1e-5)
 
 
 def test_what_has_no_derivative_is_said():

@@ -123,9 +123,16 @@ def test_moving_base(eliminated):
     if eliminated:
         exact = 1.0 - OMEGA**2 * shaken.of("tip 1")
         assert np.allclose(found, exact, rtol=1e-6)
-        with pytest.raises(InputError, match="prescribed motion"):
-            scene.linearize(None, [base]).state_space()
-    else:
+    model = scene.linearize(None, [base, PointForce((0, 1), at=(1, 0))])
+    response = model.frequency_response(OMEGA)
+    for space, rtol in ((model.state_space(), 1e-5), (model.state_space(modes=6), 1e-2)):
+        for w, H_ in zip(OMEGA, response.values[:, 1]):  # six modes bend, none stretches
+            seen = space.C @ np.linalg.solve(1j * w * np.eye(len(space.A)) - space.A, space.B)
+            assert np.allclose((seen + space.D)[1], H_, rtol=rtol, atol=1e-12)
+    scene.sensor("v", "velocity", at=(1, 0))
+    with pytest.raises(InputError, match="prescribed motion"):
+        scene.linearize(None, [base]).state_space()
+    if not eliminated:
         assert np.isclose(found[0], 1.0)  # L times the angle
         # reciprocity: tip by the angle is minus the moment of the clamp by a force at the tip
         scene.sensor("clamp", "joint_force", base)
@@ -207,6 +214,32 @@ def test_ring_that_turns():
         bending = np.sqrt(EI / RA * n**2 * (n**2 - 1)**2 / (n**2 + 1))
         assert np.isclose(0.5 * (low + high), bending, rtol=2e-4)
         assert np.isclose(high - low, 2e-3 * 2 * n / (n**2 + 1), rtol=1e-3)
+
+
+def test_campbell_diagram_of_a_rotating_beam():
+    """Wright, Smith, Thresher, Wang (1982): flapping mu; in the plane omega^2 = mu^2 - Omega^2."""
+    unit, scene = np.sqrt(EI / RA), Scene(strip(8)).clamp("left")
+    for speed, published in ((0.0, (3.5160, 22.0345)), (2.0, (4.1373, 22.6149)),
+                             (6.0, (7.3604, 26.8091)), (12.0, (13.1702, 37.6031))):
+        turning = scene if not speed else Scene(strip(8)).clamp("left").add(
+            RotatingFrame(speed * unit))
+        A = turning.sensor("tip", "displacement", at=(1, 0)).linearize(
+            turning.solve_static(), [PointForce((0, 1), at=(1, 0))]).state_space().A
+        found = np.sort([w for w in np.linalg.eigvals(A).imag if w > 0.0])[:2] / unit
+        assert np.allclose(np.hypot(found, speed), published, rtol=1e-3)
+
+
+def test_point_masses_feel_a_rotating_frame():
+    """A mass at the tip stretches a bar by m Omega^2 L^2 / (E A); it is felt at rest as well."""
+    mass, speed = 0.3, 2.0
+    for beam in (strip(4), Beam(MeshBeam.init_line(np.linspace(0, 1, 5), H), ElementBeamANCF(2),
+                                StVenantKirchhoff(E, 0.0, RHO), width=B)):
+        scene = Scene(beam).pin("left").fix("right", "r^2").add(RotatingFrame(speed))
+        alone = scene.solve_static().displacement((1, 0))[0]
+        scene.point_mass(mass, at=(1, 0))
+        tip = scene.solve_static().displacement((1, 0))[0] - alone
+        assert np.isclose(tip, mass * speed**2 / (E * B * H), rtol=1e-3)
+        assert np.isclose(scene.solve_static().displacement((1, 0))[0] - alone, tip, rtol=1e-12)
 
 
 def test_steady_rotation_stretches_and_stays():

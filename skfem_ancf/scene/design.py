@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..actions.forces.base import derivative
-from ..core.errors import (ConvergenceError, InputError, NameUnknown, ask, ask_array,
+from ..core.errors import (ConvergenceError, InputError, MissingExtra, NameUnknown, ask, ask_array,
                            require_finite, require_function, shown)
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
@@ -132,6 +132,35 @@ class Design:
             return float(function(y)), derivative(function, y) @ J
 
         return value_and_gradient
+
+    def to_jax(self, p: ArrayLike) -> Callable[[Any], Any]:
+        """The readings (r,) as a function of p (n,) for JAX, with derivatives by the adjoint.
+
+        ``jax.grad`` and ``jax.jit`` work with what is computed from them. Needs the extra
+        ``autodiff``; the numbers are those of JAX, single precision unless ``jax_enable_x64``.
+
+        Parameters
+        ----------
+        p
+            Parameters for which there is a solution: they show the number of readings.
+        """
+        try:
+            import jax
+        except ImportError:
+            raise MissingExtra("jax", "autodiff") from None
+        rows = len(self.values(p))
+
+        def called(function, shape, p):
+            return jax.pure_callback(lambda p: function(np.asarray(p, dtype=float)).astype(p.dtype),
+                                     jax.ShapeDtypeStruct(shape, p.dtype), p)
+
+        @jax.custom_vjp
+        def readings(p):
+            return called(self.values, (rows,), p)
+
+        readings.defvjp(lambda p: (readings(p), p), lambda p, back: (
+            back @ called(self.jacobian, (rows, len(p)), p),))
+        return readings
 
     # the state
 

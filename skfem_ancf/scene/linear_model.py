@@ -24,6 +24,8 @@ from ..solvers import eigen
 
 #: Shift of the stiffness for a static correction, relative to the highest kept eigenvalue.
 SHIFT = 1e-6
+#: Relative effect of the rate of an input on a reading that is round-off.
+DIRECT = 1e-9
 #: Change of a prescribed motion for derivatives of joints, in radians.
 TURN = 1e-5
 
@@ -40,7 +42,8 @@ class Readings(NamedTuple):
 class StateSpace(NamedTuple):
     """``x' = A x + B s``, ``y = C x + D s`` for changes s of the inputs and y of the outputs.
 
-    x are 2 n numbers: n coordinates q with ``u = T q``, and their rates. scipy.signal and
+    x are 2 n numbers: n coordinates q with ``u = T q``, and their rates. For inputs s that are
+    prescribed motions these are coordinates relative to what s makes at once. scipy.signal and
     python-control take ``model.state_space()[:4]``.
     """
 
@@ -120,27 +123,44 @@ class LinearModel:
         Raises
         ------
         InputError
-            If an input is a prescribed motion, whose accelerations are not inputs, a material has
-            no density, or an output is the force of a joint.
+            If a material has no density, an output is the force of a joint, or the velocity or
+            acceleration that a prescribed motion causes at once: it needs the rate of the input.
         """
-        if np.any(self.G) or np.any(self.prescribed):
-            raise InputError("a state space has forces as inputs, and an input is a prescribed "
-                             "motion: use frequency_response(), or an acceleration a of the whole "
-                             "base as the input Weight((-1, 0)), or (0, -1), with displacements "
-                             "relative to the base")
         if np.any(self.readings.multipliers):
             raise InputError("joints are eliminated from a state space, and an output is the force "
                              "of a joint: use frequency_response(), or the force of a stiff spring")
         M, D, K, T = self._reduced() if modes is None else self._modal(modes)
         n = len(M)
         inertia = scipy.linalg.cho_factor(M)
-        B = scipy.linalg.cho_solve(inertia, T.T @ self.B)
+        U, (m, d, k) = self._quasi_static(T)
+        # q + M^-1 m s and its rate less M^-1 d s are the state, which the rates of s leave out
+        shift = scipy.linalg.cho_solve(inertia, m)
+        rate = scipy.linalg.cho_solve(inertia, D @ shift - d)
+        force = scipy.linalg.cho_solve(inertia, T.T @ self.B + K @ shift - k - D @ rate)
         lower = -scipy.linalg.cho_solve(inertia, np.hstack([K, D]))
         A = np.block([[np.zeros((n, n)), np.eye(n)], [lower]])
         u, v, a, _ = self.readings
+        moved = U - T @ shift
+        if np.any(np.abs((v + a) @ moved) + np.abs(a @ T @ rate) > DIRECT * np.abs(
+                v + a) @ np.abs(U)):
+            raise InputError("the velocity or acceleration of an output depends on the rate of a "
+                             "prescribed motion, which is no input: read displacements, or use "
+                             "frequency_response()")
         C = np.hstack([u @ T, v @ T]) + a @ T @ lower
-        through = a @ T @ B if modes is None else a @ T @ B + u @ self._rest(T, K)
-        return StateSpace(A, np.vstack([np.zeros_like(B), B]), C, through, T)
+        through = a @ T @ force + u @ moved + v @ T @ rate
+        if modes is not None:
+            through = through + u @ np.where(U.any(axis=0), 0.0, self._rest(T, K))
+        return StateSpace(A, np.vstack([rate, force]), C, through, T)
+
+    def _quasi_static(self, T):
+        """Static displacements of unit prescribed motions, (N, k), and the forces T^T A U of mass,
+        damping and stiffness.
+        """
+        U = np.zeros_like(self.B)
+        if np.any(self.G) or np.any(self.prescribed):
+            shift = SHIFT * self._system.scales.bending_eigenvalue
+            U = self._dynamic.solve((1.0, 0.0, shift), 0.0 * self.B, self.G)[0]
+        return U, [T.T @ (A @ U) for A in (self._mass(), *self.matrices[1:3])]
 
     def _mass(self):
         if self.matrices.M is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,7 +79,7 @@ class RotatingFrame(ForceElement):
     All positions, displacements and supports are those in the frame. On each mass act the
     centrifugal force ``dm Omega^2 (r - center)`` and the Coriolis force ``2 dm Omega (v_y, -v_x)``:
     a static solution is a steady rotation, ``scene.linearize`` about it has both, ``scene.modes``
-    the first of them. Point masses do not feel them: use rigid bodies.
+    the first of them. They act on point masses of these beams, too.
 
     Parameters
     ----------
@@ -128,13 +129,34 @@ class RotatingFrame(ForceElement):
         else:
             i, j, values = member.mass_entries()
             M = sparse.csr_array((values, (i, j)), shape=(member.N, member.N))
-        self._mass = sparse.coo_array(M[::2][:, ::2])
+        self._own, self._slice = M[::2][:, ::2], slice(first, first + member.N)
+        self._set_mass(self._own)
+        return [Vector(np.zeros(2), first + k + np.arange(2)[:, None], 1.0)
+                for k in range(0, member.N, 2)]
+
+    def _set_mass(self, M):
+        self._mass = sparse.coo_array(M)
         i, j = self._mass.coords
         # the derivatives by both components of both
         c, d = np.divmod(np.arange(4), 2)
         self.entries = ((2 * i[:, None] + c).ravel(), (2 * j[:, None] + d).ravel())
-        return [Vector(np.zeros(2), first + k + np.arange(2)[:, None], 1.0)
-                for k in range(0, member.N, 2)]
+
+    def with_masses(self, masses: Sequence[Any], N: int) -> RotatingFrame:
+        """A copy of the bound frame that acts on point masses, too.
+
+        Parameters
+        ----------
+        masses, N
+            Bound elements with a mass, and the number of degrees of freedom of the scene.
+        """
+        other, M = self._thawed(), self._own
+        for one in masses:
+            i, j, values = one.mass_entries()
+            whole = sparse.csr_array((values, (i, j)), shape=(N, N))
+            M = M + whole[self._slice, self._slice][::2][:, ::2]
+        other._set_mass(M)
+        other._freeze()
+        return other
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         w = self.speed

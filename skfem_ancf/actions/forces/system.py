@@ -17,6 +17,7 @@ from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
 from .base import ForceElement, KernelElement, Remembering, recalled
 from .control import Control
+from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING, TORSION,
                       ForceTables, element_stiffness, potential, run_kinds, vectors_of)
 from .springs import TorsionalSpring
@@ -81,7 +82,10 @@ class Forces:
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
-        self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
+        self.masses: list[Any] = [e for e in elements if e.mass_entries() is not None]
+        self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
+                         for e in elements]
+        self._N, self._bandwidth = N, bandwidth
         parts: list[KernelElement] = []
         self.custom = []
         for element in self.elements:
@@ -124,7 +128,6 @@ class Forces:
         self.kept = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         self.far = bool(self._far.any() or self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
-        self.masses: list[Any] = [e for e in self.elements if e.mass_entries() is not None]
         # those of user-defined laws first, then in the order of the parts
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
                                key=lambda e: -1 if e in self.custom else self.rows_of(e)[0])
