@@ -385,7 +385,7 @@ class ElementBeam(Immutable, Element):
 
     @cached_property
     def sampling(self) -> Sampling:
-        """Sampling points of "assumed"; by default :func:`.sampling.default_sampling`."""
+        """Sampling points of "assumed"; by default :func:`.base.default_sampling`."""
         return default_sampling(self.axis_degree, 2 * self._along[1] - 1)
 
     @cached_property

@@ -74,7 +74,7 @@ def _values(height, s):
 
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
-    """As :func:`~.taper.heights_of`, for a number, a function, or a list with one for each chain.
+    """As :func:`~.mapping.heights_of`, for a number, a function, or a list with one for each chain.
 
     Functions take parameters (n,) in [0, 1]; messages identify chains by their ``numbers``.
     """
@@ -190,7 +190,10 @@ class FrameGraph:
                  tol: float | None = None, beams: Sequence[str] | None = None,
                  lost: Mapping[str, int] | None = None) -> None:
         self.points = require_moderate("points", _pairs("points", points).astype(float))
-        self.lines = _numbers("lines", lines)
+        ends = _pairs("lines", lines)
+        if np.any(ends != np.floor(ends)):
+            raise InputError(f"lines are numbers of points, got {shown(lines)}")
+        self.lines = ends.astype(np.int64)
         n, m = self.points.shape[1], self.lines.shape[1]
         self.groups = _named("group", "lines", groups, m)
         self.nodes = _named("name", "nodes", nodes, n)
@@ -367,7 +370,7 @@ class FrameGraph:
         """A mesh with one chain of elements for each of the lines (k,), in their order.
 
         ``elements`` (m,) is the number of elements of every line; ``height`` is that of
-        :func:`~.members.heights_of_chains`.
+        :func:`~.frame_graph.heights_of_chains`.
         """
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])
@@ -421,13 +424,6 @@ def _pairs(what, values):
         raise InputError(f"{what} are pairs, one at least: a list of pairs or an array of shape "
                          f"(n, 2), got {shown(values)} of shape {found.shape}{hint}")
     return found.T
-
-
-def _numbers(what, values):
-    out = _pairs(what, values)
-    if np.any(out != np.floor(out)):
-        raise InputError(f"{what} are numbers of points, got {shown(values)}")
-    return out.astype(np.int64)
 
 
 def _named(kind, what, given, n):

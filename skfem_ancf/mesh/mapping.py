@@ -144,8 +144,8 @@ class MappingBeam(Mapping):
     Every ANCF element of order 1 or more contains this map, so it represents the reference
     configuration and its rigid motions exactly. On a mesh with ``sections="cubic"``, for elements
     with cubic sections, the directors are interpolated by H_i as well; from "quintic" on both are
-    interpolated by Hermite functions of that degree (:func:`.nodal.nodal_derivatives`). The height
-    of a tapered beam is cubic in xi.
+    interpolated by Hermite functions of that degree (:func:`.mapping.nodal_derivatives`). The
+    height of a tapered beam is cubic in xi.
 
     Methods take reference points ``X`` = (xi, eta), shape (2, npoints) for all elements or
     (2, nelements, npoints), and elements ``tind`` (nelements,), None for all. They return arrays

@@ -247,7 +247,7 @@ class Across(Immutable):
     def jumps(self) -> Array:
         """Elements that begin with a jump of width, E, density, slope of the height or curvature.
 
-        See :func:`~.jumps.jumps`.
+        See :func:`~.across.jumps`.
         """
         n, found = self.mesh.nelements, [np.zeros(0)]
         for layer in self.layers:
