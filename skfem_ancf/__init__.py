@@ -39,6 +39,7 @@ from .results.path import CriticalPoint, Path
 from .results.response import FrequencyResponse
 from .results.output import Extreme
 from .results.state import Reaction, State
+from .scene.cases import Envelope, LoadCases
 from .scene.design import Design
 from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
 from .scene.motion_design import MotionDesign
@@ -87,6 +88,7 @@ __all__ = [
     "EndMoment",
     "Energy",
     "EnergyMomentum",
+    "Envelope",
     "Explorer",
     "Extreme",
     "FileError",
@@ -112,6 +114,7 @@ __all__ = [
     "LineLoad",
     "LinearModel",
     "Load",
+    "LoadCases",
     "Material",
     "MeshBeam",
     "MeshError",

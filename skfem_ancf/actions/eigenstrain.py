@@ -212,6 +212,9 @@ class EigenStrain(Load):
         bound._size = bound.at_rest if bound.grows else 1.0
         return bound
 
+    def times(self, factor: float) -> Load:
+        return super().times(factor)._with(_size=factor * self.at_rest if self.grows else 1.0)
+
     def acting(self, t: float | None) -> tuple[float, Load]:
         if not self.grows:
             return super().acting(t)

@@ -160,6 +160,11 @@ class Load(Item):
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
         return self.at_rest if t is None else 1.0 if self.amplitude is None else self.amplitude(t)
 
+    def times(self, factor: float) -> Load:
+        """A copy with a factor, in statics and over time."""
+        return self._with(at_rest=factor * self.at_rest, amplitude=Amplitude(
+            partial(_factored, factor, self.amplitude)))
+
     def acting(self, t: float | None) -> tuple[float, Load]:
         """Factor and load at time ``t``; None in statics."""
         return self.factor(t), self
@@ -203,6 +208,10 @@ class Load(Item):
 
     def __repr__(self):
         return f"<{type(self).__name__} on {self.beam!r}>"
+
+
+def _factored(factor, amplitude, t):
+    return factor * (1.0 if amplitude is None else amplitude(t))
 
 
 def bind_load(load: Load, beam: Beam | RigidBody | Domain) -> Load:

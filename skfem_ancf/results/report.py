@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import html
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..actions.item import Item
 from ..beam.domain import Domain
 from ..beam.layout import Layout
 from ..core.archive import output_file
@@ -159,6 +158,35 @@ def total_force(system: Any, u: Array, force: Array) -> Array:
     return out
 
 
+def supports_of(state: Any) -> Iterator[tuple[str, tuple[float, float, float]]]:
+    """Places of supports, and their reactions along x, along y, and moment."""
+    system, known = state.system, set[str]()
+    if (frame := system.constraints.frame) is not None:
+        for node in np.flatnonzero(np.any(frame.fixed, axis=1)).tolist():
+            found = state.reactions(node)
+            yield f"node {node} at {_pair(frame.graph.points[:, node])}", (
+                *found.force, found.moment)
+    layout = Layout(*system.members)
+    for item in system.items:
+        symbols = [s for one in item.expand(layout) for s in one.symbols(layout)
+                   if s.kind == "support"]
+        if not symbols or not hasattr(item, "boundary"):
+            continue
+        try:
+            found = state.reactions(item.boundary, item.beam)
+        except AncfError:
+            continue
+        place = f"{_at(symbols[0].at[0])} of beam {name_of(system, layout.beam(item.beam))}"
+        if place not in known:
+            known.add(place)
+            yield place, (*found.force, found.moment)
+
+
+def name_of(system: Any, member: Any) -> str:
+    """Name or number of a member."""
+    return str(system.members.index(member)) if member.name is None else member.name
+
+
 class _Page:
     """The parts of the page of a state."""
 
@@ -175,10 +203,6 @@ class _Page:
         if unit == "Pa" and abs(value) >= 1e5:
             value, unit = (1e-9 * value, "GPa") if abs(value) >= 1e10 else (1e-6 * value, "MPa")
         return (rounded(value + 0.0, unit),)
-
-    def name(self, beam: Any) -> str:
-        """Name or number of a member."""
-        return str(self.system.members.index(beam)) if beam.name is None else beam.name
 
     def parts(self) -> list[str]:
         """All sections of the page."""
@@ -207,11 +231,12 @@ class _Page:
         for beam in self.state.beams:
             mesh, weighs = beam.mesh, all(layer.density is not None
                                           for layer in beam.across.layers)
-            rows.append((self.name(beam), self.number(float(np.sum(mesh.lengths)), "length"),
-                         self.number(mesh.height, "length"), str(beam.section).strip("<>"),
+            length = self.number(float(np.sum(mesh.lengths)), "length")
+            rows.append((name_of(self.system, beam), length, self.number(mesh.height, "length"),
+                         str(beam.section).strip("<>"),
                          f"{mesh.nelements} × {type(beam.element).__name__}",
                          (f"{beam.total_mass:.4g}",) if weighs else "–"))
-        others = [(self.name(one), repr(one)) for one in self.system.members[len(rows):]]
+        others = [(name_of(self.system, one), repr(one)) for one in self.system.members[len(rows):]]
         return _table(("beam", "length", "height", "section", "elements", "mass"), rows) + _table(
             ("body", ""), others)
 
@@ -256,7 +281,7 @@ class _Page:
     def _reactions(self):
         """Forces of supports, and the balance of all forces."""
         state, system, u = self.state, self.system, self.state._acted
-        rows = [(place, *self._forces(*force)) for place, force in self._supports()]
+        rows = [(place, *self._forces(*force)) for place, force in supports_of(state)]
         support = state._support_force()
         inertia, internal = state._inertia + np.zeros_like(u), state.internal_force
         joints = np.zeros_like(u) if not system.constraints.joints else (
@@ -284,29 +309,6 @@ class _Page:
 
     def _forces(self, x, y, moment):
         return self.number(x, "force"), self.number(y, "force"), self.number(moment, "moment")
-
-    def _supports(self):
-        """Places of supports and their reactions (3,)."""
-        state, frame = self.state, self.system.constraints.frame
-        if frame is not None:
-            for node in np.flatnonzero(np.any(frame.fixed, axis=1)).tolist():
-                found = state.reactions(node)
-                yield f"node {node} at {_pair(frame.graph.points[:, node])}", (
-                    *found.force, found.moment)
-        layout, known = Layout(*self.system.members), set()
-        for item in self.system.items:
-            symbols = [s for one in item.expand(layout) for s in one.symbols(layout)
-                       if s.kind == "support"]
-            if not symbols or not isinstance(item, Item) or not hasattr(item, "boundary"):
-                continue
-            try:
-                found = state.reactions(item.boundary, item.beam)
-            except AncfError:
-                continue
-            place = f"{_at(symbols[0].at[0])} of beam {self.name(layout.beam(item.beam))}"
-            if place not in known:
-                known.add(place)
-                yield place, (*found.force, found.moment)
 
     def _extremes(self):
         rows = []
@@ -349,7 +351,7 @@ class _Page:
                 line = lines[int(pick([one[name][pick(one[name])] for one in lines]))]
                 k = int(pick(line[name]))
                 rows.append((f"{what} {name}", (rounded(float(line[name][k]), unit),),
-                             _pair(line["x"][:, k]), self.name(line["beam"])))
+                             _pair(line["x"][:, k]), name_of(self.system, line["beam"])))
         points = np.hstack([line["x"] for line in lines])
         width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
         beside = height > width

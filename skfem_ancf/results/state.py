@@ -572,6 +572,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
             if load.beam is beam:
                 at_rest = base is not None and not load.first_order
                 factor, now = load.acting(t)
+                if isinstance(load, EigenStrain):  # of nonlinear laws it has its size in itself
+                    factor = load.factor(t)
                 loads.append((scale * factor, now.distribution(
                     (base if at_rest else self).u_of(number))))
         points: list[Any] = []
