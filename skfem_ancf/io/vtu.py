@@ -165,37 +165,36 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
 def _write(path, body, dtype, units=()):
     import meshio
 
+    from xml.sax.saxutils import escape, quoteattr  # which imports http and ssl
+
     with output_file(path) as temporary:
         meshio.write(temporary, meshio.Mesh(
             body.points.astype(dtype), body.cells,
             {name: values.astype(dtype) for name, values in body.point_data.items()},
             body.cell_data))
-        if path.suffix.lower() == ".vtu":
-            temporary.write_bytes(_completed(temporary.read_bytes(), body, dict(units)))
-
-
-def _completed(text, body, units):
-    """Add field data, names of components and units, which meshio does not write."""
-    from xml.sax.saxutils import escape, quoteattr  # which imports http and ssl
-
-    facts = "".join(
-        f'<DataArray type="{"Int64" if x.dtype.kind == "i" else "Float64"}" Name={quoteattr(name)}'
-        f' NumberOfTuples="{len(x)}" format="ascii">{" ".join(map(repr, x.tolist()))}</DataArray>\n'
-        for name, x in body.field_data.items())
-    start = b"<UnstructuredGrid>\n"
-    text = text.replace(start, start + f"<FieldData>\n{facts}</FieldData>\n".encode(), 1)
-    for name, values in body.point_data.items():
-        at = text.find(f"Name={quoteattr(name)}".encode(), text.find(b"<PointData>"))
-        end = text.find(b"</DataArray>", at)
-        if at < 0 or end < 0:
-            continue
-        unit = units.get(name, "")
-        label = f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{escape(unit)}' \
-            "</InformationKey>\n" if unit not in ("", "1") else ""
-        parts = "".join(f'ComponentName{k}="{c}" ' for k, c in enumerate(
-            COMPONENTS.get(values.size // len(values), ())))
-        text = b"".join([text[:at], parts.encode(), text[at:end], label.encode(), text[end:]])
-    return text
+        if path.suffix.lower() != ".vtu":
+            return
+        # field data, names of components and units, which meshio does not write
+        facts = "".join(
+            f'<DataArray type="{"Int64" if x.dtype.kind == "i" else "Float64"}" '
+            f'Name={quoteattr(name)} NumberOfTuples="{len(x)}" format="ascii">'
+            f'{" ".join(map(repr, x.tolist()))}</DataArray>\n'
+            for name, x in body.field_data.items())
+        text, start = temporary.read_bytes(), b"<UnstructuredGrid>\n"
+        text = text.replace(start, start + f"<FieldData>\n{facts}</FieldData>\n".encode(), 1)
+        for name, values in body.point_data.items():
+            at = text.find(f"Name={quoteattr(name)}".encode(), text.find(b"<PointData>"))
+            end = text.find(b"</DataArray>", at)
+            if at < 0 or end < 0:
+                continue
+            unit = dict(units).get(name, "")
+            label = "" if unit in ("", "1") else (
+                '<InformationKey name="UNITS_LABEL" location="vtkDataArray">'
+                f"{escape(unit)}</InformationKey>\n")
+            parts = "".join(f'ComponentName{k}="{c}" ' for k, c in enumerate(
+                COMPONENTS.get(values.size // len(values), ())))
+            text = b"".join([text[:at], parts.encode(), text[at:end], label.encode(), text[end:]])
+        temporary.write_bytes(text)
 
 
 # time series of states for ParaView

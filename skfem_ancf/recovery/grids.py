@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -243,25 +244,19 @@ def _array(field, grid, lenient):
         return value
     if field.components == 2:
         return in_space(value)
-    zero = np.zeros(n)
-    return np.array([value[0], value[1], _normal(field, grid.values), value[2], zero, zero]).T
-
-
-def _normal(field, values):
-    """The out-of-plane component of a tensor, (n,); NaN if the law does not define it."""
-    try:
-        strain, cable = values.elastic, values.cable
+    # the out-of-plane component; NaN if the law does not define it
+    values, normal, zero = grid.values, np.full(n, np.nan), np.zeros(n)
+    with suppress(InputError):
+        strain = values.elastic
         if field.name == "strain":
-            return values.of_materials(lambda law: 0.5 * (law.thickness_stretch(strain)**2 - 1.0))
-        if field.name == "stress":
-            return values.of_materials(lambda law: (
-                law.nu * values.S[0] * (law.plane == "strain") if cable else
-                law.stress_zz(strain)), not cable)
-        if field.name == "cauchy_stress":
-            return values.sigma_zz
-    except InputError:
-        pass
-    return np.full(values.n, np.nan)
+            normal = values.of_materials(lambda law: 0.5 * (law.thickness_stretch(strain)**2 - 1.0))
+        elif field.name == "stress":
+            normal = values.of_materials(lambda law: (
+                law.nu * values.S[0] * (law.plane == "strain") if values.cable else
+                law.stress_zz(strain)), not values.cable)
+        elif field.name == "cauchy_stress":
+            normal = values.sigma_zz
+    return np.array([value[0], value[1], normal, value[2], zero, zero]).T
 
 
 def facts_of(state: Any) -> dict[str, Array]:

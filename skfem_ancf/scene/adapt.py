@@ -87,7 +87,17 @@ def solve_adaptive(scene: Any, tol: float, max_elements: int, goal: str, max_deg
         fine = _changed(coarse, [np.arange(b.mesh.nelements) for b in coarse.beams],
                         [rounds.raised(k) for k in range(len(coarse.beams))])
         better = solve_static(fine.system, None, None, find)
-        estimate, errors = _compare(coarse, state, fine, better)
+        # the contribution of each beam to the larger of both parts of the estimate
+        total, changes, errors = better.strain_energy, [0.0], []
+        for a, b in zip(coarse.beams, fine.beams):
+            u, v = state.u_of(a), better.u_of(b)
+            there, here = (np.append([0, -1], chain_ends(beam)) for beam in (a, b))
+            ends = v.reshape(-1, b.nd)[here, :2] - u.reshape(-1, a.nd)[there, :2]
+            changes.append(float(np.max(np.hypot(*np.transpose(ends)))) / coarse.system.size)
+            energy = float(b.kernel.energy(v) - a.kernel.energy(u)) / (total or 1.0)
+            errors.append(max(changes[-1], abs(energy)))
+        estimate = {"displacement": max(changes),
+                    "energy": abs(total - state.strain_energy) / (abs(total) or 1.0)}
         better = better.replace(error_estimate=estimate, scene=fine,
                                 refinements=rounds.done(errors, fine))
         n = sum(b.mesh.nelements for b in fine.beams)
@@ -221,20 +231,6 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
         gap = strain - beam.strain(state.u_of(beam), X)
         out += [np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain)]
     return tuple(out)
-
-
-def _compare(coarse, state, fine, better):
-    """The estimate, and the contribution of each beam to the larger of its parts."""
-    total, changes, energies = better.strain_energy, [], []
-    for a, b in zip(coarse.beams, fine.beams):
-        u, v = state.u_of(a), better.u_of(b)
-        there, here = (np.append([0, -1], chain_ends(beam)) for beam in (a, b))
-        ends = v.reshape(-1, b.nd)[here, :2] - u.reshape(-1, a.nd)[there, :2]
-        changes.append(float(np.max(np.hypot(*np.transpose(ends)))) / coarse.system.size)
-        energies.append(float(b.kernel.energy(v) - a.kernel.energy(u)) / (total or 1.0))
-    estimate = {"displacement": max(changes, default=0.0),
-                "energy": abs(better.strain_energy - state.strain_energy) / (abs(total) or 1.0)}
-    return estimate, [max(c, abs(e)) for c, e in zip(changes, energies)]
 
 
 def _mark(coarse, state, fine, better, split):

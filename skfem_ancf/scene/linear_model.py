@@ -310,7 +310,7 @@ def _columns(system, state, loads, joint):
             s, (factor, acting) = system.of(load), load.acting(state.t)
             B[s] += factor * acting.force(np.array(state.u[s]))
         return [(B, np.zeros(system.constraints.m), none)]
-    t = state.load if state.t is None else state.t
+    t = state._time
     return [(none, *system.constraints.driven(joint, change))
             for change in _driven(joint, state, t)]
 

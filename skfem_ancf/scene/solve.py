@@ -105,18 +105,14 @@ def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
     """The equations of a scene."""
     loads = [one for one in bound if isinstance(one, Load)]
     elements = [one for one in bound if isinstance(one, ForceElement)]
-    return System(layout.beams, loads + _weights(layout, loads, elements),
+    masses = [one for one in elements if isinstance(one, PointMass) and one.mass]
+    weights = [bind_load(PointForce(one.mass * g, one.at, None, load.amplitude), load.beam)
+               for load in loads if (g := getattr(load, "g", None)) is not None
+               for one in masses if layout.beam(one.beam) is load.beam]
+    return System(layout.beams, loads + weights,
                   np.array(list(fixed), dtype=int), np.array(list(fixed.values()), dtype=float),
                   [one for one in bound if isinstance(one, Joint)], damping, elements,
                   layout.bodies, eigen.rest_modes, layout.domains)
-
-
-def _weights(layout, loads, elements):
-    """Weights of point masses."""
-    masses = [one for one in elements if isinstance(one, PointMass) and one.mass]
-    return [bind_load(PointForce(one.mass * load.g, one.at, None, load.amplitude), load.beam)
-            for load in loads if getattr(load, "g", None) is not None
-            for one in masses if layout.beam(one.beam) is load.beam]
 
 
 def velocity_of(member: Any, v: Any) -> Array:

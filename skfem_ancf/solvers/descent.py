@@ -22,7 +22,7 @@ from .outcome import Equilibrium, StaticResult, LoadStepFailed
 logger = logging.getLogger(__name__)
 
 #: Initial trust-region radii, relative to the scene's size, in the order of attempts.
-STRIDES = (0.1, 0.02, 0.004)
+RADII = (0.1, 0.02, 0.004)
 #: First displacement along a negative direction, relative to the scene's size.
 KICK = 0.02
 #: Size of small corrections, number of consecutive small ones that indicates a stall at an unstable
@@ -91,16 +91,16 @@ class Descent:
     Trust-Region Methods (2000), 7.3). Close to a minimum nothing is added, which is Newton's
     method.
 
-    ``stride`` is the initial radius, the largest change of a scaled DOF. It is halved if
+    ``radius`` is the initial radius, the largest change of a scaled DOF. It is halved if
     corrections reverse, and grows to five times that if they continue. ``saw_unstable`` is True
     once a direction of negative curvature was met.
     """
 
-    def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
+    def __init__(self, system: System, radius: float = RADII[0]) -> None:
         self.system, self.saw_unstable, self.handle = system, False, handle_of(self)
         self._weights = position_weights(system)
         self._sizes = system.constraints.coordinate_sizes
-        self._radius, self._largest = stride, min(5.0 * stride, LARGEST)
+        self._radius, self._largest = radius, min(5.0 * radius, LARGEST)
         self._shift, self._before = 0.0, np.zeros(system.N)
         self._small = self._calls = 0
         self._passed: list[Array] = []
@@ -229,16 +229,16 @@ class Descent:
         return inverse, values, Y
 
 
-def way_down(increment: Any) -> tuple[Equilibrium | None, bool]:
+def leave_unstable(increment: Any) -> tuple[Equilibrium | None, bool]:
     """The result of :func:`descend`, or None, and whether an unstable tangent was met.
 
-    Of all strides, the first result to which the load drives the scene is preferred.
+    Of all radii, the first result to which the load drives the scene is preferred.
     """
     system, start, level = increment.system, increment.start, increment.level
     options = increment.options._replace(most=DESCENT, watched=False)
     first: tuple[Any, bool] = None, False
-    for stride in STRIDES:
-        descent = Descent(system, stride)
+    for radius in RADII:
+        descent = Descent(system, radius)
 
         def iterate(begin, descent=descent):
             return increment.iterate(begin, options, descent)

@@ -18,7 +18,7 @@ from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, W
                         Start, find_equilibrium)
 from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                       StaticResult, Unstable)
-from .touching import SOON, found_touching
+from .touching import MOST_FROM_SOFT, found_touching
 
 logger = logging.getLogger(__name__)
 
@@ -160,7 +160,8 @@ class Increment:
         def solve(begin, rough, most=None):
             chosen = options._replace(most=min(options.most, most or options.most))
             if rough:
-                chosen = options._replace(tol=max(options.tol, NEAR), most=min(options.most, SOON))
+                chosen = options._replace(tol=max(options.tol, NEAR),
+                                          most=min(options.most, MOST_FROM_SOFT))
             return self._from_start(chosen) if begin is None else self.iterate(begin, chosen)
 
         before = self.start.u, options.route.acting(self.start.load)[1]
@@ -296,7 +297,7 @@ class Increment:
                            "loads have no potential by which to find a stable equilibrium")
             return failure.found
         with np.errstate(all="ignore"):
-            found, saw_unstable = descent.way_down(self)
+            found, saw_unstable = descent.leave_unstable(self)
         if saw_unstable and not start.doubt:
             start.doubt = (
                 f"the path loses its stability between the load levels {start.load:.6g} and "

@@ -24,7 +24,7 @@ from .continuation import continuation
 from .increment import Increment, Options, Route
 from .outcome import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
-from .touching import SOON
+from .touching import MOST_FROM_SOFT
 
 logger = logging.getLogger(__name__)
 
@@ -340,7 +340,7 @@ class Search:
         result = self._beginning(route)
         options = self._options(route, method, watched=True)
         if self.touches and self.stable:  # a descent follows
-            options = options._replace(most=min(SOON, options.most))
+            options = options._replace(most=min(MOST_FROM_SOFT, options.most))
         step = Increment(self.system, result, 1.0, options)
         try:
             with np.errstate(all="ignore"):  # overflow shows in the residual

@@ -40,7 +40,7 @@ LEFT = 0.5
 #: Largest stiffening factor in one step.
 RUNG = 30.0
 #: Largest number of iterations close to the last equilibrium: directly, and from a soft start.
-AT_ONCE, SOON = 8, 15
+MOST_DIRECT, MOST_FROM_SOFT = 8, 15
 #: Largest number of stiffenings in a load step, and of reductions of the factor.
 TIMES, HALVED = 4, 2
 
@@ -133,12 +133,12 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
 
 def _at_once(climb, _):
     """The equilibrium in few iterations."""
-    return climb.solve(None, False, AT_ONCE)
+    return climb.solve(None, False, MOST_DIRECT)
 
 
 def _soon(climb, flags):
     """As :func:`_from_soft`, in few iterations."""
-    return _from_soft(climb, flags, SOON)
+    return _from_soft(climb, flags, MOST_FROM_SOFT)
 
 
 def _from_soft(climb, _, most=None):

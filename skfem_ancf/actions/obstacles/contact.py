@@ -92,7 +92,7 @@ def _number(members, which):
 
 def _of_obstacles(state, known, member):
     """Contact points, forces, pressures, gaps, sticking and the least gap of each group."""
-    contacts, t = state._equations.forces.contacts, state.load if state.t is None else state.t
+    contacts, t = state._equations.forces.contacts, state._time
     v = None if state.t is None else np.array(state.v)
     pushes = contacts.pushes(np.array(state.u), v, t) if contacts.obstacles else []
     for (_, group), (k, x, force, pressure, gap) in zip(contacts.groups, pushes):
@@ -112,7 +112,7 @@ def _of_obstacles(state, known, member):
 
 def _of_bodies(state, known, member):
     """The same of bodies that touch each other, on both sides."""
-    t = state.load if state.t is None else state.t
+    t = state._time
     for element, found in state._equations.forces.looks(np.array(state.u), t):
         if not any(element.same(other) for other in known):
             continue
@@ -126,7 +126,7 @@ def _of_bodies(state, known, member):
 def loads_of_contact(state: Any, dofs: slice) -> list[tuple[int, float, Array]]:
     """Forces of obstacles on the beam with some DOFs: element, xi, and nodal force (nb, 2)."""
     contacts, u = state._equations.forces.contacts, np.array(state.u)
-    t, out = state.load if state.t is None else state.t, []
+    t, out = state._time, []
     v = None if state.t is None else np.array(state.v)
     for (_, group), (_, _, force, _, _) in zip(contacts.groups, contacts.pushes(u, v, t)):
         if not dofs.start <= group.first[0] < dofs.stop:

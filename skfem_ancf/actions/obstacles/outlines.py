@@ -71,6 +71,6 @@ def outlines(state: Any, box: Array) -> list[Array]:
     """Outlines of the obstacles at a state, as straight segments."""
     out = []
     for one in obstacles_of(state):
-        points, pieces = one.outline(box, state.load if state.t is None else state.t)
+        points, pieces = one.outline(box, state._time)
         out.append(points.T[pieces])
     return out
