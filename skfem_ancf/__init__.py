@@ -43,6 +43,7 @@ from .scene.cases import Envelope, LoadCases
 from .scene.design import Design
 from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
 from .scene.motion_design import MotionDesign
+from .scene.parameters import Parameters
 from .scene.frame import Frame
 from .scene.plan import Plan
 from .scene.linear_model import LinearModel, StateSpace
@@ -130,6 +131,7 @@ __all__ = [
     "Obstacle",
     "OnCircle",
     "OnLine",
+    "Parameters",
     "Path",
     "Pin",
     "Plan",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import zip_longest
 from typing import Any
 
@@ -13,6 +14,7 @@ from scipy import sparse
 from ..actions.forces.base import derivative
 from ..core.errors import (ConvergenceError, InputError, MissingExtra, NameUnknown, ask, ask_array,
                            require_finite, require_function, shown)
+from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
@@ -256,12 +258,11 @@ class Design:
             else:
                 functions.append((one.what if isinstance(one, Sensor) else one, at, size))
             at += size
-        solver = tangent_of(state, P if functions else P[:, :0])
         out = np.zeros((len(by_state), P.shape[1]))
         if by_state.any():
-            out -= solver.adjoint([1.0], by_state.T).T @ P
+            out -= adjoint_of(state, by_state, P) @ P
         if functions:
-            z = changes_of(solver, P, state.system.N)
+            z = changes_of(tangent_of(state, P), P, state.system.N)
             for function, at, size in functions:
                 out[at:at + size] = np.array([_along(function, state, x) for x in z.T]).T
         return out
@@ -429,6 +430,18 @@ def require_smooth(state: State) -> None:
     if state.system.histories.dissipates:
         raise InputError("forces of this scene depend on the path (friction, plasticity): the "
                          "derivative of a reading depends on the direction, and is not defined")
+
+
+def adjoint_of(state: State, by_state: Array, P: Any) -> Array:
+    """The adjoint (r, N + m) of readings, for products with changes P (N + m, n)."""
+    system = state.system.after(state.memory)
+    if system.symmetric and not P[system.constraints.fixed].count_nonzero():  # as in an iteration
+        with suppress(*NO_FACTORS):
+            system.assemble(np.array(state.u), state.load)
+            system.solver.factorize(np.array(state.u), state.load, state.multipliers)
+            return np.array([np.concatenate(system.solver.solve(row[:system.N], row[system.N:]))
+                             for row in by_state])
+    return tangent_of(state, P[:, :0]).adjoint([1.0], by_state.T).T
 
 
 def tangent_of(state: State, P: Any) -> Bordered:

@@ -35,7 +35,10 @@ class Parameter(NamedTuple):
 
 
 class Parameters:
-    """Values of parameters by object and name, and scenes with other values.
+    """Parameters of a scene by object and name, for a :class:`~skfem_ancf.Design`.
+
+    ``Parameters(scene, wrt)(p)`` is the scene with other values; a Design knows what fields act on,
+    so that its first gradient costs no more than others.
 
     Parameters
     ----------
@@ -53,7 +56,20 @@ class Parameters:
     start
         The values in the scene, (n,).
     each
-        The :class:`Parameter` of each of ``wrt``.
+        The ``Parameter`` of each of ``wrt``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, Design, ElementBeamCable, MeshBeam, Parameters, Scene
+    >>> from skfem_ancf import StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+    ...             StVenantKirchhoff(2e8, 0.3), width=0.01)
+    >>> scene = Scene(beam).clamp("left").point_force((0, -1e-4), at=(1, 0))
+    >>> scene = scene.sensor("tip", "displacement", at=(1, 0))
+    >>> heights = Parameters(scene, [(beam, "height", "nodes")])
+    >>> Design(heights, ["tip"]).jacobian(heights.start).shape
+    (2, 5)
     """
 
     def __init__(self, scene: Any, wrt: Sequence[Any]) -> None:
