@@ -175,6 +175,8 @@ def test_fields_of_a_bent_strip_at_points_and_in_files(element, tmp_path):
     mean = np.sum(0.5 * (lost[1:] + lost[:-1])) / 200.0
     assert_allclose(mean * B * H * L, run.dissipated[-1], rtol=5e-2)
     meshio = pytest.importorskip("meshio")
+    everything = meshio.read(state.save(tmp_path / "all.vtu")).point_data
+    assert {"plastic_strain", "yield_ratio", "dissipated", "back_stress"} <= set(everything)
     file = state.save(tmp_path / "strip.vtu", fields=("stress", "plastic_strain", "back_stress"))
     read = meshio.read(file)
     largest = read.point_data["plastic_strain"].max()  # at the clamp, in sections
@@ -737,6 +739,8 @@ def test_a_bar_that_cools_between_walls_yields_and_keeps_a_stress(element):
             flow if k > 5 else 0.0, rel=5e-3 if cable else 0.2, abs=1e-12)
         assert state.strain_energy == pytest.approx(
             (0.5 * stress**2 / E + (k > 5) * 0.5 * hard * flow**2) * B * H * L, rel=2 * near)
+        assert state.field("energy", (0.03, 0.002)) * B * H * L == pytest.approx(
+            state.strain_energy, rel=2e-3 if cable else 3e-2)
     assert run.dissipated[-1] == pytest.approx(YIELD * flow * B * H * L, rel=1e-2)
 
 
@@ -828,3 +832,26 @@ def test_a_tapered_strip_yields_where_it_is_thin(element):
     if element.axis_degree > 3:
         found = run.state(10).resultants((0.9 * L, 0.0), recover=False)
         assert found.M == pytest.approx(1.44 * thin, rel=2e-3)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)], ids=name)
+def test_perfect_plasticity_keeps_the_balance_of_energy(element):
+    """The work of the support that bends a strip beyond yield and back is stored or dissipated."""
+    beam = Beam(MeshBeam.init_line([0.0, 0.5 * L, L], height=H), element,
+                ElasticPlastic(E, NU, YIELD), width=B)
+    scene = Scene(beam).clamp("left").fix("right", "r^2",
+                                          displacement=lambda t: 2.5e-3 * there_and_back(t))
+    run = scene.run([1.0, 2.0], increments=20)
+    force, w = run.reactions("right").force[:, 1], run.displacement((L, 0.0))[:, 1]
+    work = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(w)))
+    assert_allclose(run.strain_energy + run.dissipated, work, rtol=0, atol=1e-6 * work.max())
+    assert run.dissipated[-1] > 0.4 * work.max()
+
+
+def test_the_energy_of_an_elastic_layer_beside_one_that_yields():
+    section = Section.layers((0.5 * H, ElasticPlastic(E, NU, YIELD)),
+                             (0.5 * H, StVenantKirchhoff(E, NU)), width=B)
+    beam = Beam(MeshBeam.init_line([0.0, L], height=H), ElementBeamCable(3), section=section)
+    state = Scene(beam).clamp("left").fix("right", "r^1", 0.5 * YIELD / E * L).solve_static()
+    for y in (-0.2 * H, 0.2 * H):
+        assert state.field("energy", (0.5 * L, y)) == pytest.approx(0.125 * YIELD**2 / E, rel=1e-6)

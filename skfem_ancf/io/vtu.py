@@ -65,7 +65,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     >>> meshio.Mesh(*body_fields(Scene(beam).state())).points.shape  # 4 x 8 x 4 quads
     (165, 3)
     """
-    wanted, undeformed = find_fields(fields), require_flag("undeformed", undeformed)
+    wanted, undeformed = find_fields(fields, state.beams), require_flag("undeformed", undeformed)
     found = grids(state, subdivide, lagrange, recover)
     if all(grid.values is None for grid in found):
         wanted = [field for field in wanted if field.name == "displacement"]
@@ -126,7 +126,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         Recovered strain and stress if available; False for those of the elements.
     fields
         Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; those of the table
-        by default.
+        by default, with ``plastic_strain``, ``yield_ratio``, ``dissipated`` and ``back_stress`` of
+        materials that yield.
     precision
         "double", or "single" for files of half the size.
 
@@ -150,7 +151,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
     body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
     scale = units_of(state)
-    units = {field.name: unit_of(field, scale) for field in find_fields(fields) if scale}
+    units = {field.name: unit_of(field, scale)
+             for field in find_fields(fields, state.beams) if scale}
     _write(path, body, dtype, units)
     logger.info("wrote %s: %d points", path, len(body.points))
     if walls := outlines(state, around(body.points[:, :2].T)):

@@ -235,8 +235,8 @@ class Values(Mapping):
     @property
     def _stored(self):
         if not self.cable:
-            return self._by_history(lambda law, history: law.energy(self.strain, history), np.nan)
-        longer = stretched(self.strain[0])[1]
+            return self._by_history(lambda law, history: law.energy(self.elastic, history), np.nan)
+        longer = stretched(self.strain[0])[1] - (self._eigenstrain + 0.0 * self.strain)[0]
         return self._by_history(lambda law, history: law.axial_energy(longer, history), np.nan)
 
     def output(self, name: str, other: float = 0.0) -> Array:
@@ -253,7 +253,7 @@ class Values(Mapping):
             return np.full(self.n, other)
         S = stretched(self.strain[0])[0] * self.S if self.cable else self.S
         return self._by_history(lambda law, history: law.outputs(
-            self.strain, history, S).get(name, np.full(self.n, other)), other)
+            self.elastic, history, S).get(name, np.full(self.n, other)), other)
 
     def variable(self, name: str, components: int = 1) -> Array:
         """A history variable of materials, (n,) or (components, n); zero where there is none.
@@ -342,7 +342,7 @@ class Values(Mapping):
             return np.zeros(self.n)
         if self._remembers:
             return self._by_history(lambda law, history: law.out_of_plane(
-                self.strain, history, self.S)[1], 0.0) / self._volume
+                self.elastic, history, self.S)[1], 0.0) / self._volume
         if self.cable:  # eps_zz = 0 and S_yy = 0
             return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -353,8 +353,13 @@ class Values(Mapping):
     @cached_property
     def energy(self) -> Array:
         """Strain energy per reference volume, (n,); of materials with a history what is stored."""
-        if self._remembers and not np.iscomplexobj(self._u):
-            return self._stored
+        if not self._remembers or np.iscomplexobj(self._u):
+            return self._elastic_energy
+        stored = self._stored
+        return np.where(np.isnan(stored), self._elastic_energy, stored)
+
+    @property
+    def _elastic_energy(self):
         if self.cable and not self._small:
             # cable: half of the nominal stress times the elastic stretch - 1
             stretch, longer = stretched(self.strain[0])
@@ -500,6 +505,8 @@ FIELDS = {field.name: field for field in _table()}
 
 #: Default fields in files.
 DEFAULT = ("displacement", "strain", "stress", "cauchy_stress", "von_mises")
+#: Those added by default for materials that yield.
+PLASTIC = "plastic_strain", "yield_ratio", "dissipated", "back_stress"
 
 #: Fields that plots can show.
 DRAWN = tuple(name for name, f in FIELDS.items() if f.components == 1 or name == "displacement")
@@ -531,10 +538,12 @@ def no_value(field: Field) -> InputError:
         if field.name == "utilisation" else ""))
 
 
-def find_fields(fields: Any) -> list[Field]:
-    """The Fields of one or several names, functions or Fields; None for the default."""
+def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:
+    """The Fields of one or several names, functions or Fields; None for the default of beams."""
     if fields is None:
-        fields = DEFAULT
+        yields = any("plastic_strain" in getattr(layer.material, "variables", ())
+                     for beam in beams for layer in beam.across.layers)
+        fields = (*DEFAULT, *PLASTIC) if yields else DEFAULT
     if isinstance(fields, (str, Field)) or callable(fields):
         fields = (fields,)
     if not isinstance(fields, (list, tuple)):

@@ -53,7 +53,9 @@ class ForceElement(Item):
     ``start()``, its history at rest, shape (k,), and ``evaluate(x, v, t, history, dt)`` instead of
     :meth:`force`. That returns the force and the history at the end of an increment of time
     ``dt`` from ``history``, and changes nothing: all solvers, states and checkpoints keep the
-    history. Its ``stiffness(x, v, t, history, dt)``, ``resistance(x, v, t, history, dt)`` and
+    history. What it dissipates is the work of the mean of its forces at both ends of an increment
+    minus what it stores: in the example below 0.2 % too little with 20 increments, 0.04 % with 80.
+    Its ``stiffness(x, v, t, history, dt)``, ``resistance(x, v, t, history, dt)`` and
     ``potential(x, history)``, the stored energy, are optional. A further increment of ``dt = 0``
     should give the same force. Set ``symmetric = False`` where what slips has no potential.
     ``mean(x, y, t, history, dt)``, a mean force of a step with exact work, is optional, and by
