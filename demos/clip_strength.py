@@ -1,8 +1,8 @@
 r"""A clip: will it break?
 ======================
 
-A snap hook of POM is pushed over an edge; its utilisation at the worst moment decides whether it
-breaks, and by how much it is to be thinner.
+A snap hook of POM is pushed over an edge, and its utilisation tells whether it breaks and how thin
+it must be.
 
 The hook is a cantilever with a sloping nose. Inserted, its tip bends by the height of the nose. The
 stress depends on the thickness, which a table of designs shows.
