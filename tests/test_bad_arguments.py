@@ -492,6 +492,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.filterwarnings("ignore:the mesh is coarse")
 @pytest.mark.parametrize("entry", CALLS, ids=lambda entry: entry.name)
 def test_bad_arguments(entry):
     try:

@@ -180,6 +180,7 @@ def test_a_vibration_by_the_published_schemes(scheme, parameters, dt):
                        atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.filterwarnings("ignore:the mesh is coarse")
 @pytest.mark.parametrize("scheme, size, low, high", [
     (EnergyMomentum(), 1e-2, 1 - 1e-10, 1 + 1e-10), (Newmark(), 1e-6, 1 - 1e-5, 1 + 1e-5),
     (GeneralizedAlpha(0.8), 1e-4, 1e-9, 1e-2), (GeneralizedAlpha(0.0), 1e-4, 0.0, 1e-12)], ids=str)

@@ -151,6 +151,7 @@ def test_a_driven_joint_is_met_in_position_and_velocity(scheme):
 # statics
 
 
+@pytest.mark.filterwarnings("ignore:the mesh is coarse")
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
 def test_two_welded_beams_are_one(angle):
     """Cut in the middle and welded: the same deflection and the same frequencies."""

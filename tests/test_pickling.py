@@ -104,6 +104,7 @@ def test_scenes_and_their_results(make, how):
     same(original.solve_static(start=COPIES[how](state)).u, original.solve_static(start=state).u)
 
 
+@pytest.mark.filterwarnings("ignore:the mesh is coarse")
 @pytest.mark.parametrize("how", COPIES)
 def test_paths_modes_and_adaptive_states(how):
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamANCF(2), MATERIAL, 0.02)

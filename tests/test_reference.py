@@ -72,3 +72,13 @@ def test_what_public_methods_return_is_in_the_reference():
                         if word in classes and not word.startswith("_") and word not in MACHINERY
                         and not any(classes[word] is other for other in listed)}
     assert not missing
+
+
+def test_each_name_of_a_scene_is_on_one_page():
+    """Its methods are on pages by task, not on one that is longer than thirty screens."""
+    pages = [re.findall(r"auto(?:method|property):: skfem_ancf\.Scene\.(\w+)",
+                        page.read_text(encoding="utf-8"))
+             for page in sorted(PAGE.parent.glob("scene_*.md"))]
+    names = sorted(name for page in pages for name in page)
+    assert names == sorted(name for name in dir(skfem_ancf.Scene) if not name.startswith("_"))
+    assert max(map(len, pages)) < 20

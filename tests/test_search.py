@@ -42,6 +42,37 @@ def pages():
     return found
 
 
+#: What is looked for, and the page of a heading with these words: the site's search names headings
+#: first.
+HEADINGS = {
+    "moving load": "loads", "bolt preload": "loads", "electrostatic": "loads",
+    "mesh convergence": "trust", "units": "units", "strength": "fields",
+    "stiffness obstacle": "obstacles", "own weak form": "domains", "plane mesh": "recipes",
+    "natural frequencies": "modes", "buckling": "modes", "friction": "obstacles",
+    "follower force": "loads", "element": "choose", "damping": "motion"}
+
+
+@pytest.fixture(scope="module")
+def headings():
+    """From the name of a page to the stems of each of its headings."""
+    if not BUILT.exists():
+        return {page.stem: [stems(line.lstrip("# ")) for line in page.read_text(
+            encoding="utf-8").splitlines() if line.startswith("#")]
+            for page in (ROOT / "docs").glob("*.md")}
+    index = json.loads(re.fullmatch(r"Search\.setIndex\((.*)\)",
+                                    BUILT.read_text(encoding="utf-8"), re.DOTALL)[1])
+    found = {name: [] for name in index["docnames"]}
+    for title, places in index["alltitles"].items():
+        for number, _ in places:
+            found[index["docnames"][number]].append(stems(title))
+    return found
+
+
+@pytest.mark.parametrize("phrase", HEADINGS)
+def test_a_heading_answers(phrase, headings):
+    assert any(stems(phrase) <= heading for heading in headings[HEADINGS[phrase]])
+
+
 @pytest.mark.parametrize("phrase", PHRASES)
 def test_search_finds(phrase, pages):
     assert stems(phrase) <= pages[PHRASES[phrase]]

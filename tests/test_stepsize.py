@@ -57,6 +57,7 @@ def test_error_is_in_proportion_to_the_tolerance(scheme, name):
     assert 0.05 < min(ratios) and max(ratios) < 2.5, ratios
 
 
+@pytest.mark.filterwarnings("ignore:the mesh is coarse")
 @pytest.mark.parametrize("scheme, size", [("auto", 1e-4), ("energy-momentum", 1e-5)])
 def test_small_vibrations_are_right(scheme, size):
     """The first mode swings as a cosine with the frequency of the eigenvalue problem."""

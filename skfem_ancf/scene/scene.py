@@ -40,7 +40,8 @@ from ..solvers.continuation import Point
 from ..visuals.explore import Explorer, explorer
 from ..visuals.html import scene_html
 from ..visuals.matplotlib import plot_scene
-from .adapt import DEGREES, GOALS, MOST_ELEMENTS, solve_adaptive
+from .adapt import (DEGREES, GOALS, MOST_ELEMENTS, frequency_errors, solve_adaptive,
+                    warn_of_frequencies)
 from .design import Gradient
 from .linear_model import LinearModel
 from .model import Entry, Model
@@ -926,8 +927,10 @@ class Scene(Model):
         Returns
         -------
         Modes
-            With ``frequencies`` in rad/s, ``shapes`` and ``mode(i, amplitude)``; ``flutter`` and
-            complex ``eigenvalues`` for loads without a potential.
+            With ``frequencies`` in rad/s, their estimated ``errors``, ``shapes`` and
+            ``mode(i, amplitude)``; ``flutter`` and complex ``eigenvalues`` for loads without a
+            potential. A ModelWarning says if the mesh is coarse for a frequency: an estimated error
+            above 3 %.
 
         Examples
         --------
@@ -941,10 +944,15 @@ class Scene(Model):
         True
         """
         with self._lock:
+            start = self.state(load=0.0) if state is None else configuration(self.system, state)
             if state is None:
-                state = self.state(load=0.0)
-                self.system.forces.contacts.require_clear(np.array(state.u), 0.0)
-            return eigen.modes(self.system, configuration(self.system, state), k)
+                self.system.forces.contacts.require_clear(np.array(start.u), 0.0)
+            found = eigen.modes(self.system, start, k)
+            found.errors = np.full(len(found.frequencies), np.nan)
+            if state is None:
+                found.errors = frequency_errors(self, found)
+                warn_of_frequencies(found.errors, self)
+            return found
 
     def buckling(self, k: int = 1, state: State | None = None) -> Buckling:
         """The k lowest buckling load factors and their shapes.
