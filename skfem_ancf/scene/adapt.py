@@ -205,7 +205,7 @@ def frequency_errors(scene: Any, modes: Modes) -> Array:
         for a, b in zip(scene.layout.members, fine.layout.members):
             part = modes.shapes[:, scene.system.of(a)]
             shapes[:, fine.system.of(b)] = part if not isinstance(a, Beam) else [
-                _prolong(a, np.arange(a.mesh.nelements), one) for one in part]
+                _prolonged(a, _halving(a), one) for one in part]
         better = improved(fine.system, shapes)
     except AncfError as error:
         logger.info("no estimate of the error of frequencies: %s", error)
@@ -282,6 +282,21 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
     return tuple(out)
 
 
+def _halving(beam):
+    """Nodal DOFs in the middle of each element by those of its ends, (ne, nb, 2 nb)."""
+    slope = np.array([f[1] for f in beam.element.functionals])
+    L = beam.mesh.lengths[:, None, None]
+    return (beam.element.halving[beam.element.nodal_dofs:] * L ** np.tile(slope, 2)) / (
+        0.5 * L) ** slope[:, None]
+
+
+def _prolonged(beam, halving, u):
+    """The same displacement on halved elements: the spaces are nested."""
+    u, t = u.reshape(-1, beam.element.nodal_dofs, 2), beam.mesh.t
+    middle = np.einsum("eij,ejc->eic", halving, np.concatenate([u[t[0]], u[t[1]]], axis=1))
+    return np.insert(u, t[1], middle, axis=0).ravel()
+
+
 def _mark(coarse, state, fine, better, split):
     """Elements of the coarse mesh with most of the difference in the energy norm.
 
@@ -295,16 +310,10 @@ def _mark(coarse, state, fine, better, split):
         if not s:
             errors.append(np.zeros(a.mesh.nelements))
             continue
-        v, t, nb = better.u_of(b), a.mesh.t, a.element.nodal_dofs
-        slope = np.array([f[1] for f in a.element.functionals])
-        L = a.mesh.lengths[:, None, None]
-        halving = (a.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]
-        # the same displacement on the finer mesh: the spaces are nested
-        u = state.u_of(a).reshape(-1, nb, 2)
-        middle = np.einsum("eij,ejc->eic", halving, np.concatenate([u[t[0]], u[t[1]]], axis=1))
-        d = v - np.insert(u, t[1], middle, axis=0).ravel()
+        v, t, nb, halving = better.u_of(b), a.mesh.t, a.element.nodal_dofs, _halving(a)
+        d = v - _prolonged(a, halving, state.u_of(a))
         # the force on the finer mesh, restricted to the coarse one by the transpose
-        new = np.insert(np.zeros(len(u), dtype=bool), t[1], True)
+        new = np.insert(np.zeros(a.mesh.p.shape[1], dtype=bool), t[1], True)
         force = after[fine.system.of(b)].reshape(-1, nb, 2)
         gap, shares = force[~new], np.einsum("eij,eic->ejc", halving, force[new])
         np.add.at(gap, t[0], shares[:, :nb])
