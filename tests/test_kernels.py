@@ -137,7 +137,7 @@ def test_loops_are_arrays(kind, mesh):
     (u, v), ld = states(k), 4 * k.nd + 6
     stiff = np.abs(k.tangents(u)).max()
     for t in k.tables:
-        x, y, ns = Elements(t), compiled_tables(t, none.astype(int)), len(t.start) * t.rows.shape[1]
+        x, y, ns = Elements(t), compiled_tables(t), len(t.start) * t.rows.shape[1]
         given = np.sin(np.arange(1.0, ns + 1.0))
         eigen, linear = given, t.law.kind == law.LINEAR
         if not linear:

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.band import add_multiple, clear, copy, mirror
+from ..core.band import Band, add_multiple, clear, copy, mirror
 from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_mean, add_eigen_tangent,
                                   put_eigenstrains)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from ..core.callbacks import custom_force, custom_joints, custom_load_stiffness, custom_mean_force
-from ..core.source import F1, F2, I1, indices, primitive, source
+from ..core.source import F1, F2, I1, apart, indices, primitive, source
 
 
 #: Number of ``lasting`` from which on materials have a history, see
@@ -99,7 +99,7 @@ def subtract_from_band(A, i, j, v, x, k):
 # joints
 
 
-@source
+@apart("joints", JointTables, F1, F1, float, F1, F1)
 def constraint(joints, c, g, t, u, phi):
     """Phi at u."""
     if joints.custom > 0:
@@ -113,7 +113,7 @@ def constraint(joints, c, g, t, u, phi):
     add_products(phi, joints.gk, g, u, joints.gi)
 
 
-@source
+@apart("joints", JointTables, F1, float, F1, F1, F1)
 def add_constraint_rate(joints, g, t, u, v, out):
     """out += J(u) v."""
     if joints.custom > 0:
@@ -123,7 +123,7 @@ def add_constraint_rate(joints, g, t, u, v, out):
     add_triples(out, joints.hk, joints.hv, v, joints.hi, u, joints.hj)
 
 
-@source
+@apart("joints", JointTables, F1, float, F1, F1, F1)
 def add_joint_force(joints, g, t, u, multipliers, out):
     """out += J(u)^T multipliers."""
     if joints.custom > 0:
@@ -139,7 +139,7 @@ def add_curvature_force(joints, multipliers, v, out):
     add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, v, joints.hj)
 
 
-@source
+@apart("joints", JointTables, F1, float, F1, F2)
 def joint_directions(joints, g, t, u, J):
     """J(u), dense, shape (m, N)."""
     flat = J.reshape(J.size)
@@ -189,49 +189,65 @@ def carry_eigenstrains(loads, factors):
         put_eigenstrains(loads.eigenstrained, _eigenstrains(loads, factors))
 
 
-@source
+@apart("eigenstrains", LoadTables, F1, F1, F1, F1)
+def _add_eigen_force(loads, factors, u, v, out):
+    """Add the force of eigenstrains, or, with v, its mean from u to v."""
+    f, given = np.zeros(u.size), _eigenstrains(loads, factors)
+    if v.size > 0:
+        add_eigen_mean(loads.eigenstrained, u, v, given, f)
+    else:
+        add_eigen_force(loads.eigenstrained, u, given, f)
+    add_multiple(-1.0, f, out)
+
+
+@apart("eigenstrains", LoadTables, F1, F1, F1, int)
+def _add_eigen_tangent(loads, factors, u, lower, ld):
+    """Subtract the derivative of the force of eigenstrains from a lower half."""
+    add_eigen_tangent(loads.eigenstrained, u, _eigenstrains(loads, factors), lower, ld)
+
+
+@apart("statics", LoadTables, F1, float, float, F1, F1)
 def external_force(loads, factors, t, scale, u, out):
     """External force of all loads; ``scale`` multiplies user-defined ones, others have factors."""
     _dead_force(loads, factors, out)
-    add_moments(loads.moments, _of_moments(loads, factors), u, out)
+    if loads.moments.M.size > 0:
+        add_moments(loads.moments, _of_moments(loads, factors), u, out)
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
     if loads.eigenstrains.shape[0] > 0:
-        f = np.zeros(u.size)
-        add_eigen_force(loads.eigenstrained, u, _eigenstrains(loads, factors), f)
-        add_multiple(-1.0, f, out)
+        _add_eigen_force(loads, factors, u, u[:0], out)
     if loads.custom > 0:
         custom_force(loads.custom, t, scale, u, out)
 
 
-@source
+@apart("motion", LoadTables, F1, float, F1, F1, F1)
 def mean_external_force(loads, factors, t, u0, u1, out):
     """Mean force of all loads from u0 to u1, whose work is minus the change of the potentials."""
     _dead_force(loads, factors, out)
-    add_mean_moments(loads.moments, _of_moments(loads, factors), u0, u1, out)
+    if loads.moments.M.size > 0:
+        add_mean_moments(loads.moments, _of_moments(loads, factors), u0, u1, out)
     if loads.rows.size > 0:
         middle = np.empty(out.size)
         for i in indices(out.size):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
     if loads.eigenstrains.shape[0] > 0:
-        f = np.zeros(u0.size)
-        add_eigen_mean(loads.eigenstrained, u0, u1, _eigenstrains(loads, factors), f)
-        add_multiple(-1.0, f, out)
+        _add_eigen_force(loads, factors, u0, u1, out)
     if loads.custom > 0:
         custom_mean_force(loads.custom, t, u0, u1, out)
 
 
-@source
+@apart("statics", LoadTables, F1, float, float, F1, Band)
 def add_load_stiffness(loads, factors, t, scale, u, A):
     """Subtract the derivative of :func:`external_force` from a band matrix.
 
     If only the lower half is stored, symmetric entries come first, then the upper half.
     """
     lower = A.flat[A.top:]
-    add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
+    if loads.moments.M.size > 0:
+        add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
     if loads.eigenstrains.shape[0] > 0:
-        add_eigen_tangent(loads.eigenstrained, u, _eigenstrains(loads, factors), lower, A.ld)
+        _add_eigen_tangent(loads, factors, u, lower, A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)

@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.linalg import blas, lapack
 from scipy.sparse.linalg import splu
 
-from .source import F1, I1, indices, primitive, shaped, source
+from .source import F1, I1, apart, indices, primitive, shaped, source
 from .types import Array
 
 #: Zeros after each column of a lower half, for vectorised loops over four columns.
@@ -31,10 +31,6 @@ HALVES = -1
 REPEATED = 1e-13
 
 
-#: Addresses of the compiled functions of bands, see :mod:`skfem_ancf.core.loops`.
-ADDRESSES = np.zeros(5, np.int64)
-
-
 class Band(NamedTuple):
     """A band matrix: entries, pivots of ``gbtrf``, and layout."""
 
@@ -43,7 +39,6 @@ class Band(NamedTuple):
     ld: int
     width: int
     top: int
-    kernels: I1 = ADDRESSES
 
 
 class CoupledBand(Band):
@@ -251,20 +246,20 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
     return True
 
 
-@source
+@apart("band", Band, Band, I1, F1, F1, returns=int)
 def solve_definite(A, L, fixed, b, x):
-    """x = A^-1 b by L D L^T factors in L, with these rows fixed; False unless A is definite."""
+    """x = A^-1 b by L D L^T factors in L, with these rows fixed; 0 unless A is definite."""
     fix(A, fixed)
     copy(A.flat, L.flat)
     copy(b, x)
     if not factorize(L):
-        return False
+        return 0
     rows = L.flat.reshape(x.size, L.ld)
     for j in range(x.size):
         if not rows[j, 0] > 0.0:
-            return False
+            return 0
     solve(L, x)
-    return True
+    return 1
 
 
 def solve_many(A: Band, B: Array, X: Array) -> None:

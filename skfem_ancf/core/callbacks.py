@@ -5,13 +5,16 @@ An object is known by a handle, a positive integer that compiled code can store.
 
 import signal
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
-from threading import current_thread, main_thread
+from ctypes import c_double
+from threading import current_thread, get_ident, main_thread
 from typing import Any
 
-from .source import primitive
+import numpy as np
+
+from .source import PYTHON, apart, primitive
 
 # signals such as Ctrl-C while compiled code runs
 
@@ -128,9 +131,11 @@ def call_solver(handle, t, u, multipliers, R, phi, du, dm):
     return bool(owner(handle).solve_into(t, u, multipliers, R, phi, du, dm))
 
 
+#: Number of the question for poses.
+POSES = 5
 #: Callbacks of compiled code by number, with one signature: a handle, a selector, a time, a factor
 #: and three arrays.
-QUESTIONS = (
+_QUESTIONS = (
     lambda handle, what, t, scale, u, _, out: custom_force(handle, t, scale, u, out),
     lambda handle, what, t, _, u0, u1, out: custom_mean_force(handle, t, u0, u1, out),
     lambda handle, what, t, scale, u, _, flat: custom_load_stiffness(handle, t, scale, u, flat),
@@ -138,3 +143,50 @@ QUESTIONS = (
     custom_elements,
     lambda handle, what, t, span, _, __, poses: custom_poses(handle, t, span, poses),
 )
+#: Exceptions of callbacks by thread, which compiled code cannot raise.
+_raised: dict[int, BaseException] = {}
+
+
+def kept(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that keeps its exception for :func:`raise_kept`, and then does nothing."""
+    def run(*args):
+        if get_ident() not in _raised:
+            try:
+                return function(*args)
+            except BaseException as error:
+                _raised[get_ident()] = error
+        return 0
+
+    return run
+
+
+def raise_kept() -> None:
+    """Raise the exception of a callback in this thread, if any."""
+    if _raised:
+        error = _raised.pop(get_ident(), None)
+        if error is not None:
+            raise error
+
+
+def _view(address, n):
+    """The n numbers at an address."""
+    return np.frombuffer((c_double * n).from_address(address)) if n else np.zeros(0)
+
+
+@apart(PYTHON, *3 * [int], *2 * [float], *6 * [int])
+def ask(question, handle, what, t, x, a, m, b, n, out, k):
+    """Answer a question of compiled code; arrays are given by address and size."""
+    answer = _view(out, k)
+    try:
+        _QUESTIONS[question](handle, what, t, x, _view(a, m), _view(b, n), answer)
+    except BaseException:
+        if question != POSES:
+            answer[:] = np.nan  # ends the iteration
+        raise
+
+
+@apart(PYTHON, int, float, *12 * [int], returns=int)
+def solved(handle, t, u, a, m, b, R, c, phi, d, du, e, dm, f):
+    """:func:`call_solver` for compiled code."""
+    return call_solver(handle, t, _view(u, a), _view(m, b), _view(R, c), _view(phi, d),
+                       _view(du, e), _view(dm, f))

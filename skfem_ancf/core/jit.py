@@ -8,26 +8,33 @@ therefore called by address.
 from __future__ import annotations
 
 import pickle
+from ctypes import CFUNCTYPE, c_double, c_int64, c_void_p, cast
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
+from inspect import signature
 from typing import Any
 
+import numpy as np
+from llvmlite import binding, ir
 from numba import cfunc, njit, types, typeof
-from numba.extending import intrinsic, lower_getattr_generic, models, overload, register_model
+from numba.extending import (intrinsic, lower_builtin, lower_getattr_generic, models, overload,
+                             register_model, type_callable)
 
+from .callbacks import kept as keeping
 from .code_cache import cannot_keep, can_keep, key, nothing_collected, verified
-from .source import MARKED
+from .source import APART, MADE, MARKED, PYTHON, apart
 from .words import Words, hints
 
 
 # without "nnan" and "ninf", since strains that are not finite must be detected
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 #: Numba types by annotation.
-SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(None): types.none}
-#: ``Annotated[Kind, MADE]`` marks a small named tuple that compiled code makes by value.
-MADE = "made"
+SCALARS = {int: types.int64, float: types.float64, bool: types.boolean, type(None): types.void,
+           None: types.void}
+#: ctypes of functions in Python.
+_C: dict[Any, Any] = {int: c_int64, float: c_double, None: None}
 _DTYPES = {"f": types.float64, "i": types.int64}
 #: Exceptions of a damaged cache.
 _SPOILT = RuntimeError, OSError, EOFError, pickle.PickleError, KeyError, ValueError
@@ -36,15 +43,15 @@ _registered: set[Any] = set()
 
 def register() -> None:
     """Let compiled code call all marked functions."""
-    while len(_registered) < len(MARKED):
-        for function, module in list(MARKED.items()):
-            if function not in _registered:
-                _registered.add(function)
-                loops = import_module(module) if module else None
-                found = getattr(loops, function.__name__, function)
-                _register(function, found)
-                if found is not function and callable(found):
-                    _register(found, found)  # loops call each other
+    while new := [one for one in MARKED.items() if one[0] not in _registered]:
+        for function, module in new:
+            loops = import_module(module) if module else None
+            found = getattr(loops, function.__name__, function)
+            for one in [function, found] if callable(found) else [function]:
+                if one not in _registered:  # loops call each other too
+                    _registered.add(one)
+                    alone = callable(found) and found in APART
+                    (_register_apart if alone else _register)(one, found)
 
 
 def _register(function, found):
@@ -52,6 +59,88 @@ def _register(function, found):
               inline="never" if callable(found) else "always")
     def choose(*args):
         return found if callable(found) else found[len(args)]
+
+
+def _register_apart(function, found):
+    """Let compiled code call a function by the address in its cell, which is found at need."""
+    apart, name = APART[found], _cell(found)[1]
+    takes, returns = tuple(map(type_of, apart.takes)), SCALARS[apart.returns]
+
+    def typed(*args):
+        return returns
+
+    if apart.part == PYTHON:
+        load(found)
+    vars(typed)["__signature__"] = signature(found)
+    type_callable(function)(lambda context: typed)
+
+    @lower_builtin(function, types.VarArg(types.Any))
+    def call(context, builder, made, args):
+        word, known = context.get_value_type(types.int64), builder.module.globals
+
+        def cell(name):
+            return known.get(name) or ir.GlobalVariable(builder.module, word, name)
+
+        def call_at(place, kind, args):
+            address = builder.load(place)
+            return builder.call(builder.inttoptr(address, context.get_value_type(kind)), args)
+
+        place = cell(name)
+        with builder.if_then(builder.icmp_signed("==", builder.load(place), word(0)), likely=False):
+            call_at(cell(_cell(find)[1]), types.FunctionPrototype(types.void, (types.int64,)),
+                    [builder.ptrtoint(place, word)])
+        given = [context.cast(builder, *one) for one in zip(args, made.args, takes)]
+        result = call_at(place, types.FunctionPrototype(returns, takes), given)
+        return context.get_dummy_value() if returns == types.void else result
+
+
+#: Addresses of the functions that compiled code calls by address, or 0, in arrays of one number.
+_CELLS: dict[Any, Any] = {}
+
+
+def _cell(function):
+    """The cell of a function, and the name by which compiled code finds it."""
+    name = f"{function.__module__}.{function.__qualname__}"
+    if function not in _CELLS:
+        _CELLS[function] = np.zeros(1, np.int64)
+        binding.add_symbol(name, _CELLS[function].ctypes.data)
+    return _CELLS[function], name
+
+
+@CFUNCTYPE(None)
+def _nothing():
+    pass
+
+
+@apart(PYTHON, int)
+def find(place):
+    """Load the function whose cell is at an address."""
+    function, cell = next(x for x in _CELLS.items() if x[1].ctypes.data == place)
+    try:
+        load(function)
+    except BaseException:
+        cell[0] = cast(_nothing, c_void_p).value  # until the exception is raised
+        raise
+
+
+
+def load(function: Any) -> None:
+    """Compile a function that is called by address, or load it from disk."""
+    cell, apart = _cell(function)[0], APART[function]
+    if cell[0] == 0 and apart.part == PYTHON:
+        kind = CFUNCTYPE(_C[apart.returns], *(_C[x] for x in apart.takes))
+        _alive.append(kind(keeping(function)))
+        cell[0] = cast(_alive[-1], c_void_p).value
+    elif cell[0] == 0:
+        cell[0] = address(function, apart.takes, returns=apart.returns)
+
+
+def load_part(part: str) -> None:
+    """Load all functions of a part."""
+    register()
+    for function, one in APART.items():
+        if one.part == part:
+            load(function)
 
 
 class Record(types.NamedTuple):
@@ -218,12 +307,13 @@ def _words(x, known):
     return found
 
 
-def address(function: Any, hints: Any, name: str = "", kept: bool = True) -> int:
+def address(function: Any, hints: Any, name: str = "", kept: bool = True,
+            returns: Any = None) -> int:
     """The address of a compiled function with annotated arguments, see :func:`caller`.
 
     ``name`` distinguishes it on disk; it is cached if ``kept``.
     """
-    signature, function = types.void(*map(type_of, hints)), _named(function, name)
+    signature, function = SCALARS[returns](*map(type_of, hints)), _named(function, name)
 
     def made(**options):
         return cfunc(signature, **options, **OPTIONS)

@@ -4,12 +4,10 @@ Each replaces the function of its name that :func:`skfem_ancf.core.source.primit
 """
 
 import numpy as np
-from numba import objmode
 
-from . import callbacks
+from .callbacks import ask, solved
 from .band import LOST, REPEATED, SPARE, Band
-from .jit import caller
-from .source import F1, F2, source
+from .source import F1, F2, I1, apart, source
 
 indices = {1: lambda n: range(n), 2: lambda a, b: range(a, b), 3: lambda a, b, s: range(a, b, s)}
 
@@ -18,27 +16,31 @@ def column(x):
     return x
 
 
-# band matrices; the functions of BANDS are compiled once and called by address
+# band matrices
 
 
 def multiply(A, x, y):
-    _call_multiply(A.kernels[0], (A, x, y))
+    if A.top > 0:
+        multiply_both(A, x, y)
+    else:
+        multiply_lower(A.flat, A.ld, A.width, x, y)
 
 
 def factorize(A):
-    done = np.empty(1)
-    _call_factorize(A.kernels[1 if A.top == 0 else 3], (A, done))
-    return done[0] > 0.0
+    if A.top == 0:
+        return factorize_lower(A.flat, A.ld, A.width) > 0
+    return (exchange(A) if A.top > 0 else factorize_halves(A)) > 0
 
 
 def solve(A, x):
-    _call_solve(A.kernels[2], (A, x))
+    if A.top > 0:
+        solve_exchanged(A, x)
+    else:
+        solve_lower(A.flat, A.ld, A.width, A.ld // 2 if A.top < 0 else 0, x)
 
 
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
-    done = np.empty(1)
-    _call_joined(A.kernels[4], (A, J, J1, free, anew, Y, S, b, x, done))
-    return done[0] > 0.0
+    return join(A, J, J1, free, 1 if anew else 0, Y, S, b, x) > 0
 
 
 # symmetric: four columns at once, since zeros after each column replace entries that it lacks.
@@ -48,16 +50,8 @@ U = np.uint64
 I, J, K = U(1), U(2), U(3)
 
 
-@source
-def put_product(A, x, y):
-    if A.top > 0:
-        _multiply_both(A, x, y)
-    else:
-        _multiply_lower(A.flat, A.ld, A.width, x, y)
-
-
-@source
-def _multiply_both(A, x, y):
+@apart("bands", Band, F1, F1)
+def multiply_both(A, x, y):
     n, top = x.size, A.top
     columns = A.flat.reshape(n, A.ld)
     y[:] = 0.0
@@ -68,8 +62,8 @@ def _multiply_both(A, x, y):
             out[k] += column[k] * x[j]
 
 
-@source
-def _multiply_lower(A, ld, width, x, y):
+@apart("band", F1, int, int, F1, F1)
+def multiply_lower(A, ld, width, x, y):
     n = x.size
     last = n - n % 4
     y[:] = 0.0
@@ -101,18 +95,8 @@ def add_multiple(c, x, y):
         y[i] += c * x[i]
 
 
-@source
-def put_symmetric_factors(A, done):
-    done[0] = 1.0 * _factorize_lower(A.flat, A.ld, A.width)
-
-
-@source
-def put_factors(A, done):
-    done[0] = 1.0 * _exchanging(A) if A.top > 0 else 1.0 * _factorize_halves(A)
-
-
-@source
-def _factorize_lower(A, ld, width):
+@apart("band", F1, int, int, returns=int)
+def factorize_lower(A, ld, width):
     n = A.size // ld
     for j in range(0, n, 4):
         m, w, y, z = min(4, n - j), (j + 1) * ld, (j + 2) * ld, (j + 3) * ld
@@ -134,25 +118,25 @@ def _factorize_lower(A, ld, width):
                     for i in range(size):
                         A[b + i] -= c * A[p + i]
             if not abs(A[b]) > LOST * abs(before):
-                return False
+                return 0
         for l in range(m):
             p = U((j + l) * ld)
             if not 0.0 < abs(A[p]) < np.inf:
-                return False
+                return 0
             c = 1.0 / A[p]
             for i in range(I, U(width + 1)):
                 A[p + i] *= c
-    return True
+    return 1
 
 
-@source
-def _factorize_halves(A):
+@apart("bands", Band, returns=int)
+def factorize_halves(A):
     n = A.flat.size // A.ld
     L = A.flat.reshape(n, 2, A.ld // 2)  # entry i of half h of column j
     for j in range(n):
         m, d = min(A.width, n - 1 - j), L[j, 0, 0]
         if not 0.0 < abs(d) < np.inf:
-            return False
+            return 0
         inverse = 1.0 / d
         for k in range(1, m + 1):
             before, c, d = L[j + k, 0, 0], L[j, 1, k] * inverse, L[j, 0, k] * inverse
@@ -160,15 +144,15 @@ def _factorize_halves(A):
                 L[j + k, 0, i] -= c * L[j, 0, k + i]
                 L[j + k, 1, i] -= d * L[j, 1, k + i]
             if not abs(L[j + k, 0, 0]) > LOST * abs(before):
-                return False
+                return 0
         for k in range(1, m + 1):
             L[j, 0, k] *= inverse
             L[j, 1, k] *= inverse
-    return True
+    return 1
 
 
-@source
-def _exchanging(A):
+@apart("bands", Band, returns=int)
+def exchange(A):
     """As LAPACK's gbtf2."""
     ld, top, width = A.ld, A.top, A.width
     n = A.flat.size // ld
@@ -180,7 +164,7 @@ def _exchanging(A):
                 p = i
         A.pivots[j] = j + p
         if not abs(flat[at + p]) > 0.0 or not abs(flat[at + p]) < np.inf:
-            return False
+            return 0
         last = max(last, min(j + width + p, n - 1))
         if p != 0:
             for c in range(j, last + 1):
@@ -195,19 +179,11 @@ def _exchanging(A):
             if x != 0.0:
                 for i in range(1, m + 1):
                     flat[row + i] -= flat[at + i] * x
-    return True
+    return 1
 
 
-@source
-def put_solution(A, x):
-    if A.top > 0:
-        _solve_exchanged(A, x)
-    else:
-        _solve_lower(A.flat, A.ld, A.width, A.ld // 2 if A.top < 0 else 0, x)
-
-
-@source
-def _solve_lower(A, ld, width, half, x):
+@apart("band", F1, int, int, int, F1)
+def solve_lower(A, ld, width, half, x):
     n = x.size
     last = n - n % 4
     for j in range(0, last, 4):
@@ -245,8 +221,8 @@ def _solve_lower(A, ld, width, half, x):
         x[j], x[j + 1], x[j + 2], x[j + 3] = a, b, c, d
 
 
-@source
-def _solve_exchanged(A, x):
+@apart("bands", Band, F1)
+def solve_exchanged(A, x):
     """As LAPACK's gbtrs."""
     flat, ld, top, n, reach = A.flat, A.ld, A.top, x.size, A.width
     for j in range(n):
@@ -404,13 +380,13 @@ def subtract_rows(J, x, out):
             out[i] -= J[k, i] * x[k]
 
 
-@source
-def put_joined(A, J, J1, free, anew, Y, S, b, x, done):
-    if anew:
+@apart("bands", Band, F2, F2, F1, int, F2, F2, F1, F1, returns=int)
+def join(A, J, J1, free, anew, Y, S, b, x):
+    if anew > 0:
         for k in range(b.size):
             for i in range(x.size):
                 Y[k, i] = J[k, i] * free[i]
-            put_solution(A, Y[k])
+            solve(A, Y[k])
     for k in range(b.size):
         for l in range(b.size):
             s = 0.0
@@ -419,18 +395,10 @@ def put_joined(A, J, J1, free, anew, Y, S, b, x, done):
             S[k, l] = s
         for i in range(x.size):
             b[k] += J1[k, i] * x[i]
-    done[0] = 1.0 * solve_dependent(S, b)
-    if done[0] > 0.0:
-        subtract_rows(Y, b, x)
-
-
-#: Large functions with annotations of their arguments, in the order of their addresses.
-BANDS = {put_product: (Band, F1, F1), put_symmetric_factors: (Band, F1), put_solution: (Band, F1),
-         put_factors: (Band, F1), put_joined: (Band, F2, F2, F1, bool, F2, F2, F1, F1, F1)}
-#: Those of statics are the first three.
-STATIC = 3
-_call_multiply, _call_factorize, _call_solve, _, _call_joined = (
-    caller(*hints) for hints in BANDS.values())
+    if not solve_dependent(S, b):
+        return 0
+    subtract_rows(Y, b, x)
+    return 1
 
 
 # sums
@@ -507,8 +475,8 @@ def subtract_from_band(A, i, j, v, x, k):
 
 @source
 def _ask(question, handle, what, t, x, a, b, out):
-    with objmode():
-        callbacks.QUESTIONS[question](handle, what, t, x, a, b, out)
+    ask(question, handle, what, t, x, a.ctypes.data, a.size, b.ctypes.data, b.size,
+        out.ctypes.data, out.size)
 
 
 def custom_force(handle, t, scale, u, out):
@@ -536,9 +504,9 @@ def custom_poses(handle, t, span, poses):
 
 
 def call_solver(handle, t, u, multipliers, R, phi, du, dm):
-    with objmode(done="boolean"):
-        done = callbacks.call_solver(handle, t, u, multipliers, R, phi, du, dm)
-    return done
+    return solved(handle, t, u.ctypes.data, u.size, multipliers.ctypes.data, multipliers.size,
+                  R.ctypes.data, R.size, phi.ctypes.data, phi.size, du.ctypes.data, du.size,
+                  dm.ctypes.data, dm.size) > 0
 
 
 def custom_distance(handle, obstacle, t, x, out):
@@ -553,6 +521,7 @@ def everywhere(condition):
     return condition
 
 
+@apart("band", F1, int, int, int, I1)
 def fix_stored(flat, ld, width, top, fixed):
     n, step = flat.size // ld, max(1, ld - 1)
     for i in fixed:

@@ -20,7 +20,7 @@ Rules for an index ``e`` of :func:`indices`:
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -42,6 +42,35 @@ def source(function: _Function) -> _Function:
     """Mark a function for compilation."""
     MARKED[function] = None
     return function
+
+
+class Apart(NamedTuple):
+    """How compiled code calls a function of :func:`apart`."""
+
+    part: str
+    takes: tuple[Any, ...]  # annotations of the arguments
+    returns: Any  # int, float or None
+
+
+#: ``Annotated[Kind, MADE]`` marks a small named tuple that compiled code makes by value.
+MADE = "made"
+#: The part of functions that run in Python.
+PYTHON = "Python"
+#: Functions that compiled code calls by address.
+APART: dict[Any, Apart] = {}
+
+
+def apart(part: str, *takes: Any, returns: Any = None) -> Callable[[_Function], _Function]:
+    """Mark a function that is compiled once for all callers, which call it by its address.
+
+    LLVM optimises others again in each caller, and in the callers of that. ``part`` is a name of
+    what is loaded together, ``takes`` are annotations of the arguments.
+    """
+    def mark(function: _Function) -> _Function:
+        APART[function] = Apart(part, takes, returns)
+        return source(function)
+
+    return mark
 
 
 def primitive(module: str) -> Callable[[_Function], _Function]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from copy import copy
 from functools import partial
 from threading import RLock
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ..beam.kernels.law import CUSTOM, HISTORY
 from ..core import code_cache
 from ..core.immutable import cached_property
-from ..core.callbacks import deferred
+from ..core.callbacks import deferred, raise_kept
 from ..core.progress import announced_bar
 from ..core.switch import compiled_off, wanted
 from .tables import Tables
@@ -23,15 +23,17 @@ logger = logging.getLogger(__name__)
 #: Compiled functions and parts of this process by name.
 LOADED: dict[str, Any] = {}
 #: Parts that are called by address and that most scenes use, and those of some functions.
-PARTS = "StrainTables", "elements", "contacts", "band", "bands", "unsymmetric"
-NEEDED = {"equilibrium": ["band"], "steps": ["band", "bands", "unsymmetric"],
+PARTS = ("StrainTables", "cables", "own", "elements", "contacts", "moments", "joints", "band",
+         "bands", "unsymmetric", "statics", "motion")
+NEEDED = {"equilibrium": ["band", "statics"], "steps": ["band", "motion"],
           "collocate": ["band", "bands", "gradients"]}
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
-COMPILING = {"StrainTables": 15.0, "elements": 5.0, "contacts": 17.0,
-             "unsymmetric": 7.0, "band": 3.0, "bands": 5.0, "equilibrium": 11.0, "tangent": 1.0,
-             "force": 0.5, "linearised": 0.5, "steps": 27.0}
+COMPILING = {"StrainTables": 8.0, "cables": 1.0, "own": 1.0, "elements": 5.0, "contacts": 17.0,
+             "moments": 1.0, "joints": 1.0, "unsymmetric": 6.0, "band": 3.0, "bands": 4.0,
+             "statics": 4.0, "motion": 1.0, "equilibrium": 1.5, "tangent": 0.5,
+             "force": 0.2, "linearised": 0.2, "steps": 27.0}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
               "mean_force": 1.0, "viscous_force": 1.0}
@@ -193,14 +195,14 @@ class Backend:
         except Exception as error:  # a user's function, or an incompatible Numba
             self._give_up(kernel, error)
             return self._in_numpy(kernel)
-        if not calls:
-            return function
 
-        def interruptible(*args):
-            with deferred():
-                return function(*args)
+        def checked(*args):
+            with deferred() if calls else nullcontext():
+                found = function(*args)
+            raise_kept()
+            return found
 
-        return interruptible
+        return checked
 
     def keep_factors(self) -> None:
         """Let the tangent have the factors of the last compiled iteration."""
@@ -247,10 +249,11 @@ class Backend:
 
 def load_part(name: str, update: Callable[[str], None]) -> None:
     """Compile a part or load it; calls ``update(name)``."""
-    from . import loops
+    from ..core import jit
 
     if name not in LOADED:
-        LOADED[name] = loops.part(name)
+        jit.load_part(name)
+        LOADED[name] = True
         code_cache.note(name)
         update(name)
 

@@ -1,6 +1,6 @@
 """Evaluations of the equations of a scene, which run in NumPy or compiled."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, ca
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
 from ..core.band import diagonal, dot, largest, weighted_square
-from ..core.source import indices, source
+from ..core.source import F1, F2, MADE, apart, indices, source
+from .tables import Equations
 
 
-@source
+@apart("statics", Equations, F1, float, F1)
 def force(e, u, at, f):
     """Set the internal force f at u; ``at`` is the time, or the load factor in statics."""
     body_force(e.body, u, f)
@@ -34,7 +35,7 @@ def viscous_force(e, u, v, f):
     add_viscous_force(e.viscous, u, v, f)
 
 
-@source
+@apart("statics", Equations, F1, F1, float, float, float, bool, F1, F1, F1)
 def tangent(e, u, factors, t, scale, at, use_independent, stresses, independent, f):
     """Set internal force, stresses, and the tangent of the residual, in ``e.K``.
 
@@ -72,14 +73,14 @@ U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, MOVED, ROWS = range(9)
 SMALLEST = 1e-14
 
 
-@source
-def balance(e, target, factors, first, last, mixed, g, x, m, stresses):
+@apart("statics", Equations, Annotated[Target, MADE], F2, bool, bool, bool, F1, F2, F2, F2, F1)
+def balance(e, target, factors, first, last, mixed, g, x, m, stresses, norms):
     """Set forces, residual, tangent and its inverse diagonal; if ``last``, without the tangent.
 
     ``factors`` are load factors and those for the first tangent; ``m`` the multipliers and
     residuals of joints, and in row 3 their c; ``stresses`` those of the strain and the independent
     ones. If ``mixed``, the geometric part uses the last stresses, linearised along the correction.
-    Returns the norms of residual and larger force, and the largest relative residual of joints.
+    ``norms`` gets those of residual and larger force, and the largest relative residual of joints.
     """
     u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
     gap, opened = x[GAP], 0.0
@@ -113,7 +114,7 @@ def balance(e, target, factors, first, last, mixed, g, x, m, stresses):
     for i in indices(u.size):
         R[i] *= e.free[i]
     size = np.sqrt(max(weighted_square(f, weights), weighted_square(load, weights)))
-    return np.sqrt(weighted_square(R, weights)), size, opened
+    norms[0], norms[1], norms[2] = np.sqrt(weighted_square(R, weights)), size, opened
 
 
 @source
@@ -138,7 +139,7 @@ def mean_stiffness(diagonal, sizes):
 LEFT, TRIES, PARTS = 0.5, 12, 16
 
 
-@source
+@apart("contacts", Equations, float, F1, F1, F1, F1)
 def hold_back(e, t, u, R, du, dm):
     """Line search for a correction that runs into obstacles; scales du and dm.
 

@@ -14,7 +14,7 @@ from ..actions.forces.kernels import ForceTables
 from ..beam.kernels.histories import remembering
 from ..beam.kernels.law import HISTORY, LINEAR
 from ..beam.kernels.moments import MomentPack
-from ..beam.kernels.tables import linearised
+from ..beam.kernels.tables import CABLE, linearised
 from ..core.callbacks import handle_of
 from ..core.source import F1, I1
 from ..core.words import constant
@@ -93,7 +93,9 @@ class Tables:
     def parts(self) -> list[str]:
         """Compiled parts that the scene uses, see :mod:`skfem_ancf.equations.loops`."""
         forces, packs = self.plain.forces, self.plain.body.packs
-        used = {"StrainTables": len(packs) > 0, "elements": forces.number > 0,
+        used = {"StrainTables": len(packs) > 0, "cables": any(t.kind == CABLE for t in packs),
+                "moments": self.plain.loads.moments.M.size > 0,
+                "joints": self.system.constraints.m > 0, "elements": forces.number > 0,
                 "laws": any(t.law.kind != LINEAR for t in packs),
                 "contacts": forces.contacts.number > 0,
                 "eigenstrains": len(self.plain.loads.eigenstrains) > 0}

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..actions.tables import add_constraint_rate
 from ..core.band import dot, multiply, solve_definite
 from ..core.callbacks import call_solver
-from ..core.source import indices, source
+from ..core.source import F1, MADE, apart, indices, source
 from ..core.types import Array
 from ..equations.backend import Backend
+from ..equations.tables import Equations
 from ..equations.evaluation import (DU, FORCE, GAP, LOAD, MOVED, RESIDUAL, ROWS, U, Target, balance,
                                     hold_back)
 
@@ -106,12 +107,13 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     u, du, force, load, R, moved = x[U], x[DU], x[FORCE], x[LOAD], x[RESIDUAL], x[MOVED]
     multipliers, phi, dm = m[0], m[1], m[2]
     by_band = target.definite and e.factors.flat.size > 0
+    norms = np.empty(3)
     quiet, last, moving, k = False, False, target.moving, 0
     work = before = reference = np.inf
     while True:
         # the last residual needs no tangent
-        rho, size, opening = balance(e, target, factors, k == 0, last, rules.mixed and k > 0,
-                                     g, x, m, stresses)
+        balance(e, target, factors, k == 0, last, rules.mixed and k > 0, g, x, m, stresses, norms)
+        rho, size, opening = norms[0], norms[1], norms[2]
         if not rho < 1e300:
             return NOT_FINITE, k, k, by_band and k > 0
         residuals[k] = rho / size if size > 0.0 else 0.0
@@ -126,11 +128,11 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if k == rules.iterations:
             return NOT_CONVERGED, k + 1, k, by_band and k > 0
         if last:
-            balance(e, target, factors, False, False, rules.mixed, g, x, m, stresses)
+            balance(e, target, factors, False, False, rules.mixed, g, x, m, stresses, norms)
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
-            if not solve_definite(e.K, e.factors, e.fixed, R, du):
+            if solve_definite(e.K, e.factors, e.fixed, R, du) == 0:
                 return INDEFINITE, k + 1, k, False
             good = True
         else:
@@ -169,7 +171,7 @@ def _diverging(wary, k, work):
     return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
 
 
-@source
+@apart("statics", Equations, Annotated[Target, MADE], F1, F1, F1, F1, F1)
 def _move(e, target, g, moved, u, R, phi):
     """Let residuals take account of the prescribed changes of fixed DOFs, (N,)."""
     force = np.zeros(u.size)

@@ -10,9 +10,11 @@ In a motion the stiffness is at least ``INERTIA`` times the mass over the square
 updates of multipliers are needed.
 """
 
+from typing import Annotated
+
 import numpy as np
 
-from ...core.source import indices, primitive, source
+from ...core.source import F1, MADE, apart, indices, source
 from ..tables import add_each
 from .active_set import near_points, project, search, stride, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface
@@ -21,7 +23,7 @@ from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_sl
 from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, BILATERAL,
                      DAMPED_TANGENT, DAMPING, END, FORCE, FRICTION, GAP, LARGEST, MULTIPLIER, NOW,
                      OFFSET, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING, STIFFNESS, TOLERANCE,
-                     hardening, pair_of, transition)
+                     ContactTables, Question, hardening, pair_of, transition)
 
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
@@ -37,17 +39,11 @@ INSIDE, NOWHERE = 1e-9, 1e-14
 NX, NY = FOUND + 1, FOUND + 2
 
 
-@source
+@apart("contacts", ContactTables, Annotated[Question, MADE], F1, F1, F1)
 def of_contacts(tables, asked, u, v, out):
     """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     for k in range(tables.number):
         of_pair(pair_of(tables, k), asked, u, v, out)
-
-
-@primitive("skfem_ancf.equations.loops")
-def run_contacts(tables, asked, u, v, out):
-    """As :func:`of_contacts`; compiled once for all kernels that call it."""
-    of_contacts(tables, asked, u, v, out)
 
 
 @source

@@ -70,8 +70,7 @@ class ContactTables(NamedTuple):
     ``ints`` and ``floats`` are headers of pairs, DOFs, and parameters of points and shapes;
     ``poses`` those of obstacles at the last time; ``memory`` history data. ``moving`` tells whether
     poses depend on time, ``custom`` is the handle for poses and user-defined shapes, ``lasting``
-    the sum of flags of history data: ANCHORS, TURNS, PRESSURES. ``address`` is that
-    of the compiled kernel, 0 in NumPy.
+    the sum of flags of history data: ANCHORS, TURNS, PRESSURES.
     """
 
     number: int
@@ -82,7 +81,6 @@ class ContactTables(NamedTuple):
     moving: int
     custom: int
     lasting: int = 0
-    address: int = 0
 
 
 class Pair(NamedTuple):

@@ -6,16 +6,16 @@ rows of arrays (4, n), with elements of one kind side by side. Vectors of user-d
 follow in the same array. Forces are resisting, as internal forces.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from ...core.band import clear, dot
 from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import custom_elements, custom_poses
-from ...core.source import F1, I1, indices, primitive, shaped, source
+from ...core.source import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_products
-from ..contact.kernels import run_contacts
+from ..contact.kernels import of_contacts
 from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
                               TURNS, ContactTables, Question)
 from ..contact.tables import RESISTING as RUBBING
@@ -65,8 +65,6 @@ class ForceTables(NamedTuple):
         Positions between the rows of elements that couple distant DOFs.
     custom, contacts
         Handle of user-defined elements, 0 for none; the obstacles.
-    address
-        Address of the compiled :func:`of_kinds`; 0 in NumPy.
     changing
         Number of user-defined elements whose stiffness changes its pattern.
     """
@@ -86,7 +84,6 @@ class ForceTables(NamedTuple):
     row_of: I1
     custom: int
     contacts: ContactTables
-    address: int = 0
     changing: int = 0
 
 
@@ -125,11 +122,12 @@ def turns_of(tables):
     return memory[memory.size - tables.ends[TORSION + 1] + tables.ends[TORSION]:]
 
 
-@primitive("skfem_ancf.equations.loops")
+@source
 def run_kinds(tables, what, y, w, factor, out):
-    """As :func:`of_kinds`; compiled once for all kernels that call it."""
-    kinds = Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
-    of_kinds(kinds, what, y, w, factor, out)
+    """As :func:`of_kinds`, for all kinds of the tables."""
+    if tables.number > 0:
+        kinds = Kinds(tables.number, tables.ends, tables.numbers, turns_of(tables))
+        of_kinds(kinds, what, y, w, factor, out)
 
 
 @source
@@ -140,12 +138,10 @@ def _evaluate(tables, what, t, factor, y, w, out):
         custom_elements(tables.custom, what, t, factor, y, w, out)
 
 
-@source
+@apart("elements", ForceTables, int, float, float, F1, F1, float, F1)
 def _add_force(tables, what, t, span, u, v, start, f):
     """Add the force for vectors at u and, without ``start``, rates at v."""
     size = tables.start.size
-    if size == 0:
-        return
     y, w, F = np.empty(size), np.empty(size), np.zeros(size)
     vectors_of(tables, u, 1.0, y)
     vectors_of(tables, v, start, w)
@@ -159,24 +155,27 @@ def add_elastic_force(tables, t, span, u0, u1, f):
 
     It is a mean over a time span about t; the force at t for u0 = u1 and span zero.
     """
-    _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
-    add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
+    if tables.start.size > 0:
+        _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
 def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
-    _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
-    add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
+    if tables.start.size > 0:
+        _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
 
-@source
+@apart("contacts", ContactTables, Annotated[Question, MADE], F1, F1, F1)
 def add_contact(contacts, asked, u, v, out):
     """Add the answer of obstacles to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
-    if contacts.number > 0:
-        if contacts.moving > 0:
-            custom_poses(contacts.custom, asked.t, asked.span, contacts.poses)
-        run_contacts(contacts, asked, u, v, out)
+    if contacts.moving > 0:
+        custom_poses(contacts.custom, asked.t, asked.span, contacts.poses)
+    of_contacts(contacts, asked, u, v, out)
 
 
 @source
@@ -188,20 +187,23 @@ def _at(what, t):
 @source
 def add_contact_tangent(tables, t, span, u0, u1, A):
     """Add the derivative of the mean contact force by u1 to a band: twice, unless u0 = u1."""
-    add_contact(tables.contacts, Question(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, Question(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
 
 
 @source
 def add_friction_tangent(tables, t, factor, u, v, A):
     """Add the derivative of friction and damping to a band; that by velocities times a factor."""
-    add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
-                A.flat)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
+                    A.flat)
 
 
 @source
 def contact_work(tables, t, u, du, f):
     """Product of the contact force at u and du; f is workspace, zero on return."""
-    add_contact(tables.contacts, _at(FORCE, t), u, u, f)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, _at(FORCE, t), u, u, f)
     if tables.changing > 0:
         custom_elements(tables.custom, np.int64(PUSHING), t, 0.0, u, du, f)
     work = dot(f, du)
@@ -213,7 +215,8 @@ def contact_work(tables, t, u, du, f):
 def contact_along(tables, t, u, du, out):
     """Derivative of :func:`contact_work` along du, and the largest slip of an element, (2,)."""
     out[0], out[1] = 0.0, 0.0
-    add_contact(tables.contacts, _at(ALONG, t), u, du, out)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, _at(ALONG, t), u, du, out)
     if tables.changing > 0:
         custom_elements(tables.custom, np.int64(ALONG_PUSHING), t, 0.0, u, du, out)
 
@@ -228,7 +231,8 @@ def set_contact_rate(tables, dt):
 def augment_contact(tables, t, u, out):
     """Augment pressures where penetration at u is too large; their number goes to out, (1,)."""
     out[0] = 0.0
-    add_contact(tables.contacts, _at(AUGMENT, t), u, u, out)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, _at(AUGMENT, t), u, u, out)
 
 
 @source
@@ -236,7 +240,8 @@ def settle_contact(tables, t, span, u0, u1, out):
     """Update the history data at the end of a step; the dissipated energy goes to out, (1,)."""
     out[0] = 0.0
     follow_turns(tables, u1)
-    add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
+    if tables.contacts.number > 0:
+        add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
 
 
 @source
@@ -263,7 +268,7 @@ def follow_turns(tables, u):
         _evaluate(tables, np.int64(TURNED), 0.0, 0.0, y, y, y)
 
 
-@source
+@apart("elements", ForceTables, float, F1, F1, float, F1)
 def element_stiffness(tables, t, u, v, factor, D):
     """Derivative by the vectors plus factor times that by their velocities, shape (size,)."""
     size = tables.start.size
@@ -324,7 +329,7 @@ def put_between(tables, D, factor, first, S):
 # the kinds
 
 
-@source
+@apart("elements", Annotated[Kinds, MADE], int, F1, F1, float, F1)
 def of_kinds(kinds, what, y, w, factor, out):
     """Evaluate ``what`` for all kinds from vectors y, and end vectors or rates w."""
     if what == ELASTIC:

@@ -194,7 +194,7 @@ class Forces:
             np.ascontiguousarray(numbers.T).ravel(), self.size,
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._between[0], self._between[1],
-            handle if self.custom else 0, self.contacts.tables, 0, len(self.changing))
+            handle if self.custom else 0, self.contacts.tables, len(self.changing))
 
     def acting_rows(self) -> Array:
         """Derivatives of positions of concentrated elements, shape (k, N)."""

@@ -10,8 +10,8 @@ prevents vectors. So do too many arrays in one loop, whose addresses it compares
 
 import numpy as np
 
-from ...core.source import primitive, source
-from .compiled import W
+from ...core.source import F1, F2, I1, I2, apart, source
+from .compiled import W, CompiledTables
 from .law import LINEAR, conserve, law_evaluate
 from .tables import SECTION
 
@@ -22,7 +22,7 @@ def block(x, first):
     return x[first // W if len(x) > 1 else 0]
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F1, F2)
 def gather(t, first, u, U):
     """DOFs relative to the left node, scaled."""
     m, start = len(U), t.start
@@ -66,12 +66,18 @@ def to_rows(t, first, U, d):
     if len(t.own) == 0:
         np.dot(t.G, U, d)
         return
-    G, used, m = block(t.own, first), t.used, len(U)
     d[:] = 0.0
+    add_own(block(t.own, first), t.used, len(U), U, d, 0)
+
+
+@apart("own", F2, I1, int, F2, F2, int)
+def add_own(G, used, m, X, Y, back):
+    """Y += G X, or with ``back`` G^T X, for derivatives of each element."""
     for n in range(len(G)):
         if used[n]:
-            a, x, y = G[n], U[n % m], d[n // m]
-            for e in range(t.width):
+            row, column = n // m, n % m
+            a, x, y = G[n], X[row if back > 0 else column], Y[column if back > 0 else row]
+            for e in range(len(a)):
                 y[e] += a[e] * x[e]
                 y[W + e] += a[e] * x[W + e]
 
@@ -82,17 +88,11 @@ def from_rows(t, first, B, F):
     if len(t.own) == 0:
         np.dot(t.G.T, B, F)
         return
-    G, used, m = block(t.own, first), t.used, len(F)
     F[:] = 0.0
-    for n in range(len(G)):
-        if used[n]:
-            a, x, y = G[n], B[n // m], F[n % m]
-            for e in range(t.width):
-                y[e] += a[e] * x[e]
-                y[W + e] += a[e] * x[W + e]
+    add_own(block(t.own, first), t.used, len(F), B, F, 1)
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F1, F2, F2, F2)
 def displaced(t, first, u, U, d, r):
     """Unknowns, change of the rows, and rows at u."""
     gather(t, first, u, U)
@@ -107,7 +107,7 @@ def displaced(t, first, u, U, d, r):
 # strains
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F2, F2, F2)
 def strains(t, first, d, r, E):
     """Strains of the samples."""
     rows, x = t.pattern.rows, block(t.x, first)
@@ -121,7 +121,7 @@ def strains(t, first, d, r, E):
             o[e] = c * (p[e] * b[e] + p[W + e] * b[W + e] + a[e] * q[e] + a[W + e] * q[W + e])
 
 
-@source
+@apart("cables", F2, F2, F2, F2)
 def cable_strains(rest, d, r, E):
     """Extension and change of curvature; ``rest`` are |r_X| and the curvature of the reference."""
     n, flat = len(E) // 2, r.reshape(r.size)
@@ -157,7 +157,7 @@ def directions(t, r, dd, X):
     return X
 
 
-@source
+@apart("cables", F2, F2, F2)
 def cable_directions(r, s, X):
     """Those of the extension, and of the curvature by r_X and r_XX, at each point, from r to s."""
     start, end, out = r.reshape(r.size), s.reshape(s.size), X.reshape(X.size)
@@ -180,7 +180,7 @@ def cable_directions(r, s, X):
             c[4 * W + e], c[5 * W + e] = -k * y, k * x
 
 
-@source
+@apart("StrainTables", CompiledTables, F2, F2, F2)
 def changes(t, X, d, E):
     """Change of the strains for a change d of the rows in directions X."""
     rows, ways = t.pattern.rows, t.pattern.ways
@@ -206,7 +206,7 @@ def add(c, X, Y):
 # stresses
 
 
-@source
+@apart("StrainTables", I2, F2, F2, F2)
 def times(pairs, H, E, T):
     """T = H E."""
     T[:] = 0.0
@@ -252,15 +252,9 @@ def stresses(t, first, E, change, T):
         law_stresses(t, first, E, change, T)
 
 
-@primitive("skfem_ancf.equations.loops")
+@apart("laws", CompiledTables, int, F2, F2, F2)
 def law_stresses(t, first, E, change, T):
     """:func:`stresses` of a nonlinear law."""
-    put_law_stresses(t, first, E, change, T)
-
-
-@source
-def put_law_stresses(t, first, E, change, T):
-    """:func:`stresses` of a nonlinear law, by address."""
     S, x = np.empty((3, t.weights.shape[1], t.width)), at_points(t, first, E)
     law_evaluate(t.law, x, S)
     if len(change) > 0:
@@ -278,15 +272,9 @@ def moduli(t, first, E):
     return H
 
 
-@primitive("skfem_ancf.equations.loops")
+@apart("laws", CompiledTables, int, F2, F2)
 def law_moduli(t, first, E, H):
     """:func:`moduli` of a nonlinear law."""
-    put_law_moduli(t, first, E, H)
-
-
-@source
-def put_law_moduli(t, first, E, H):
-    """:func:`moduli` of a nonlinear law, by address."""
     M = np.empty((9, t.weights.shape[1], t.width))
     law_evaluate(t.law, at_points(t, first, E), M)
     between_samples(t, first, M, H)
@@ -312,7 +300,7 @@ def between_samples(t, first, M, H):
                 h[e] *= a[e] * b[e]
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F1, F2)
 def take(t, first, given, T):
     """Given stresses, scaled."""
     ns, ne = len(T), len(t.start)
@@ -324,7 +312,7 @@ def take(t, first, given, T):
         multiply(block(t.sigma, first), T)
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F2, F1, F1)
 def put(t, first, T, more, out):
     """Write stresses, plus ``more`` if not empty."""
     ns = len(T)
@@ -344,7 +332,7 @@ def put(t, first, T, more, out):
 # forces
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F2, F2, F2, F2, F2, F1)
 def push(t, first, X, T, U, B, F, f):
     """Add the forces of stresses in directions X; with U, those of the constant stiffness too."""
     rows, ways = t.pattern.rows, t.pattern.ways
@@ -365,7 +353,7 @@ def push(t, first, X, T, U, B, F, f):
     add_to_nodes(t, first, F, f)
 
 
-@source
+@apart("StrainTables", I2, F2, F2, F2, F2)
 def add_constant(coupled, K, Z, U, F):
     """Add the forces of the constant stiffness."""
     for n in range(coupled.shape[1]):

@@ -58,7 +58,6 @@ class CompiledTables(NamedTuple):
     yy and the symmetric part of xy; Z those of the skew part of xy, without diagonal.
     """
 
-    kernels: I1  # addresses of compiled functions
     pattern: CompiledPattern
     kind: int  # SECTION or CABLE
     width: int  # W, as a number that LLVM does not know
@@ -81,7 +80,7 @@ class CompiledTables(NamedTuple):
     weights: F3  # of the points, (n, points, W)
 
 
-def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
+def compiled_tables(t: StrainTables) -> CompiledTables:
     """The CompiledTables of a StrainTables."""
     ne, pattern, section = len(t.start), t.pattern, t.kind == SECTION
 
@@ -102,7 +101,7 @@ def compiled_tables(t: StrainTables, kernels: np.ndarray) -> CompiledTables:
         *_products(G[0], pattern.products, own), _coupled(K, Z, D.shape[1])))
     used = (G if own else G[:0]).any(axis=0).ravel().astype(np.int64)
     return CompiledTables(
-        kernels, compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
+        compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
         _NOTHING if section else _rest(frame), _blocks(H), P, Q, K, Z, coupled, t.law, t.along,
         _blocks(each(t.weights, OF_WEIGHTS)))

@@ -7,16 +7,16 @@ t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and `
 import numpy as np
 
 from ...core.band import add_multiple
-from ...core.source import source
+from ...core.source import F1, apart, source
 from .blocks import (add, at_points, between_samples, block, changes, directions, displaced,
                      from_points, gather, moduli, push, put, strains, stresses,
                      take, times, to_rows)
-from .compiled import W
+from .compiled import W, CompiledTables
 from .law import LINEAR, conserve, law_evaluate
 from .tangents import (add_geometric, add_material, add_matrices, place, products, scale_products)
 
 
-@source
+@apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
 def force(t, u, v, given, out, f):
     """Force and stresses at u, or with v means from u to v whose work is the change of the energy.
 
@@ -53,7 +53,7 @@ def force(t, u, v, given, out, f):
             push(t, first, D, T, U if whole else U[:0], B, F, f)
 
 
-@source
+@apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
 def linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
@@ -75,7 +75,7 @@ def linearised(t, u, du, given, out, f):
             push(t, first, D, T, U[:0], B, F, f)
 
 
-@source
+@apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1, int)
 def tangent(t, u, given, out, f, A, ld):
     """Tangent, force and stresses at u; the geometric part has the given stresses, if any."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
@@ -100,10 +100,10 @@ def tangent(t, u, given, out, f, A, ld):
         if given.size > 0:
             take(t, first, given, T)
         add_geometric(t, r, T, w)
-        add_matrices(t, first, w, z, True, ld, A)
+        add_matrices(t, first, w, z, 1, ld, A)
 
 
-@source
+@apart("unsymmetric", CompiledTables, F1, F1, F1, int)
 def unsymmetric(t, u, v, A, ld):
     """Add ``B(u)^T H (B(v) - B(u))`` to a matrix in two halves."""
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], 3 * t.G.shape[0] // 2
@@ -174,7 +174,7 @@ def add_to_halves(start, first, ld, m, K, Z, A):
 # gradients of strains
 
 
-@source
+@apart("gradients", CompiledTables, F1, F1)
 def gradients(t, u, out):
     """Write the derivatives of strains and of weighted stresses, (2, ne, ns, 2 nb)."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
@@ -261,7 +261,7 @@ def shifted(t, first, E, change, shift, S):
         y[k] -= z[k]
 
 
-@source
+@apart("eigenstrains", CompiledTables, F1, F1, F1, F1)
 def eigen_mean(t, u, v, shift, f):
     """Change of the mean force from u to v by eigenstrains (3, points, ne) of a nonlinear law."""
     R, m, ns, du = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], v.copy()
@@ -283,7 +283,7 @@ def eigen_mean(t, u, v, shift, f):
         push(t, first, D, T, U[:0], B, U, f)
 
 
-@source
+@apart("eigenstrains", CompiledTables, F1, F1, F1, int)
 def eigen_tangent(t, u, given, A, ld):
     """Change of the tangent at u by eigenstrains: stresses for linear laws, else strains."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
@@ -308,7 +308,7 @@ def eigen_tangent(t, u, given, A, ld):
             between_samples(t, first, M, H)
             add_material(t, H, r, w, z)
         add_geometric(t, r, T, w)
-        add_matrices(t, first, w, z, False, ld, A)
+        add_matrices(t, first, w, z, 0, ld, A)
 
 
 # derivatives of strains in collocation

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.source import F1, F2, I1, I3, indices, source
+from ...core.source import F1, F2, I1, I3, apart, indices, source
 
 TINY = 1e-200
 
@@ -29,7 +29,7 @@ def moment_direction(moments, k, u):
     return x, y
 
 
-@source
+@apart("moments", MomentPack, F1, F1, F1)
 def add_moments(moments, factors, u, f):
     """Add the forces of the moments at u: M times the derivative of the angle."""
     dofs, c, M = moments.dofs, moments.c, moments.M
@@ -68,7 +68,7 @@ def mean_turning(a, b, g):
         g[2, e], g[3, e] = gc * dx + gs * dy, gc * dy - gs * dx
 
 
-@source
+@apart("moments", MomentPack, F1, F1, F1, F1)
 def add_mean_moments(moments, factors, u0, u1, f):
     """Add the mean forces from u0 to u1, whose work is the moments times the rotations.
 
@@ -103,7 +103,7 @@ def _add_force(moments, k, x, y, f):
         f[moments.dofs[k, 1, i]] += moments.c[k, i] * y
 
 
-@source
+@apart("moments", MomentPack, F1, F1, F1, int)
 def add_moment_stiffness(moments, factors, u, flat, ld):
     """Subtract the derivative of the forces from a lower half, at ``flat[j * ld + i - j]``."""
     dofs, c, M = moments.dofs, moments.c, moments.M

@@ -6,13 +6,13 @@ halves as in :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`.
 
 import numpy as np
 
-from ...core.source import source
+from ...core.source import F1, F2, I1, I2, apart, source
 from .blocks import add, block
-from .compiled import W
+from .compiled import W, CompiledTables
 from .tables import SECTION
 
 
-@source
+@apart("StrainTables", CompiledTables, F2, F2, F2, F2)
 def add_material(t, H, X, w, z):
     """Add coefficients of the products to w (np, 3 W) and z (nz, W)."""
     terms, factors = t.pattern.terms, t.pattern.factors[0]
@@ -29,7 +29,7 @@ def add_material(t, H, X, w, z):
                 o[e] += 0.5 * c * h[e] * (x[e] * y[W + e] - x[W + e] * y[e])
 
 
-@source
+@apart("StrainTables", CompiledTables, F2, F2, F2)
 def add_geometric(t, r, T, w):
     """Add coefficients of the geometric part."""
     of, rows = t.pattern.of, t.pattern.rows
@@ -43,7 +43,7 @@ def add_geometric(t, r, T, w):
             o[W + e] += c * x[e]
 
 
-@source
+@apart("cables", I1, F2, F2, F2)
 def add_cable_geometric(of, r, T, w):
     """That of extensions and curvatures."""
     n, flat = len(T) // 2, r.reshape(r.size)
@@ -74,7 +74,7 @@ def products(t, first, w, z, K, Z):
     own_products(G, t.used, m, t.pattern.skew, z, -1, Z)
 
 
-@source
+@apart("own", F2, I1, int, I2, F2, int, F2)
 def own_products(G, used, m, rows, w, sign, K):
     """Sums of ``w[p] (G_g G_h^T + sign G_h G_g^T)``, lower halves; skew ones without diagonal."""
     p, width, size = 0, G.shape[1], w.shape[1]
@@ -123,7 +123,7 @@ def place(i, m):
     return (m // 2, a, -1.0) if k == 0 else (k - 1, a, 1.0)
 
 
-@source
+@apart("StrainTables", I1, int, int, int, F2, F2, F1)
 def add_to_band(start, first, ld, m, K, Z, A):
     """Add tangents to a lower half."""
     last = min(W, len(start) - first)
@@ -145,13 +145,13 @@ def add_to_band(start, first, ld, m, K, Z, A):
                     A[at[e] + p] += sign * x[e] + c * y[e]
 
 
-@source
+@apart("StrainTables", CompiledTables, int, F2, F2, int, int, F1)
 def add_matrices(t, first, w, z, constant, ld, A):
     """Add the matrices of coefficients to a lower half."""
     m, n = t.G.shape[1], t.width
     K, Z = np.empty((m * (m + 1) // 2, 3 * n)), np.empty((m * (m - 1) // 2, n))
     products(t, first, w, z, K, Z)
-    if constant and len(t.K) > 0:
+    if constant > 0 and len(t.K) > 0:
         add(1.0, block(t.K, first), K)
         add(1.0, block(t.Z, first), Z)
     if len(t.D) > 0:
