@@ -60,9 +60,7 @@ def test_compiled_bands_are_the_dense_matrices(storage, sign, compiled):
 def compiled():
     from skfem_ancf.core.jit import entry
     from skfem_ancf.core.words import Words
-    from skfem_ancf.equations import loops
 
-    loops.part("bands")
     x, A = np.zeros(2), matrix(2, 1, "symmetric", 1)[1]
     found = [entry(f, (A, *args)) for f, *args in (
         (band_product, x, x), (band_factors,), (band_solution, x))]

@@ -108,8 +108,9 @@ def _cell(function):
 
 
 @CFUNCTYPE(None)
-def _nothing():
-    pass
+@keeping
+def _missing():
+    raise RuntimeError("a part of compiled code could not be compiled")
 
 
 @apart(PYTHON, int)
@@ -119,9 +120,8 @@ def find(place):
     try:
         load(function)
     except BaseException:
-        cell[0] = cast(_nothing, c_void_p).value  # until the exception is raised
+        cell[0] = cast(_missing, c_void_p).value
         raise
-
 
 
 def load(function: Any) -> None:

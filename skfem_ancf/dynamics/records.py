@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from ..actions.forces.kernels import add_resisting_force
-from ..actions.tables import add_products, add_triples
+from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import add_viscous_force, body_tangent
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..core.callbacks import custom_joints
-from ..core.source import F1, F2, F3, indices, source
+from ..core.source import F1, F2, F3, MADE, apart, indices, source
+from ..equations.tables import Equations
+from .convergence import StepState
 
 
 # damping in kernels: of materials, proportional to the mass, and of modes
@@ -87,7 +89,7 @@ def add_damping(viscous, dampers, M, factor, u, stresses, scratch, A):
             A.flat[i] += factor * dampers.mass * M.flat[i]
 
 
-@source
+@apart("rows", Band, LowRankRows, F1)
 def factorize_rows(A, rows, free):
     """Set Z and H with the factors of A."""
     P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
@@ -108,16 +110,22 @@ def factorize_rows(A, rows, free):
 def solve_rows(A, rows, x):
     """Solve in place by the Sherman-Morrison-Woodbury formula."""
     solve(A, x)
+    if rows.P.shape[0] > 0:
+        _correct_rows(rows, x)
+
+
+@apart("rows", LowRankRows, F1)
+def _correct_rows(rows, x):
+    """The part of :func:`solve_rows` beside the band."""
     k = rows.P.shape[0]
-    if k > 0:
-        y, z, H = np.empty(k), np.zeros(k), rows.H.copy()
-        for a in range(k):
-            y[a] = dot(rows.P[a], x)
-        for a in range(k):
-            for c in range(k):
-                z[a] += rows.S[a, c] * y[c]
-        dense_solve(H, z)
-        subtract_rows(rows.Z, z, x)
+    y, z, H = np.empty(k), np.zeros(k), rows.H.copy()
+    for a in range(k):
+        y[a] = dot(rows.P[a], x)
+    for a in range(k):
+        for c in range(k):
+            z[a] += rows.S[a, c] * y[c]
+    dense_solve(H, z)
+    subtract_rows(rows.Z, z, x)
 
 
 # rates of joints that depend on time, by differences within one step
@@ -143,7 +151,7 @@ class JointMotions(NamedTuple):
     drives: int
 
 
-@source
+@apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1)
 def drive_rate(joints, motion, t, dt, u, out):
     """The partial rate of Phi, c' + g' . u, at the end t of a step of dt."""
     c = motion.c[1]
@@ -155,7 +163,7 @@ def drive_rate(joints, motion, t, dt, u, out):
         _add_differences(joints, t, dt, u, u, PARTS / dt, 0.0, 0.0, out)
 
 
-@source
+@apart("joints", JointTables, Annotated[JointMotion, MADE], float, float, F1, F1, F1)
 def acceleration_of_joints(joints, motion, t, dt, u, v, out):
     """The second rate of Phi without accelerations: c'' + v . H v + g'' . u + 2 g' . v."""
     c, g = motion.c[2], motion.g[2]
@@ -234,10 +242,10 @@ class Step(NamedTuple):
     dt: float
     t: float  # end of the step
     acting: float  # instant of the equation of motion
-    factors: np.ndarray  # as in StepData
-    ends: np.ndarray
-    supports: np.ndarray
-    joints: JointMotion
+    factors: F1  # as in StepData
+    ends: F1
+    supports: F2
+    joints: Annotated[JointMotion, MADE]
     mass_factor: float
     damping_factor: float
     stiffness_factor: float
@@ -288,6 +296,10 @@ class Work(NamedTuple):
     J: F3  # Jacobian where joints act, at the end, and solutions by A and M, (4, m, N)
     S: F2  # J1 A^-1 J^T, (m, m)
     stresses: F2  # zero; start; work; independent; iterate; the last two of strain rates, (7, k)
+
+
+#: Arguments of the functions of a step: equations, matrices, rule, step, work and state.
+ALL = Equations, Matrices, Annotated[Rule, MADE], Annotated[Step, MADE], Work, StepState
 
 
 def new_work(N: int, m: int, stresses: int, dense: int) -> Work:

@@ -22,11 +22,11 @@ from ..actions.tables import MATERIALS, add_constraint_rate, carry_eigenstrains,
 from ..beam.strain_energy import accept_body, body_linearised, body_stress, quadratic
 from ..core.band import clear, copy, dot, solve_joined, subtract_rows, total
 from ..core.callbacks import call_solver
-from ..core.source import indices, shaped, source
+from ..core.source import F1, apart, indices, shaped, source
 from .convergence import (AUGMENTED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON, ITERATIONS,
                           LASTING, MIXED, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
                           SYMMETRIC, UNSETTLED, UNSYMMETRIC, judged, round_off)
-from .records import acceleration_of_joints, damping_force, drive_rate, solve_rows, step_of
+from .records import ALL, acceleration_of_joints, damping_force, drive_rate, solve_rows, step_of
 from .tangent import (add_damping_force, add_elastic, add_impulses, directions, factorize_tangent,
                       factors, free_velocity, internal_force, kinetic_energy, residual, tangent,
                       to_damping_velocity, to_middle)
@@ -34,21 +34,20 @@ from .tangent import (add_damping_force, add_elastic, add_impulses, directions, 
 
 # velocities, accelerations and multipliers at the end of a step
 
-@source
-def end_velocity(joints, free, mass, rule, s, w, state, exact):
+@apart("joints", *ALL, int, returns=int)
+def end_velocity(e, matrices, rule, s, w, state, exact):
     """v_1 = v - M^-1 J^T impulse of the iterate, with d Phi / dt = 0; FAILED for dependent joints.
 
     Unless ``exact``, the accuracy is that of the iteration.
     """
-    free_velocity(free, rule, s, w)
-    if w.m.impulse.size > 0:
-        drive_rate(joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
-        if rule.mass_solver > 0:
-            return _eliminated(joints, rule, s, w, w.x.middle, w.m.impulse, w.x.v, state, exact)
-        if not solve_joined(mass, w.J[0], w.J[1], free, not s.kept, w.J[3], w.S, w.m.impulse,
-                            w.x.v):
-            state.failure[0] = DEPENDENT
-            return FAILED
+    free_velocity(e.free, rule, s, w)
+    drive_rate(e.joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
+    if rule.mass_solver > 0:
+        return _eliminated(e.joints, rule, s, w, w.x.middle, w.m.impulse, w.x.v, state, exact)
+    if not solve_joined(matrices.mass, w.J[0], w.J[1], e.free, not s.kept, w.J[3], w.S, w.m.impulse,
+                        w.x.v):
+        state.failure[0] = DEPENDENT
+        return FAILED
     return GO_ON
 
 
@@ -73,8 +72,8 @@ def _eliminated(joints, rule, s, w, at, b, x, state, exact):
     return GO_ON
 
 
-@source
-def accelerations(free, rule, s, w, state):
+@apart("motion", *ALL)
+def accelerations(e, matrices, rule, s, w, state):
     """Set w_1 (in place of the correction), a_1 and the multipliers at the end of the step."""
     u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
     a1, w1, w0, given = w.x.acceleration, w.x.du, w.y[3], s.supports[2]
@@ -84,7 +83,7 @@ def accelerations(free, rule, s, w, state):
         ahead = s.dt / (s.dt + state.last_dt[0])
         for i in indices(u.size):
             w1[i] = (v[i] - v0[i]) / s.dt
-            a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * free[i] + given[i]
+            a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * e.free[i] + given[i]
         for k in indices(l.size):
             l[k] += impulse[k] / s.dt
             l0[k] = l[k] + ahead * (l[k] - last[k])
@@ -93,23 +92,23 @@ def accelerations(free, rule, s, w, state):
         c = 1.0 / (rule.beta * s.dt * s.dt)
         for i in indices(u.size):
             w1[i] = c * (u[i] - base[i])
-            a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + given[i]
+            a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * e.free[i] + given[i]
 
 
-@source
-def close_acceleration(joints, free, mass, rule, s, w, state):
+@apart("joints", *ALL, returns=int)
+def close_acceleration(e, matrices, rule, s, w, state):
     """Project accelerations and multipliers onto the second rate of the joints."""
     a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
     l0, last, anew = w.m.l0, w.m.last, rule.conserving > 0  # otherwise J is that of the velocity
-    acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
+    acceleration_of_joints(e.joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
     share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
     if rule.mass_solver > 0:
-        if _eliminated(joints, rule, s, w, w.x.u, dl, a1, state, EXACTLY) == FAILED:
+        if _eliminated(e.joints, rule, s, w, w.x.u, dl, a1, state, EXACTLY) == FAILED:
             return FAILED
         for i in indices(w1.size):
             w1[i] += share * w.x.damping_velocity[i]
     else:
-        if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[3], w.S, dl, a1):
+        if not solve_joined(matrices.mass, w.J[1], w.J[1], e.free, anew, w.J[3], w.S, dl, a1):
             state.failure[0] = DEPENDENT
             return FAILED
         for k in indices(l.size):
@@ -121,7 +120,7 @@ def close_acceleration(joints, free, mass, rule, s, w, state):
     return GO_ON
 
 
-@source
+@apart("damping", *ALL)
 def add_work(e, matrices, rule, s, w, state):
     """Add the work of damping at the mean velocity of the step.
 
@@ -148,8 +147,8 @@ def begin_step(e, s):
         set_contact_rate(e.forces, s.dt)
 
 
-@source
-def settle(e, rule, s, w, taken):
+@apart("history", *ALL, F1)
+def settle(e, matrices, rule, s, w, state, taken):
     """Update the history at the end of the step; ``taken`` is the dissipated work."""
     if rule.conserving > 0:
         settle_contact(e.forces, s.acting, s.dt, w.y[0], w.x.u, taken)
@@ -160,8 +159,8 @@ def settle(e, rule, s, w, taken):
     e.span[0] = 0.0
 
 
-@source
-def finish(free, M, s, w, state):
+@apart("motion", *ALL)
+def finish(e, matrices, rule, s, w, state):
     """The end of the step becomes the start of the next."""
     u, v, a1, w1, given = w.x.u, w.x.v, w.x.acceleration, w.x.du, s.supports[2]
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
@@ -169,9 +168,9 @@ def finish(free, M, s, w, state):
     copy(v, v0)
     copy(a1, a0)
     for i in indices(u.size):
-        w0[i] = w1[i] * free[i] + given[i]
+        w0[i] = w1[i] * e.free[i] + given[i]
     state.last_dt[0], state.mixed_steps[0] = s.dt, max(0, state.mixed_steps[0] - 1)
-    state.energy[0] = max(state.energy[0], kinetic_energy(M, v, w.x.scratch))
+    state.energy[0] = max(state.energy[0], kinetic_energy(matrices.M, v, w.x.scratch))
 
 
 @source
@@ -194,59 +193,61 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, wo
         if matrices.dampers.active > 0:
             add_work(e, matrices, rule, s, w, state)
         if e.lasting > 0:
-            settle(e, rule, s, w, taken)
+            settle(e, matrices, rule, s, w, state, taken)
             state.dissipated[0] += taken[0]
             copy(e.history, memories[n])
         works[n] = state.dissipated[0]
-        finish(e.free, matrices.M, s, w, state)
+        finish(e, matrices, rule, s, w, state)
         copy(shaped(w.y, (w.y.size,)), shaped(rows[n], (w.y.size,)))
         copy(w.m.l0, multiplier_rows[n, 0])
         copy(w.m.last, multiplier_rows[n, 1])
     return rows.shape[0]
 
 
-@source
+@apart("motion", *ALL, returns=int)
 def _iterate(e, matrices, rule, s, w, state):
     """Iterate to the end of a step: DONE or FAILED."""
     joined, damped, taken = w.m.l.size > 0, matrices.dampers.active > 0, np.empty(1)
     contacts, stale = e.forces.contacts, not s.kept
-    rough, wanted = _predict(e.free, matrices.M, rule, s, w, state)
+    limits = np.empty(2)
+    _predict(e, matrices, rule, s, w, state, limits)
+    rough, wanted = limits[0], limits[1]
     status, left, most = GO_ON, ITERATIONS, AUGMENTED
-    _start(e, w, state)
+    _start(e, matrices, rule, s, w, state)
     if e.lasting > 0:
         begin_step(e, s)
     while left > 0:
         left, most = left - 1, most - 1
         if state.factors[0] == 0:
             tangent(e, matrices, rule, s, w, state)
-            if not factorize_tangent(e, matrices, rule, s, w, state):
+            if factorize_tangent(e, matrices, rule, s, w, state) == 0:
                 return FAILED
             stale = True
         if damped:
             to_middle(rule, w)
             to_damping_velocity(e.free, rule, s, w)
-        internal_force(e, matrices.dampers, rule, w, state)
+        internal_force(e, matrices, rule, s, w, state)
         add_elastic(e.forces, rule, s, w)
         if damped:
-            add_damping_force(e, matrices, s, w, state)
+            add_damping_force(e, matrices, rule, s, w, state)
         anew, stale = joined and (stale or not s.constant), False
         if anew:
-            directions(e.joints, rule, s, w)
-        residual(e.loads, e.joints, e.free, matrices.M, rule, s, w)
+            directions(e, matrices, rule, s, w, state)
+        residual(e, matrices, rule, s, w, state)
         status = GO_ON
         if joined and rule.conserving > 0 and not s.constant:
-            status = end_velocity(e.joints, e.free, matrices.mass, rule, s, w, state, ROUGHLY)
-            add_impulses(e.joints, s, w)
+            status = end_velocity(e, matrices, rule, s, w, state, ROUGHLY)
+            add_impulses(e, matrices, rule, s, w, state)
         if status == GO_ON:
-            status = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
+            status = _correct(e, matrices, rule, s, w, state, anew)
         if status == GO_ON:
-            status = _judged(e, matrices, s, w, state, wanted, rough)
+            status = _judged(e, matrices, rule, s, w, state, wanted, rough)
         if status == DONE and contacts.lasting >= PRESSURES:
             augment_contact(e.forces, s.t, w.x.u, taken)
             if taken[0] > 0.0:
                 status, left, state.correction[0] = GO_ON, min(ITERATIONS, most), -1.0
         if status == RESTART:
-            _start(e, w, state)
+            _start(e, matrices, rule, s, w, state)
         elif status != GO_ON:
             return status
     state.failure[0] = NOT_CONVERGED if most > 0 else UNSETTLED
@@ -258,19 +259,23 @@ def _end(e, matrices, rule, s, w, state):
     """Set velocities, accelerations and multipliers of the last iterate; may be FAILED."""
     joined = w.m.l.size > 0
     if joined and not s.constant:
-        directions(e.joints, rule, s, w)
-    status = end_velocity(e.joints, e.free, matrices.mass, rule, s, w, state, EXACTLY)
-    accelerations(e.free, rule, s, w, state)
+        directions(e, matrices, rule, s, w, state)
+    status = GO_ON
+    if joined:
+        status = end_velocity(e, matrices, rule, s, w, state, EXACTLY)
+    else:
+        free_velocity(e.free, rule, s, w)
+    accelerations(e, matrices, rule, s, w, state)
     if status == GO_ON and joined and rule.conserving == 0:
-        status = close_acceleration(e.joints, e.free, matrices.mass, rule, s, w, state)
+        status = close_acceleration(e, matrices, rule, s, w, state)
     return status
 
 
-@source
-def _predict(free, M, rule, s, w, state):
+@apart("motion", *ALL, F1)
+def _predict(e, matrices, rule, s, w, state, limits):
     """Set all that does not depend on u_1, and the initial guess with the acceleration at 0.
 
-    Returns the round-off of a correction, and its tolerance.
+    ``limits`` get the round-off of a correction, and its tolerance.
     """
     h, u, guess, straight = s.dt, w.x.u, w.x.guess, w.x.straight
     base, speed, rest, constrained = w.x.base, w.x.speed, w.x.rest, w.x.constrained
@@ -283,22 +288,22 @@ def _predict(free, M, rule, s, w, state):
         speed[i] = v0[i] + c * w0[i]
         rest[i] = p * w0[i] - q * a0[i]
         constrained[i] = s.supports[2, i]
-        guess[i] = (base[i] + d * a[i]) * free[i] + s.supports[0, i]
-        straight[i] = (u0[i] + h * v0[i]) * free[i] + s.supports[0, i]
+        guess[i] = (base[i] + d * a[i]) * e.free[i] + s.supports[0, i]
+        straight[i] = (u0[i] + h * v0[i]) * e.free[i] + s.supports[0, i]
         u[i] = guess[i]
     if rule.conserving > 0:  # from the change of velocity
         for i in indices(u.size):
-            constrained[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
+            constrained[i] = (s.supports[1, i] - v0[i]) * (1.0 - e.free[i]) / h
     state.fresh[0], state.correction[0] = 0, -max(1.0, state.fresh[0])
-    free_velocity(free, rule, s, w)
-    energy = max(state.energy[0], kinetic_energy(M, w.x.v, w.x.scratch))
-    noise = 2.0 * abs(kinetic_energy(M, u, w.x.scratch))
+    free_velocity(e.free, rule, s, w)
+    energy = max(state.energy[0], kinetic_energy(matrices.M, w.x.v, w.x.scratch))
+    noise = 2.0 * abs(kinetic_energy(matrices.M, u, w.x.scratch))
     rough = round_off(rule, s.stiffness_factor, s.mass_factor, noise)
-    return rough, rule.tol * np.sqrt(energy) + rough
+    limits[0], limits[1] = rough, rule.tol * np.sqrt(energy) + rough
 
 
-@source
-def _start(e, w, state):
+@apart("motion", *ALL)
+def _start(e, matrices, rule, s, w, state):
     """Set the initial guess; in the mixed iteration a straight motion."""
     copy(w.x.straight if state.mixed_steps[0] > 0 else w.x.guess, w.x.u)
     copy(w.m.l0, w.m.l)
@@ -307,20 +312,20 @@ def _start(e, w, state):
         clear(w.stresses[5])
 
 
-@source
-def _correct(joints, free, matrices, rule, s, w, state, anew):
+@apart("motion", *ALL, bool, returns=int)
+def _correct(e, matrices, rule, s, w, state, anew):
     """Correct u and the multipliers; FAILED for dependent joints."""
     u, R, du, scratch = w.x.u, w.x.residual, w.x.du, w.x.scratch
     l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, factors(matrices, state), matrices.rows
     state.iterations[0] += 1
     for i in indices(u.size):
-        R[i] *= free[i]
+        R[i] *= e.free[i]
         du[i] = R[i]
     if rule.solver == 0:
         solve_rows(A, rows, du)
     work = abs(dot(R, du))
     if l.size > 0:
-        constraint(joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
+        constraint(e.joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
         for k in indices(l.size):
             dl[k] = phi[k]
             phi[k] = -phi[k]
@@ -329,18 +334,18 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
             for k in range(l.size):
                 row, out = w.J[0, k], w.J[2, k]
                 for i in indices(u.size):
-                    out[i] = row[i] * free[i]
+                    out[i] = row[i] * e.free[i]
                 solve_rows(A, rows, out)
         if rule.solver > 0:
             good = call_solver(rule.solver, s.t, u, l, R, phi, du, dl)
         else:
-            good = solve_joined(A, w.J[0], w.J[1], free, anew, w.J[2], w.S, dl, du)
+            good = solve_joined(A, w.J[0], w.J[1], e.free, anew, w.J[2], w.S, dl, du)
         if not good:
             state.failure[0] = DEPENDENT
             return FAILED
         for i in indices(u.size):
             scratch[i] = np.abs(R[i] * du[i])
-        work = dot(scratch, free)
+        work = dot(scratch, e.free)
         for k in indices(l.size):
             l[k] += dl[k]
             phi[k] = np.abs(phi[k] * dl[k])
@@ -351,8 +356,8 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
     return GO_ON
 
 
-@source
-def _judged(e, matrices, s, w, state, wanted, rough):
+@apart("motion", *ALL, float, float, returns=int)
+def _judged(e, matrices, rule, s, w, state, wanted, rough):
     """Update the independent stresses and decide what to do after the correction.
 
     If old factors rotate with respect to a stiff, slender beam, they take axial stretch for

@@ -11,9 +11,9 @@ from ..beam.strain_energy import (add_force_of, add_unsymmetric, body_force, bod
 from ..core.band import (add_halves, add_multiple, clear, copy, dot, factorize, fix, multiply,
                          subtract_rows)
 from ..core.callbacks import call_solver, custom_joints
-from ..core.source import indices, source
+from ..core.source import apart, indices, source
 from .convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
-from .records import add_damping, damping_beside, factorize_rows
+from .records import ALL, add_damping, damping_beside, factorize_rows
 
 
 # the residual of a step, ``Q - f - M a - J^T lambda``, at an iterate
@@ -52,8 +52,8 @@ def to_damping_velocity(free, rule, s, w):
         damping_velocity[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
 
 
-@source
-def internal_force(e, dampers, rule, w, state):
+@apart("motion", *ALL)
+def internal_force(e, matrices, rule, s, w, state):
     """The internal force of the iterate without damping.
 
     In the mixed iteration with independent stresses S, the residual of ``S = D eps(u)`` acts in the
@@ -69,7 +69,7 @@ def internal_force(e, dampers, rule, w, state):
         body_mixed(e.body, rule.conserving > 0, u0, u, f, independent, constitutive)
         for i in indices(missing.size):
             missing[i] = constitutive[i] - independent[i]
-        if dampers.viscous > 0:
+        if matrices.dampers.viscous > 0:
             body_linearised(e.viscous, w.x.middle, w.x.damping_velocity, S[0], rates)
             add_force_of(e.body, w.x.middle, slow, f)
             for i in indices(missing.size):
@@ -91,8 +91,8 @@ def add_elastic(forces, rule, s, w):
         add_elastic_force(forces, s.acting, 0.0, u, u, f)
 
 
-@source
-def add_damping_force(e, matrices, s, w, state):
+@apart("damping", *ALL)
+def add_damping_force(e, matrices, rule, s, w, state):
     """Add the damping force; materials are included already in the mixed iteration."""
     d, f = w.x.damping, w.x.force
     damping_beside(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.damping_velocity,
@@ -101,62 +101,62 @@ def add_damping_force(e, matrices, s, w, state):
         f[i] += d[i]
 
 
-@source
-def directions(joints, rule, s, w):
+@apart("joints", *ALL)
+def directions(e, matrices, rule, s, w, state):
     """Set the joint Jacobian where joints act, and at the end of the step."""
     to_middle(rule, w)
     if rule.solver > 0:
         return
-    if joints.custom > 0 and rule.conserving > 0:
+    if e.joints.custom > 0 and rule.conserving > 0:
         flat = w.J[0].reshape(w.J[0].size)
         clear(flat)
-        custom_joints(joints.custom, np.int64(5), s.acting, w.x.u, w.y[0], flat)
+        custom_joints(e.joints.custom, np.int64(5), s.acting, w.x.u, w.y[0], flat)
     else:
-        joint_directions(joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
-    joint_directions(joints, s.joints.g[0], s.t, w.x.u, w.J[1])
+        joint_directions(e.joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
+    joint_directions(e.joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
-@source
-def residual(loads, joints, free, M, rule, s, w):
+@apart("motion", *ALL)
+def residual(e, matrices, rule, s, w, state):
     """R = Q - f - M a - J^T lambda."""
     u, base, rest, constrained = w.x.u, w.x.base, w.x.rest, w.x.constrained
     a, R, f, scratch = w.x.acceleration, w.x.residual, w.x.force, w.x.scratch
     for i in indices(u.size):
-        a[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + constrained[i]
-    multiply(M, a, scratch)
-    mean_external_force(loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
+        a[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * e.free[i] + constrained[i]
+    multiply(matrices.M, a, scratch)
+    mean_external_force(e.loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
     for i in indices(u.size):
         R[i] = R[i] - f[i] - scratch[i]
     if rule.solver > 0:
         clear(scratch)
-        add_joint_force(joints, s.joints.g[1], s.acting, w.x.middle, w.m.l, scratch)
+        add_joint_force(e.joints, s.joints.g[1], s.acting, w.x.middle, w.m.l, scratch)
         for i in indices(u.size):
             R[i] -= scratch[i]
     else:
         subtract_rows(w.J[0], w.m.l, R)
 
 
-@source
-def add_impulses(joints, s, w):
+@apart("joints", *ALL)
+def add_impulses(e, matrices, rule, s, w, state):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, scratch, share, impulse = w.y[1], w.x.v, w.x.scratch, w.m.phi, w.m.impulse
-    if joints.custom > 0:
+    if e.joints.custom > 0:
         n = v.size
         ends = np.empty(3 * n + impulse.size)
         copy(v0, ends[:n])
         copy(v, ends[n:2 * n])
         copy(w.y[0], ends[2 * n:3 * n])
         copy(impulse, ends[3 * n:])
-        custom_joints(joints.custom, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
+        custom_joints(e.joints.custom, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
         return
     for i in indices(v.size):
         scratch[i] = v0[i] + v[i]
     for k in indices(share.size):
         share[k] = -0.25 * impulse[k]
-    add_curvature_force(joints, share, scratch, w.x.residual)
+    add_curvature_force(e.joints, share, scratch, w.x.residual)
 
 
-@source
+@apart("motion", *ALL)
 def tangent(e, matrices, rule, s, w, state):
     """Assemble the iteration matrix, with the stresses at the start, or mean independent stresses.
 
@@ -182,29 +182,29 @@ def tangent(e, matrices, rule, s, w, state):
         for k in range(dampers.modes.shape[0]):
             matrices.rows.S[k, k] = s.damping_factor
     add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x.middle, matrices.A)
-    _add_elements(e.forces, matrices, s, w)
+    if e.forces.start.size > 0:
+        _add_elements(e, matrices, rule, s, w, state)
     keep_entries(e.forces, s.acting, s.stiffness_factor, w.y[0] if rule.conserving > 0 else w.x.u,
                  w.x.u)
     if e.forces.contacts.number > 0:
-        _add_obstacles(e, matrices, rule, s, w)
+        _add_obstacles(e, matrices, rule, s, w, state)
     for i in indices(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
 
 
-@source
-def _add_elements(forces, matrices, s, w):
+@apart("elements", *ALL)
+def _add_elements(e, matrices, rule, s, w, state):
     """Add the derivatives of force elements to the band and the low-rank rows."""
-    if forces.start.size > 0:
-        D = np.empty(forces.size)
-        element_stiffness(forces, s.acting, w.x.middle, w.y[1],
-                          s.damping_factor / s.stiffness_factor, D)
-        add_products(matrices.A.flat, forces.band_at, forces.band_weight, D, forces.band_of)
-        put_between(forces, D, s.stiffness_factor, matrices.dampers.modes.shape[0],
-                    matrices.rows.S)
+    forces = e.forces
+    D = np.empty(forces.size)
+    element_stiffness(forces, s.acting, w.x.middle, w.y[1], s.damping_factor / s.stiffness_factor,
+                      D)
+    add_products(matrices.A.flat, forces.band_at, forces.band_weight, D, forces.band_of)
+    put_between(forces, D, s.stiffness_factor, matrices.dampers.modes.shape[0], matrices.rows.S)
 
 
-@source
-def _add_obstacles(e, matrices, rule, s, w):
+@apart("contacts", *ALL)
+def _add_obstacles(e, matrices, rule, s, w, state):
     """Add the derivatives of contact at the iterate."""
     u, u0 = w.x.u, w.y[0]
     if rule.conserving > 0:
@@ -229,9 +229,9 @@ def use_unsymmetric(matrices, state):
     return state.mixed_steps[0] > LASTING and matrices.U.flat.size > 0
 
 
-@source
+@apart("motion", *ALL, returns=int)
 def factorize_tangent(e, matrices, rule, s, w, state):
-    """Factorise the iteration matrix; False on failure."""
+    """Factorise the iteration matrix; 0 on failure."""
     fix(matrices.A, e.fixed)
     state.factorizations[0] += 1
     state.factors[0] = SYMMETRIC
@@ -242,20 +242,20 @@ def factorize_tangent(e, matrices, rule, s, w, state):
         good = call_solver(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:
         if use_unsymmetric(matrices, state):
-            _unsymmetric_tangent(e, matrices, s, w)
+            _unsymmetric_tangent(e, matrices, rule, s, w, state)
             state.factors[0] = UNSYMMETRIC
         good = factorize(factors(matrices, state))
     if not good:
         state.factors[0], state.failure[0] = 0, SINGULAR
-        return False
-    if rule.solver == 0:
+        return 0
+    if rule.solver == 0 and matrices.rows.P.shape[0] > 0:
         factorize_rows(factors(matrices, state), matrices.rows, e.free)
     state.contraction[0], state.fresh[0], state.correction[0] = EXPECTED, state.fresh[0] + 1, -1.0
-    return True
+    return 1
 
 
-@source
-def _unsymmetric_tangent(e, matrices, s, w):
+@apart("unsymmetric", *ALL)
+def _unsymmetric_tangent(e, matrices, rule, s, w, state):
     """Set U, the iteration matrix with the strain derivatives at the end of the step.
 
     A mean force ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. A has B(u_m) instead of

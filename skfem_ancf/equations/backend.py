@@ -24,16 +24,16 @@ logger = logging.getLogger(__name__)
 LOADED: dict[str, Any] = {}
 #: Parts that are called by address and that most scenes use, and those of some functions.
 PARTS = ("StrainTables", "cables", "own", "elements", "contacts", "moments", "joints", "band",
-         "bands", "unsymmetric", "statics", "motion")
+         "bands", "unsymmetric", "statics", "motion", "damping", "rows", "history")
 NEEDED = {"equilibrium": ["band", "statics"], "steps": ["band", "motion"],
           "collocate": ["band", "bands", "gradients"]}
 #: Why Numba cannot be used although it is installed.
 PROBLEMS: list[str] = []
 #: Approximate seconds for compiling: parts (if a scene uses them) and functions; and for loading.
-COMPILING = {"StrainTables": 8.0, "cables": 1.0, "own": 1.0, "elements": 5.0, "contacts": 17.0,
-             "moments": 1.0, "joints": 1.0, "unsymmetric": 6.0, "band": 3.0, "bands": 4.0,
-             "statics": 4.0, "motion": 1.0, "equilibrium": 1.5, "tangent": 0.5,
-             "force": 0.2, "linearised": 0.2, "steps": 27.0}
+COMPILING = {"StrainTables": 8.0, "cables": 1.0, "own": 1.0, "elements": 7.0, "contacts": 16.0,
+             "moments": 1.5, "joints": 4.0, "unsymmetric": 2.5, "band": 3.0, "bands": 3.5,
+             "statics": 3.0, "motion": 9.0, "damping": 1.0, "rows": 1.0, "history": 1.0,
+             "equilibrium": 1.5, "tangent": 0.5, "force": 0.2, "linearised": 0.2, "steps": 1.5}
 #: The same for functions that are compiled on first use only.
 WHERE_USED = {"laws": 3.0, "eigenstrains": 5.0, "gradients": 2.0, "collocate": 25.0,
               "mean_force": 1.0, "viscous_force": 1.0}

@@ -8,8 +8,8 @@ normal at the closest point.
 import numpy as np
 
 from ...core.callbacks import custom_distance
-from ...core.source import indices, source
-from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIRS, RADIUS, SIDE, START
+from ...core.source import F1, F2, I1, apart, indices, source
+from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIR, PAIRS, RADIUS, SIDE, START
 
 TINY = 1e-200
 #: The least square of a slope: sections have none, and levers of no length.
@@ -29,7 +29,7 @@ def _interpolate(weights, first, u, at, p, q):
             q[i] += w * u[dof + 1]
 
 
-@source
+@apart("contacts", PAIR, F1, float, I1, F2)
 def places(pair, u, factor, at, z):
     """Positions and slopes (4, n) of points: factor times the reference ones plus displacements."""
     for c in range(4):
@@ -40,7 +40,7 @@ def places(pair, u, factor, at, z):
     _interpolate(pair.slopes, pair.first, u, at, z[2], z[3])
 
 
-@source
+@apart("contacts", PAIR, F1, float, F2, F1)
 def middles(pair, u, factor, x, radius):
     """Positions of element middles (2, n), and bounds of the distance of their points.
 
@@ -62,7 +62,7 @@ def middles(pair, u, factor, x, radius):
             radius[e] += q[e] * np.sqrt(c * c + d * d)
 
 
-@source
+@apart("contacts", PAIR, I1, F2, F2)
 def surface(pair, at, z, x):
     """Surface points (2, n) from positions and slopes."""
     offset = pair.points[OFFSET]
@@ -72,7 +72,7 @@ def surface(pair, at, z, x):
         x[0, i], x[1, i] = z[0, i] - c * t, z[1, i] + c * s
 
 
-@source
+@apart("contacts", PAIR, I1, F2, F2)
 def levers(pair, at, z, lever):
     """Derivative of the surface point by the slope: xs, xt, ys, yt."""
     offset = pair.points[OFFSET]
@@ -93,7 +93,7 @@ def carried(q, p, x, y):
     return x + (q[0] - p[0]) + cos * a - sin * b, y + (q[1] - p[1]) + sin * a + cos * b
 
 
-@source
+@apart("contacts", PAIR, int, bool, F2, F2)
 def distances(pair, which, whole, x, out):
     """Gap, its gradient and, if ``whole``, second derivatives xx, xy, yy at points x, (6, n)."""
     pose, y, side = pair.poses[which], np.empty(x.shape), pair.numbers[SIDE]
@@ -139,7 +139,7 @@ def disc(shape, whole, y, out):
             out[3, i], out[4, i], out[5, i] = gy * gy / size, -gx * gy / size, gx * gx / size
 
 
-@source
+@apart("contacts", F1, bool, F2, F2)
 def outline(shape, whole, y, out):
     """Closest point projection on a polygon with rounded corners.
 

@@ -14,7 +14,7 @@ from typing import Annotated
 
 import numpy as np
 
-from ...core.source import F1, MADE, apart, indices, source
+from ...core.source import F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
 from .active_set import near_points, project, search, stride, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface
@@ -23,7 +23,7 @@ from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_sl
 from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, BILATERAL,
                      DAMPED_TANGENT, DAMPING, END, FORCE, FRICTION, GAP, LARGEST, MULTIPLIER, NOW,
                      OFFSET, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING, STIFFNESS, TOLERANCE,
-                     ContactTables, Question, hardening, pair_of, transition)
+                     PAIR, ContactTables, Question, hardening, pair_of, transition)
 
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
@@ -95,7 +95,7 @@ def of_pair(pair, asked, u, v, out):
             _add_stiffness(pair, asked, at, S, out)
 
 
-@source
+@apart("contacts", PAIR, bool, F2, F2, I1, F2)
 def states(pair, same, a, b, at, w):
     """Fill the rows of points up to the derivative by the slope."""
     part, multiplier = 1.0 / hardening(pair), pair.memory[MULTIPLIER]
@@ -145,7 +145,7 @@ def way(w):
 # laws
 
 
-@source
+@apart("contacts", PAIR, I1, F2)
 def push(pair, at, w):
     """Force of the pressure, and its derivative."""
     area, multiplier, width = pair.points[AREA], pair.memory[MULTIPLIER], transition(pair)
@@ -184,7 +184,7 @@ def _tangential(pair):
             pair.numbers[STICKING] * (1.0 + firmness))
 
 
-@source
+@apart("contacts", PAIR, bool, I1, F2)
 def add_friction(pair, same, at, w):
     """Add Coulomb friction and its derivative."""
     friction, holds, sticking = _tangential(pair)
@@ -211,7 +211,7 @@ def add_friction(pair, same, at, w):
         w[K + 3, i] += c * nx * nx - change * nx * ny + T * w[FOUND + 4, i]
 
 
-@source
+@apart("contacts", PAIR, float, I1, F2)
 def resist(pair, factor, at, w):
     """Damping force proportional to the pressure, and its derivative."""
     area, pose, damping = pair.points[AREA], pair.poses[NOW], pair.numbers[DAMPING]
@@ -230,7 +230,7 @@ def resist(pair, factor, at, w):
 # history data
 
 
-@source
+@apart("contacts", PAIR, bool, I1, F2, F1)
 def _settle(pair, same, at, w, out):
     """Move anchors of slipping points to the limit of sticking; add the work to ``out[0]``."""
     friction, _, sticking = _tangential(pair)
@@ -258,7 +258,7 @@ def _settle(pair, same, at, w, out):
     add_each(out, where, lost)
 
 
-@source
+@apart("contacts", PAIR, I1, F2, F1)
 def _augment(pair, at, w, out):
     """Increase multipliers by penetrations, decrease them by gaps, beyond the tolerance."""
     tolerance, multiplier = pair.numbers[TOLERANCE], pair.memory[MULTIPLIER]
@@ -283,7 +283,7 @@ def _augment(pair, at, w, out):
 # from points to degrees of freedom
 
 
-@source
+@apart("contacts", PAIR, I1, F2, F1)
 def _add_force(pair, at, w, out):
     """Add forces on surface points to those on degrees of freedom."""
     value, turn, where = np.empty(at.size), np.empty(at.size), pair.first[at]
@@ -302,7 +302,7 @@ def _add_force(pair, at, w, out):
             add_each(out[2 * a + c:], where, value)
 
 
-@source
+@apart("contacts", PAIR, I1, F2, F2)
 def _stiffness(pair, at, w, S):
     """Derivative of the force on position and slope; entry (c, d) in row 4 c + d."""
     offset = pair.points[OFFSET]
@@ -337,7 +337,7 @@ def _stiffness(pair, at, w, S):
         S[15, i] += across * s * s + 2.0 * both * s * t
 
 
-@source
+@apart("contacts", F2, F2, F1)
 def _add_along(w, S, out):
     """Add the derivative of the work along the velocities to ``out[0]``."""
     value, where = np.empty(w.shape[1]), np.zeros(w.shape[1], np.int64)
@@ -348,7 +348,7 @@ def _add_along(w, S, out):
             add_each(out, where, value)
 
 
-@source
+@apart("contacts", PAIR, Annotated[Question, MADE], I1, F2, F1)
 def _add_stiffness(pair, asked, at, S, flat):
     """Add the derivatives to a band matrix, or its lower half if only that is stored."""
     value, where = np.empty(at.size), asked.ld * pair.first[at]

@@ -4,11 +4,11 @@ A contact pair is the surface of one beam with one obstacle. Its arrays are cons
 those in :class:`ContactTables`; :func:`pair_of` returns views with names.
 """
 
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ...core.source import F1, I1, shaped, source
+from ...core.source import F1, F2, I1, MADE, shaped, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
@@ -92,20 +92,24 @@ class Pair(NamedTuple):
     shape. ``common`` is the history data shared by all pairs.
     """
 
-    k: Any
-    number: Any
-    moving: Any
-    custom: Any
-    header: Any
-    first: Any
-    weights: Any
-    slopes: Any
-    points: Any
-    middles: Any
-    numbers: Any
-    poses: Any
-    memory: Any
-    common: Any
+    k: int
+    number: int
+    moving: int
+    custom: int
+    header: I1
+    first: I1
+    weights: F2
+    slopes: F2
+    points: F2
+    middles: F2
+    numbers: F1
+    poses: F2
+    memory: F2
+    common: F1
+
+
+#: The type of a pair in compiled code.
+PAIR = Annotated[Pair, MADE]
 
 
 @source

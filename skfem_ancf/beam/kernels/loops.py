@@ -7,7 +7,7 @@ t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and `
 import numpy as np
 
 from ...core.band import add_multiple
-from ...core.source import F1, apart, source
+from ...core.source import F1, F2, I1, apart, source
 from .blocks import (add, at_points, between_samples, block, changes, directions, displaced,
                      from_points, gather, moduli, push, put, strains, stresses,
                      take, times, to_rows)
@@ -120,8 +120,10 @@ def unsymmetric(t, u, v, A, ld):
         strains(t, first, d, r, E)
         gather(t, first, du, U)
         to_rows(t, first, U, d)
-        s[:] = r
-        add(1.0, d, s)
+        for g in range(R):
+            a, b, c = r[g], d[g], s[g]
+            for e in range(len(c)):
+                c[e] = a[e] + b[e]
         one, two = directions(t, r, d[:0], X), directions(t, s, d[:0], Y)
         add(-1.0, one, two)
         w[:] = 0.0
@@ -134,7 +136,7 @@ def unsymmetric(t, u, v, A, ld):
         add_to_halves(t.start, first, ld, m, K, Z, A)
 
 
-@source
+@apart("unsymmetric", CompiledTables, F2, F2, F2, F2, F2)
 def add_difference(t, H, X, D, w, z):
     """Coefficients xx, xy, yx, yy of ``X^T H D``, symmetric and skew in the functions."""
     terms, factors = t.pattern.terms, t.pattern.factors[0]
@@ -152,7 +154,7 @@ def add_difference(t, H, X, D, w, z):
                         o[e] += c * h[e] * (x[i + e] * y[j + e] - X0[i + e] * Y0[j + e])
 
 
-@source
+@apart("unsymmetric", I1, int, int, int, F2, F2, F1)
 def add_to_halves(start, first, ld, m, K, Z, A):
     """Add matrices to both halves."""
     for j in range(2 * m + 2):

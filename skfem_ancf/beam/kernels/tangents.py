@@ -103,7 +103,7 @@ def own_products(G, used, m, rows, w, sign, K):
                 n += 1
 
 
-@source
+@apart("own", F2, F2, int)
 def scale_products(D, K, top):
     """Multiply a lower half, with diagonal if ``top`` is 1, by D from both sides."""
     n = 0
