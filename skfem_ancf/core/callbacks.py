@@ -8,7 +8,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
-from ctypes import c_double
+from ctypes import c_double, c_int64
 from threading import current_thread, get_ident, main_thread
 from typing import Any
 
@@ -168,25 +168,26 @@ def raise_kept() -> None:
             raise error
 
 
-def _view(address, n):
-    """The n numbers at an address."""
-    return np.frombuffer((c_double * n).from_address(address)) if n else np.zeros(0)
+def _views(places, n):
+    """The n arrays whose addresses and sizes are at an address."""
+    words = iter((c_int64 * (2 * n)).from_address(places))
+    return [np.frombuffer((c_double * size).from_address(address)) if size else np.zeros(0)
+            for address, size in zip(words, words)]
 
 
-@apart(PYTHON, *3 * [int], *2 * [float], *6 * [int])
-def ask(question, handle, what, t, x, a, m, b, n, out, k):
-    """Answer a question of compiled code; arrays are given by address and size."""
-    answer = _view(out, k)
+@apart(PYTHON, int, int, int, float, float, int)
+def ask(question, handle, what, t, x, places):
+    """Answer a question of compiled code with three arrays."""
+    a, b, answer = _views(places, 3)
     try:
-        _QUESTIONS[question](handle, what, t, x, _view(a, m), _view(b, n), answer)
+        _QUESTIONS[question](handle, what, t, x, a, b, answer)
     except BaseException:
         if question != POSES:
             answer[:] = np.nan  # ends the iteration
         raise
 
 
-@apart(PYTHON, int, float, *12 * [int], returns=int)
-def solved(handle, t, u, a, m, b, R, c, phi, d, du, e, dm, f):
+@apart(PYTHON, int, float, int, returns=int)
+def solved(handle, t, places):
     """:func:`call_solver` for compiled code."""
-    return call_solver(handle, t, _view(u, a), _view(m, b), _view(R, c), _view(phi, d),
-                       _view(du, e), _view(dm, f))
+    return call_solver(handle, t, *_views(places, 6))

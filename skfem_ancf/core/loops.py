@@ -474,9 +474,19 @@ def subtract_from_band(A, i, j, v, x, k):
 
 
 @source
+def _places(x, k, places):
+    """Note address and size of array number k."""
+    places[2 * k], places[2 * k + 1] = x.ctypes.data, x.size
+
+
+@source
 def _ask(question, handle, what, t, x, a, b, out):
-    ask(question, handle, what, t, x, a.ctypes.data, a.size, b.ctypes.data, b.size,
-        out.ctypes.data, out.size)
+    places = np.empty(6, np.int64)
+    _places(a, 0, places)
+    _places(b, 1, places)
+    _places(out, 2, places)
+    ask(question, handle, what, t, x, places.ctypes.data)
+    places[0] = 0  # it has lived until here
 
 
 def custom_force(handle, t, scale, u, out):
@@ -504,9 +514,16 @@ def custom_poses(handle, t, span, poses):
 
 
 def call_solver(handle, t, u, multipliers, R, phi, du, dm):
-    return solved(handle, t, u.ctypes.data, u.size, multipliers.ctypes.data, multipliers.size,
-                  R.ctypes.data, R.size, phi.ctypes.data, phi.size, du.ctypes.data, du.size,
-                  dm.ctypes.data, dm.size) > 0
+    places = np.empty(12, np.int64)
+    _places(u, 0, places)
+    _places(multipliers, 1, places)
+    _places(R, 2, places)
+    _places(phi, 3, places)
+    _places(du, 4, places)
+    _places(dm, 5, places)
+    done = solved(handle, t, places.ctypes.data) > 0
+    places[0] = 0  # it has lived until here
+    return done
 
 
 def custom_distance(handle, obstacle, t, x, out):

@@ -69,13 +69,17 @@ class Target(NamedTuple):
 #: external force, residual, inverse diagonal of the tangent; residual that may remain, and
 #: prescribed changes of the fixed DOFs.
 U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, MOVED, ROWS = range(9)
+#: Which residual of an iteration is evaluated.
+BETWEEN, AT_START, AT_END = range(3)
 #: Smallest stiffness of a DOF in norms, relative to the mean; DOFs of a rigid body have none.
 SMALLEST = 1e-14
 
 
-@apart("statics", Equations, Annotated[Target, MADE], F2, bool, bool, bool, F1, F2, F2, F2, F1)
-def balance(e, target, factors, first, last, mixed, g, x, m, stresses, norms):
-    """Set forces, residual, tangent and its inverse diagonal; if ``last``, without the tangent.
+@apart("statics", Equations, Annotated[Target, MADE], F2, int, bool, F1, F2, F2, F2, F1)
+def balance(e, target, factors, which, mixed, g, x, m, stresses, norms):
+    """Set forces, residual, tangent and its inverse diagonal.
+
+    ``which`` is AT_START for the first tangent, AT_END for the last residual, without a tangent.
 
     ``factors`` are load factors and those for the first tangent; ``m`` the multipliers and
     residuals of joints, and in row 3 their c; ``stresses`` those of the strain and the independent
@@ -86,7 +90,7 @@ def balance(e, target, factors, first, last, mixed, g, x, m, stresses, norms):
     gap, opened = x[GAP], 0.0
     if e.lasting >= MATERIALS:
         carry_eigenstrains(e.loads, factors[0])
-    if last:
+    if which == AT_END:
         force(e, u, target.at, f)
     else:
         if mixed:
@@ -94,9 +98,9 @@ def balance(e, target, factors, first, last, mixed, g, x, m, stresses, norms):
             for i in indices(u.size):
                 before[i] = u[i] - du[i]
             linearised(e, before, du, stresses[0], stresses[1])
-        t = np.inf if first and np.isnan(target.when) else target.when
-        tangent(e, u, factors[1 if first else 0], t, target.scale, target.at, mixed, stresses[0],
-                stresses[1], f)
+        t = np.inf if which == AT_START and np.isnan(target.when) else target.when
+        tangent(e, u, factors[1 if which == AT_START else 0], t, target.scale, target.at, mixed,
+                stresses[0], stresses[1], f)
         diagonal(e.K, weights)
         invert(weights, e.sizes)
     external_force(e.loads, factors[0], target.when, target.scale, u, load)

@@ -13,8 +13,8 @@ from ..core.source import F1, MADE, apart, indices, source
 from ..core.types import Array
 from ..equations.backend import Backend
 from ..equations.tables import Equations
-from ..equations.evaluation import (DU, FORCE, GAP, LOAD, MOVED, RESIDUAL, ROWS, U, Target, balance,
-                                    hold_back)
+from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DU, FORCE, GAP, LOAD, MOVED,
+                                    RESIDUAL, ROWS, U, Target, balance, hold_back)
 
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
 ITERATIONS = 8
@@ -112,7 +112,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     work = before = reference = np.inf
     while True:
         # the last residual needs no tangent
-        balance(e, target, factors, k == 0, last, rules.mixed and k > 0, g, x, m, stresses, norms)
+        balance(e, target, factors, AT_START if k == 0 else AT_END if last else BETWEEN,
+                rules.mixed and k > 0, g, x, m, stresses, norms)
         rho, size, opening = norms[0], norms[1], norms[2]
         if not rho < 1e300:
             return NOT_FINITE, k, k, by_band and k > 0
@@ -128,7 +129,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if k == rules.iterations:
             return NOT_CONVERGED, k + 1, k, by_band and k > 0
         if last:
-            balance(e, target, factors, False, False, rules.mixed, g, x, m, stresses, norms)
+            balance(e, target, factors, BETWEEN, rules.mixed, g, x, m, stresses, norms)
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
