@@ -45,7 +45,7 @@ from .scene.eigen_readings import BucklingLoad, CriticalLoad, Frequency
 from .scene.motion_design import MotionDesign
 from .scene.parameters import Parameters
 from .scene.frame import Frame
-from .scene.plan import Plan
+from .scene.solve import Plan
 from .scene.linear_model import LinearModel, StateSpace
 from .scene.scene import Scene
 from .scene.stepper import Stepper

@@ -45,10 +45,9 @@ from .adapt import (DEGREES, GOALS, MOST_ELEMENTS, frequency_errors, solve_adapt
 from .design import Gradient
 from .linear_model import LinearModel
 from .model import Entry, Model
-from .plan import Plan, make_plan
 from .quasistatic import StepHistory, Steps, run
-from .solve import (configuration, displacement, solve_linear, solve_static, system_of,
-                    velocity_of, warn_about)
+from .solve import (Plan, configuration, displacement, make_plan, solve_linear, solve_static,
+                    system_of, velocity_of, warn_about)
 from .stepper import Held, Stepper
 
 if TYPE_CHECKING:
