@@ -102,7 +102,7 @@ def custom_load_stiffness(handle, t, scale, u, flat):
 @primitive("skfem_ancf.core.loops")
 def custom_joints(handle, what, t, u, v, out):
     """Joints without tables, see
-    :meth:`~skfem_ancf.equations.user_defined.UserDefined.add_custom_joints`.
+    :meth:`~skfem_ancf.equations.tables.UserDefined.add_custom_joints`.
     """
     owner(handle).add_custom_joints(what, t, u, v, out)
 

@@ -85,7 +85,11 @@ class EnergyMomentum4(EnergyMomentum):
 
     def require(self, system: System) -> None:
         super().require(system)
-        system.histories.require_none(self, "it takes a part of each step back in time")
+        if system.histories.evolve:
+            raise InputError(
+                f"{self!r} takes a part of each step back in time, which materials and items with "
+                "a history do not know: use 'energy-momentum', 'generalized-alpha', 'gauss' or "
+                "'radau'")
         if system.damped or system.histories.dissipates:
             raise InputError(f"{self!r} takes a part of each step back in time, where damping and "
                              "friction would add energy: use 'energy-momentum', or 'radau' for "

@@ -13,7 +13,6 @@ from ..actions.forces.system import Forces
 from ..beam.beam import Beam
 from ..beam.kernels.histories import ElementsWithHistory, Past, history_size
 from ..beam.remembered import remembers, with_history
-from ..core.errors import InputError
 from ..core.types import Array
 
 
@@ -160,13 +159,6 @@ class Histories:
                 continue
             if _laws(beam) == _laws(other):
                 yield self._parts[id(beam)], theirs._parts[id(other)]
-
-    def require_none(self, scheme: Any, because: str) -> None:
-        """Raise InputError if a material or a user-defined item has a history."""
-        if self.evolve:
-            one = [*(beam for beam, _ in self._beams), *self.forces.remembering][0]
-            raise InputError(f"{scheme!r} does not know histories, as that of {one!r}: {because}; "
-                             "use 'energy-momentum', 'generalized-alpha', 'gauss' or 'radau'")
 
 
 def _laws(beam):
