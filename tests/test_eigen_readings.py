@@ -5,7 +5,7 @@ import pytest
 
 from skfem_ancf import (Beam, BucklingLoad, CriticalLoad, Design, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, Frequency, InputError, MeshBeam,
-                        RigidBody, Scene, StVenantKirchhoff, Weight)
+                        Parameters, RigidBody, Scene, StVenantKirchhoff, Weight)
 from tests.test_design import agree, beam_of, difference
 
 S = np.linspace(0, 1, 5)
@@ -40,6 +40,24 @@ def test_frequencies_by_heights_at_nodes():
                      ).clamp("left")
 
     agree(Design(build, [Frequency(0), Frequency(1)]), 0.05 + 0.01 * np.cos(3 * S))
+
+
+def test_fields_by_name_beside_static_readings():
+    """Frequencies and buckling loads of heights and moduli by name, alone and beside a sensor."""
+    x = np.linspace(0, 1, 9)
+
+    def build(p):
+        mesh = MeshBeam.init_line(x, lambda s: np.interp(s, x, p))
+        scene = Scene(beam_of(mesh=mesh, element=ElementBeamCable(5))).clamp("left")
+        scene.point_force((-0.1, -0.01), at=(1, 0))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    p = 0.03 - 0.01 * x
+    scene = build(p)
+    for readings in ([Frequency(0), BucklingLoad(0)], ["tip", Frequency(0, loaded=True)]):
+        found = Design(Parameters(scene, [(scene.beams[0], "height", "nodes")]), readings)
+        assert np.allclose(found.jacobian(p), Design(build, readings).jacobian(p), rtol=1e-6,
+                           atol=1e-6 * np.abs(found.jacobian(p)).max())
 
 
 def test_frequency_about_a_loaded_state():

@@ -278,7 +278,12 @@ class Design:
         known = isinstance(self.build, Parameters)
         by = _Differences(lambda p: self._equations(p, state), p, h, stencil, noise)
         if known:
-            return by.of(self.build.groups(len(noise)))
+            # the same degrees of freedom in the equations and in the rows of each eigenvalue
+            n, c = len(self._values), self._built.system.constraints
+            before, after = (0 if state is None else 1), (len(self._owners) - n) // (c.N + c.m)
+            return by.of([(members, np.concatenate([np.tile(of, before), np.full(n, -1),
+                                                    np.tile(of, after)]))
+                          for members, of in self.build.groups(c.N + c.m)])
         if self._groups is not None:
             found = by.of(self._groups)
             if by.agree(found):

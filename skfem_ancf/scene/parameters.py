@@ -172,7 +172,7 @@ class Parameters:
     def groups(self, size: int) -> list[tuple[list[int], Array]]:
         """Parameters that change different rows, and the parameter of each of ``size`` rows.
 
-        Rows are those of the degrees of freedom, and others, for which it is not known (-1). A
+        Rows are those of degrees of freedom and of joints, for which it is not known (-1). A
         component of a field acts on the nodes of its elements: each third one at once.
         """
         out = []
