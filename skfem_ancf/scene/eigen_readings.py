@@ -13,7 +13,7 @@ from ..core.types import Array
 from ..equations.matrices import matrices_of
 from ..equations.strain_tangent import Inverse, StrainTangent
 from ..results.state import State
-from ..solvers.eigen import ROUND_OFF, UNSTRESSED
+from ..solvers import eigen
 from .linear_model import Bordered
 
 #: Relative distance of the squares of frequencies, or of buckling loads, that are not simple.
@@ -122,7 +122,8 @@ class Frequency(EigenReading):
     def _find(self, scene: Any, state: State | None) -> tuple[float, Any]:
         c = scene.system.constraints
         k = min(self.number + 2, max(int(c.free.sum()) - c.m, self.number + 1))
-        modes = scene.modes(k, state)
+        # without the estimate of errors of scene.modes, which a design need not repeat
+        modes = eigen.modes(scene.system, scene.state(load=0.0) if state is None else state, k)
         return float(modes.frequencies[self.number].real), modes
 
     def _freeze(self, scene: Any, found: Any) -> Frozen:
@@ -131,7 +132,7 @@ class Frequency(EigenReading):
         if found.flutter or not system.symmetric:
             raise InputError("the loads have no potential: derivatives of frequencies need a "
                              "symmetric stiffness, so use differences of values")
-        if abs(mu) <= 1e2 * ROUND_OFF**2 * system.scales.bending_eigenvalue:
+        if abs(mu) <= 1e2 * eigen.ROUND_OFF**2 * system.scales.bending_eigenvalue:
             raise InputError(f"{self!r} is that of a rigid motion, zero for all parameters: give "
                              "a higher number, or supports")
         self._require_simple(values.real)
@@ -164,9 +165,10 @@ class BucklingLoad(EigenReading):
     def _freeze(self, scene: Any, found: Any) -> Frozen:
         system, factor = scene.system, found.factors[self.number]
         zero, sizes = np.zeros(system.N), system.constraints.coordinate_sizes
-        rest = residual(system, zero, np.zeros(system.constraints.m), 0.0)[:system.N]
-        if not system.symmetric or system.domains or np.any(np.abs(rest * sizes) > UNSTRESSED * (
-                np.abs(system.external_force(zero) * sizes).max())):
+        rest = residual(system, zero, np.zeros(system.constraints.m), 0.0)[:system.N] * sizes
+        push = np.abs(system.external_force(zero) * sizes).max()
+        if not system.symmetric or system.domains or np.any(
+                np.abs(rest) > eigen.UNSTRESSED * push):
             raise InputError("derivatives of buckling loads are of beams under loads with a "
                              "potential, free of stress without them: use CriticalLoad()")
         self._require_simple(found.factors)
