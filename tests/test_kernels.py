@@ -153,17 +153,17 @@ def test_loops_are_arrays(kind, mesh):
                 ((runs.run_mean_mixed, u, v, given), (loops.force, u, v, given), (S, T), (f, g)),
                 ((runs.run_linearised, u, v, given), (loops.linearised, u, v, given), (S, T)),
                 ((runs.run_viscous, u, v), (loops.linearised, u, v, none, none), (f, g)),
-                ((runs.run_tangent, u, none), (loops.tangent, u, none), (S, T), (f, g), (A, B)),
-                ((runs.run_tangent, u, given), (loops.tangent, u, given), (S, T), (f, g), (A, B)),
-                ((runs.run_unsymmetric, u, v), (loops.unsymmetric, u, v), (A, B)),
-                ((runs.run_gradients, u), (loops.gradients, u), (D, E)),
+                *(((runs.run_tangent, u, x), (loops.run_tangent, u, x), (S, T), (f, g), (A, B))
+                  for x in (none, given)),
+                ((runs.run_unsymmetric, u, v), (loops.run_unsymmetric, u, v), (A, B)),
+                ((runs.run_gradients, u), (loops.run_gradients, u), (D, E)),
                 ((runs.run_eigen_force, u, eigen),
                  (loops.force, u, none, eigen, none) if linear else (loops.eigen_mean, u, u, eigen),
                  (f, g)),
                 ((runs.run_eigen_mean, u, v, eigen),
                  (loops.force, u, v, eigen, none) if linear else (loops.eigen_mean, u, v, eigen),
                  (f, g)),
-                ((runs.run_eigen_tangent, u, eigen), (loops.eigen_tangent, u, eigen), (A, B))):
+                ((runs.run_eigen_tangent, u, eigen), (loops.run_eigen_tangent, u, eigen), (A, B))):
             for function, table, place in ((one, x, 0), (other, y, 1)):
                 for pair in both:
                     pair[place][:] = 0.0

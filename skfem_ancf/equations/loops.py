@@ -1,4 +1,4 @@
-"""Large parts of compiled code behind addresses: kernels, force elements, contact, laws."""
+"""The equations for compiled code, and material laws, which it calls by address."""
 
 from functools import cache, lru_cache
 from typing import Any
@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..beam.kernels.compiled import CompiledTables, compiled_pattern, compiled_tables
-from ..beam.kernels.law import LINEAR, point_of
-from ..beam.kernels.loops import (eigen_mean, eigen_tangent, force, gradients, linearised, tangent,
-                                  unsymmetric)
+from ..beam.kernels.law import point_of
 from ..beam.strain_energy import FlatBody
 from ..core.code_cache import NotCompiled
 from ..core.immutable import is_builtin
@@ -22,76 +20,6 @@ _read, _call_law = reader(CompiledTables), caller(F1, F3, F3)
 
 def tables_of(body, k):
     return _read(body.packs[k])
-
-
-def run_force(t, u, f):
-    force(t, u, u[:0], u[:0], u[:0], f)
-
-
-def run_stress(t, u, out):
-    force(t, u, u[:0], u[:0], out, u[:0])
-
-
-def run_mixed(t, u, given, out, f):
-    force(t, u, u[:0], given, out, f)
-
-
-def run_given(t, u, given, f):
-    force(t, u, u[:0], given, u[:0], f)
-
-
-def run_mean(t, u, v, f):
-    force(t, u, v, u[:0], u[:0], f)
-
-
-def run_mean_mixed(t, u, v, given, out, f):
-    force(t, u, v, given, out, f)
-
-
-def run_linearised(t, u, du, given, out):
-    linearised(t, u, du, given, out, u[:0])
-
-
-def run_viscous(t, u, v, f):
-    linearised(t, u, v, u[:0], u[:0], f)
-
-
-def run_tangent(t, u, given, out, f, flat, ld):
-    tangent(t, u, given, out, f, flat, ld)
-
-
-def run_unsymmetric(t, u, v, flat, ld):
-    unsymmetric(t, u, v, flat, ld)
-
-
-def run_gradients(t, u, out):
-    gradients(t, u, out)
-
-
-def run_eigen_force(t, u, given, f):
-    if t.law.kind == LINEAR:
-        force(t, u, u[:0], given, u[:0], f)
-    else:
-        eigen_mean(t, u, u, given, f)
-
-
-def run_eigen_mean(t, u, v, given, f):
-    if t.law.kind == LINEAR:
-        force(t, u, v, given, u[:0], f)
-    else:
-        eigen_mean(t, u, v, given, f)
-
-
-def run_eigen_tangent(t, u, given, flat, ld):
-    eigen_tangent(t, u, given, flat, ld)
-
-
-def run_accept(t, u, v, out):
-    pass  # scenes of laws with a history run in NumPy
-
-
-def run_put(t, given):
-    pass  # as well
 
 
 def evaluate_points(law, strain, out):

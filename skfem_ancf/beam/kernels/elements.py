@@ -94,6 +94,7 @@ class Elements:
 
     def __init__(self, t: StrainTables) -> None:
         self.t, self.ne, self.ns, self.m = t, len(t.start), t.rows.shape[1], t.G.shape[2]
+        self.kind = t.pattern.kind
         G, R, D = scaled(t.G[t.at[:, OF_G]] if len(t.G) > 1 else t.G)
         self.G, self.own, self._even = G, len(G) > 1, len(R) == 1 or len(G) > 1
         self.R, self.D = R.T[:, None].copy(), D.T[:, None].copy()
@@ -146,7 +147,7 @@ class Elements:
 
         For cables this is r_X and r_XX as complex numbers, |r_X| and the material curvature.
         """
-        if self.t.kind != CABLE:
+        if self.kind != CABLE:
             return r
         z = r[:, 0] + 1j * r[:, 1]
         a, b = z[::2], z[1::2]
@@ -163,7 +164,7 @@ class Elements:
 
         For equal measures these are derivatives.
         """
-        if self.t.kind != CABLE:
+        if self.kind != CABLE:
             return one if one is two else 0.5 * (one + two)
         (a, b, p, k), (c, d, q, l) = one, two
         s, square = a + c, p * p + q * q
@@ -322,7 +323,7 @@ class Elements:
         Those of cables are ``Im(Z v v)`` for the change v of r_X, and ``Im(z v w)`` for v and the
         change w of r_XX.
         """
-        if self.t.kind != CABLE:
+        if self.kind != CABLE:
             return T[:, None]
         (a, b, p, _), n = one, len(T) // 2
         N, z = 0.5 * T[:n] / p, T[n:] / (-a * a)

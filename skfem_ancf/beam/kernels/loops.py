@@ -53,6 +53,30 @@ def force(t, u, v, given, out, f):
             push(t, first, D, T, U if whole else U[:0], B, F, f)
 
 
+def run_force(t, u, f):
+    force(t, u, u[:0], u[:0], u[:0], f)
+
+
+def run_stress(t, u, out):
+    force(t, u, u[:0], u[:0], out, u[:0])
+
+
+def run_mixed(t, u, given, out, f):
+    force(t, u, u[:0], given, out, f)
+
+
+def run_given(t, u, given, f):
+    force(t, u, u[:0], given, u[:0], f)
+
+
+def run_mean(t, u, v, f):
+    force(t, u, v, u[:0], u[:0], f)
+
+
+def run_mean_mixed(t, u, v, given, out, f):
+    force(t, u, v, given, out, f)
+
+
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
 def linearised(t, u, du, given, out, f):
     """Linearised stresses of a change or rate du at u: plus given ones to out, or as forces."""
@@ -75,8 +99,16 @@ def linearised(t, u, du, given, out, f):
             push(t, first, D, T, U[:0], B, F, f)
 
 
+def run_linearised(t, u, du, given, out):
+    linearised(t, u, du, given, out, u[:0])
+
+
+def run_viscous(t, u, v, f):
+    linearised(t, u, v, u[:0], u[:0], f)
+
+
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1, int)
-def tangent(t, u, given, out, f, A, ld):
+def run_tangent(t, u, given, out, f, A, ld):
     """Tangent, force and stresses at u; the geometric part has the given stresses, if any."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     work, samples = np.empty((2 * m + 3 * R + 3 * R // 2, 2 * t.width)), np.empty((2, ns, t.width))
@@ -104,7 +136,7 @@ def tangent(t, u, given, out, f, A, ld):
 
 
 @apart("unsymmetric", CompiledTables, F1, F1, F1, int)
-def unsymmetric(t, u, v, A, ld):
+def run_unsymmetric(t, u, v, A, ld):
     """Add ``B(u)^T H (B(v) - B(u))`` to a matrix in two halves."""
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], 3 * t.G.shape[0] // 2
     du = v.copy()
@@ -177,7 +209,7 @@ def add_to_halves(start, first, ld, m, K, Z, A):
 
 
 @apart("gradients", CompiledTables, F1, F1)
-def gradients(t, u, out):
+def run_gradients(t, u, out):
     """Write the derivatives of strains and of weighted stresses, (2, ne, ns, 2 nb)."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     both = out.reshape(2, len(t.start), ns, 2 * m + 2)
@@ -285,8 +317,22 @@ def eigen_mean(t, u, v, shift, f):
         push(t, first, D, T, U[:0], B, U, f)
 
 
+def run_eigen_force(t, u, given, f):
+    if t.law.kind == LINEAR:
+        force(t, u, u[:0], given, u[:0], f)
+    else:
+        eigen_mean(t, u, u, given, f)
+
+
+def run_eigen_mean(t, u, v, given, f):
+    if t.law.kind == LINEAR:
+        force(t, u, v, given, u[:0], f)
+    else:
+        eigen_mean(t, u, v, given, f)
+
+
 @apart("eigenstrains", CompiledTables, F1, F1, F1, int)
-def eigen_tangent(t, u, given, A, ld):
+def run_eigen_tangent(t, u, given, A, ld):
     """Change of the tangent at u by eigenstrains: stresses for linear laws, else strains."""
     R, m, ns = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1]
     U, d, r = np.empty((m, 2 * t.width)), np.empty((R, 2 * t.width)), np.empty((R, 2 * t.width))
@@ -311,6 +357,14 @@ def eigen_tangent(t, u, given, A, ld):
             add_material(t, H, r, w, z)
         add_geometric(t, r, T, w)
         add_matrices(t, first, w, z, 0, ld, A)
+
+
+def run_accept(t, u, v, out):
+    pass  # scenes of laws with a history run in NumPy
+
+
+def run_put(t, given):
+    pass  # as well
 
 
 # derivatives of strains in collocation

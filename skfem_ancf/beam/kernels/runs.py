@@ -4,7 +4,7 @@ Displacements u are (N,); f (N,) and ``flat`` are added to. Stresses are weighte
 ``flat, ld`` store entry (i, j), i >= j, of a tangent at ``flat[j * ld + i - j]``. Forces and
 tangents of the strain include the constant stiffness. Arrays of size 0 are not used.
 
-In compiled code the functions of the same names in :mod:`skfem_ancf.equations.loops` replace them.
+In compiled code the functions of the same names in :mod:`.loops` replace them.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from ...core.source import primitive
 from .law import HISTORY, LINEAR
 
 #: Marks kernels with a compiled version.
-kernel = primitive("skfem_ancf.equations.loops")
+kernel = primitive("skfem_ancf.beam.kernels.loops")
 
 
 def _given(e, T):
@@ -199,17 +199,14 @@ def run_accept(e, u, v, out):
         out[0] += e.accept(u, v)
 
 
-steps = primitive("skfem_ancf.beam.kernels.loops")
-
-
-@steps
+@kernel
 def add_changes(B, start, x, T):
     """Add ``B[e] x`` at start[e] to T (ne ns,), with B repeated for copies of the elements."""
     x = x[start[:, None] + np.arange(B.shape[2])].reshape(-1, len(B), B.shape[2], 1)
     T += (B @ x).ravel()
 
 
-@steps
+@kernel
 def add_transposed(B, start, T, f):
     """Add ``B[e]^T T[e]`` at start[e] to f, with B repeated for copies."""
     F = T.reshape(-1, len(B), 1, B.shape[1]) @ B
