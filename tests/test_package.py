@@ -194,6 +194,45 @@ def test_the_readme_runs_with_the_dependencies_alone(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["cantilever.vtu"]
 
 
+IN_A_BROWSER = """
+import sys, threading, subprocess, multiprocessing.process
+def refuse(*args, **options):
+    raise RuntimeError("a browser has no threads and no processes")
+threading.Thread.start = subprocess.Popen.__init__ = refuse
+multiprocessing.process.BaseProcess.start = refuse
+sys.modules.update(dict.fromkeys(["numba", "llvmlite", "tqdm", "pyvista", "imageio"]))
+import numpy as np
+from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, StVenantKirchhoff
+mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01)
+beam = Beam(mesh, ElementBeamANCFCubic(2), StVenantKirchhoff(2e11, 0.3, 7800), 0.01)
+scene = Scene(beam).clamp("left").gravity((0, -9.81))
+assert scene.solve_static().stress((0.5, 0.005))[0] > 0.0
+scene.modes(2), scene.integrate(0.01, 1e-3), scene.solve_static().save("beam.vtu")
+for module in list(sys.modules.values()):
+    path = getattr(module, "__file__", None) or ""
+    if "site-packages" in path and not path.endswith(".py"):
+        print(path)
+"""
+
+
+def test_it_runs_where_there_are_no_threads_and_processes(tmp_path):
+    """As Pyodide runs the wheel in a browser: binaries are those of NumPy and SciPy alone."""
+    printed = run(sys.executable, "-c", IN_A_BROWSER, cwd=tmp_path, PYTHONPATH=str(ROOT))
+    owners = {line.split("site-packages")[1].strip(os.sep).split(os.sep)[0]
+              for line in printed.splitlines() if "site-packages" in line}
+    assert "numpy" in owners
+    assert owners <= {"numpy", "scipy", "charset_normalizer"}  # the last of rich: optional there
+    own = {path.suffix for path in (ROOT / "skfem_ancf").rglob("*")
+           if path.is_file() and "__pycache__" not in path.parts}
+    assert own <= {".py", ".typed", ".json", ".csv"}
+
+
+def test_binder_installs_an_extra_that_exists():
+    lines = (ROOT / "binder" / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    named = re.fullmatch(r"\.\[(\w+)\]", next(line for line in lines if line.startswith(".")))[1]
+    assert re.search(rf"^{named} = \[", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+
+
 def test_what_is_heavy_is_imported_when_it_is_needed():
     heavy = ("scipy.spatial", "scipy.optimize", "scipy.interpolate", "scipy.integrate",
              "scipy.ndimage", "numba", "meshio", "matplotlib", "pyvista", "tqdm")
