@@ -257,6 +257,31 @@ def test_a_ratchet_holds_what_was_reached():
         TIP)[1], rtol=1e-6)
 
 
+class Latch(Item):
+    """A ratchet that says nothing of its energy: all of its work counts as dissipated."""
+
+    start, evaluate = Ratchet.start, Ratchet.evaluate
+
+    def __init__(self, k):
+        self.k = k
+
+    def bind(self, layout):
+        bound, r = super().bind(layout), point(layout, 0, TIP)
+        bound.dofs, bound.row = r.dofs, r.row((0.0, 1.0), layout.N)
+        return bound
+
+
+def test_an_item_with_a_memory_needs_no_energy():
+    def run(item):
+        scene = bare().add(item).point_force((0.0, 1.0), at=TIP, amplitude=down_and_up)
+        return scene.run([1.0, 2.0], increments=8)
+
+    one, other = run(Latch(200.0)), run(Ratchet(200.0))
+    assert_allclose(one.u, other.u, rtol=0, atol=1e-7)
+    assert_allclose(one.dissipated + one.strain_energy, other.dissipated + other.strain_energy,
+                    rtol=1e-6, atol=1e-9)
+
+
 # what it refuses
 
 class Odd(Maxwell):

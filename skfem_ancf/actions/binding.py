@@ -38,7 +38,7 @@ def bind_item(item: Item, layout: Layout) -> list[Any]:
             raise InputError(f"bind(layout) of {item!r} must return an Item, got {shown(bound)}")
         out: list[Any] = []
         if any(hasattr(bound, name) for name in ("energy", "force", "mass", "evaluate")):
-            out.append((_Remembered if hasattr(bound, "start") else _Force)(bound, layout))
+            out.append(_Force(bound, layout))
         if hasattr(bound, "constraint"):
             out.append(_Constraint(bound, layout))
     if not out:
@@ -50,9 +50,14 @@ def bind_item(item: Item, layout: Layout) -> list[Any]:
 
 
 class _Force(ForceElement):
-    """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom."""
+    """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom.
+
+    ``past`` are history and time of an increment, of an item with a memory.
+    """
 
     def __init__(self, item: Any, layout: Layout) -> None:
+        if hasattr(item, "start"):
+            self.start, self.evaluate = item.start, self._evaluate
         self.item, self._N, self.symmetric = item, layout.N, item.symmetric
         self.name, self._key = item.name, item._key
         dofs = np.arange(layout.N) if item.dofs is None else np.unique(item.dofs)
@@ -82,7 +87,13 @@ class _Force(ForceElement):
         out[self._dofs] = np.ravel(x)
         return out
 
-    def force(self, x: Array, v: Array, t: float) -> Array:
+    def _evaluate(self, x, v, t, history, dt):
+        force, after = self.item.evaluate(self._whole(x), self._whole(v), t, history, dt)
+        return self._at(force), after
+
+    def force(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        if past:
+            return self._evaluate(x, v, t, *past)[0]
         if hasattr(self.item, "force"):
             return self._at(self.item.force(self._whole(x), self._whole(v), t))
         return -derivative(lambda y: self.item.energy(self._whole(y), t), np.asarray(x))
@@ -94,24 +105,31 @@ class _Force(ForceElement):
                              f"{found.shape}")
         return found[self._dofs].reshape(-1, 2)
 
+    def potential(self, x: Array, *past: Any) -> float | None:
+        """Energy at a history, or at a time without a memory."""
+        return float(self.item.energy(self._whole(x), *past)) if hasattr(
+            self.item, "energy") else None
+
     def potential_at(self, x: Array, t: float) -> float | None:
-        return float(self.item.energy(self._whole(x), t)) if hasattr(self.item, "energy") else None
+        return self.potential(x, t)
 
     def _derivative_by(self, name, x, v, t, otherwise, *past):
         if not hasattr(self.item, name):
-            return sparse.csr_array((x.size, x.size)) if self.changing else otherwise(x, v, t)
+            return sparse.csr_array((x.size, x.size)) if self.changing else otherwise()
         found = getattr(self.item, name)(self._whole(x), self._whole(v), t, *past)
         matrix = sparse.csr_array(found)[self._dofs][:, self._dofs]
         n = len(self._dofs) // 2
         return matrix if self.changing else matrix.toarray().reshape(n, 2, n, 2)
 
-    def stiffness(self, x: Array, v: Array, t: float) -> Any:
-        return self._derivative_by("stiffness", x, v, t, super().stiffness)
+    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Any:
+        return self._derivative_by("stiffness", x, v, t, lambda: derivative(
+            lambda y: self.force(y, v, t, *past), x), *past)
 
-    def resistance(self, x: Array, v: Array, t: float) -> Any:
-        if not (hasattr(self.item, "force") or self.changing):
+    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Any:
+        if not (self.resists or self.changing):
             return np.zeros((len(x), 2, len(x), 2))
-        return self._derivative_by("damping", x, v, t, super().resistance)
+        return self._derivative_by("damping", x, v, t, lambda: derivative(
+            lambda w: self.force(x, w, t, *past), v), *past)
 
     def mass_entries(self) -> tuple[Array, Array, Array] | None:
         return self._mass
@@ -121,29 +139,6 @@ class _Force(ForceElement):
 
     def __repr__(self) -> str:
         return repr(self.item)
-
-
-class _Remembered(_Force):
-    """The same of an item with a memory."""
-
-    def start(self) -> Array:
-        return self.item.start()
-
-    def evaluate(self, x: Array, v: Array, t: float, history: Array, dt: float
-                 ) -> tuple[Array, Array]:
-        force, after = self.item.evaluate(self._whole(x), self._whole(v), t, history, dt)
-        return self._at(force), after
-
-    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Any:
-        return self._derivative_by("stiffness", x, v, t, lambda x, v, t: derivative(
-            lambda y: self.evaluate(y, v, t, *past)[0], x), *past)
-
-    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Any:
-        return self._derivative_by("damping", x, v, t, lambda x, v, t: derivative(
-            lambda w: self.evaluate(x, w, t, *past)[0], v), *past)
-
-    def potential(self, x: Array, *past: Any) -> float | None:
-        return self.item.energy(self._whole(x), *past) if hasattr(self.item, "energy") else None
 
 
 class _Constraint(Joint):

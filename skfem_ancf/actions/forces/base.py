@@ -327,7 +327,8 @@ class Remembering:
         own = self.element.potential
         if own.__func__ is ForceElement.potential:
             return None
-        return float(own(x, self.history if history is None else history))
+        found = own(x, self.history if history is None else history)
+        return None if found is None else float(found)
 
     def accept(self, x: Array, y: Array, v: Array, t: float) -> float:
         """Set the history at the end of an increment from x to y; returns what it dissipates."""
