@@ -423,17 +423,20 @@ call("PvdWriter", lambda **k: PvdWriter(**k).add(state(), 0.0), filename="s.pvd"
 call("PvdWriter.add", of(lambda: PvdWriter("s.pvd", subdivide=(1, 1)), "add"), "t=number",
      state=state(), t=0.0)
 call("history.save", of(history, "save"), filename="h.pvd", progress=False, subdivide=(1, 1))
-call("state.plot", of(state, "plot"), "cmap=name? limits=other?", {"limits": ["[True, False]"]},
+call("state.plot", of(state, "plot"), "field=name? cmap=name? limits=other?",
+     {"limits": ["[True, False]"]},
      field="S_xx", thickness=1.0, undeformed=True, colorbar=False, cmap="viridis",
      limits=(-1.0, 1.0), title="title", unit="Pa", subdivide=(2, 2), dpi=50)
-call("state.plot, magnified", of(state, "plot"), "scale=positive supports=flag loads=flag",
+call("state.plot, magnified", of(state, "plot"),
+     "field=name? scale=positive supports=flag loads=flag",
      field="S_xx", scale=2.0, loads=True, supports=True, subdivide=(1, 1), dpi=50)
 call("scene.plot", of(clamped, "plot"), "nodes=flag names=flag loads=flag supports=flag",
      nodes=True, names=True, loads=True, supports=True, thickness=1.0, title="title", dpi=50)
-call("history.animate", of(history, "animate"), "frames=count? size=other",
+call("history.animate", of(history, "animate"), "field=name? frames=count? size=other?",
      {"frames": ["10**30", "10**400"]}, filename="f.gif", field="S_xx", frames=2, fps=5.0,
      recover=False, subdivide=(1, 1), size=(320, 240))
-call("state.view", lambda **k: state().view(**k, off_screen=True).close(), field="S_xx",
+call("state.view", lambda **k: state().view(**k, off_screen=True).close(), "field=name?",
+     field="S_xx",
      thickness=1.0, unit="Pa", subdivide=(1, 1), recover=False)
 call("state.plot_resultants", of(state, "plot_resultants"), beam=0, title="title", dpi=50)
 call("path.plot", of(path, "plot"), "", {"component": ["0"]}, point=(1.0, 0.0), component=1, beam=0)

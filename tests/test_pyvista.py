@@ -130,6 +130,23 @@ def test_film(history, tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_a_film_is_as_high_as_what_moves(history, tmp_path):
+    """A flat beam fills the frame; magnified displacements need more of it."""
+    from PIL import Image
+
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamANCF(2), STEEL, 0.1)
+    flat = Scene(beam).clamp("left").point_force((0, -1e-4), at=(1, 0)).integrate(0.02, 0.01)
+    heights = []
+    for scale in (1.0, 1e3):
+        path = flat.animate(tmp_path / "flat.gif", frames=2, scale=scale, thickness=1)
+        with Image.open(path) as film:
+            heights.append(film.size[1])
+            image = np.asarray(film.convert("L")).astype(int)
+        rows = np.flatnonzero((image < 128).sum(axis=1) > 0)
+        assert film.size[0] == 800 and np.diff(rows).max() < 0.3 * heights[-1]
+    assert 240 <= heights[0] < 300
+
+
 @pytest.mark.filterwarnings("ignore::ResourceWarning",  # pipes of imageio's reader
                             "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_film_as_mp4(history, tmp_path):

@@ -114,7 +114,8 @@ def test_colour_bars_say_the_unit(state):
     def labels(**options):
         ax = state.plot("S_xx", **options)
         return {text for bar in (*ax.figure.axes, *ax.child_axes)
-                for text in (bar.get_xlabel(), bar.get_ylabel())} - {"x", "y", ""}
+                for text in (bar.get_xlabel(), bar.get_ylabel())} - {
+                    "x", "y", "", "x (mm)", "y (mm)"}
 
     assert labels(unit="Pa") == {"$S_{xx}$ (Pa)"} and labels(unit="") == {"$S_{xx}$"}
     assert labels() == {"$S_{xx}$ (force / area)"}
@@ -145,15 +146,54 @@ def test_several_states_share_a_picture():
     alone = [history.state(k).plot("eps_xx", thickness=1, subdivide=(4, 2)) for k in (0, 5, 10)]
     own = np.concatenate([c.get_array() for one in alone for c in one.collections
                           if c.get_array() is not None])
-    assert len(images) == 1 and len(outlines) == 1 and len(ax.figure.axes) == 2
-    np.testing.assert_allclose(images[0].get_array(), own, atol=1e-12 + 1e-6 * np.abs(own).max())
+    assert len(images) == 3 and not outlines and len(ax.figure.axes) == 2
+    np.testing.assert_allclose(np.concatenate([one.get_array() for one in images]), own,
+                               atol=1e-12 + 1e-6 * np.abs(own).max())
+    first, second, last = (one.get_alpha() for one in images)
+    assert 0.1 < first < second < 0.9 and last is None
+    rims = [c for c in ax.collections if type(c).__name__ == "LineCollection"]
+    assert len(rims) == 3 and min(c.get_zorder() for c in rims) > max(
+        c.get_zorder() for c in images)  # no state hides another
+    assert len([c for c in ax.collections if type(c).__name__ == "PolyCollection"]) == 1
     assert len(history.plot(times=0.1, undeformed=False).collections) == 2
-    assert len(history.plot().collections[-1].get_paths()) == 8
+    assert len(history.plot().collections) == 1 + 2 * 8
+    states = [history.state(k) for k in (0, 5, 10)]
+    together = plot_state(states, "eps_xx", thickness=1, subdivide=(4, 2)).collections
+    assert [c.get_alpha() for c in together] == [None] * 3
     with pytest.raises(InputError, match="no state to draw"):
         plot_state([])
     for wrong in (["x"], [], 0.3, [-1e-3, 0.1]):
         with pytest.raises(InputError, match="times"):
             history.plot(times=wrong)
+
+
+def test_the_default_field_is_the_stress_along_the_beam_or_the_displacement(state):
+    assert state.plot().get_title(loc="left") == FIELDS["S_xx"].title
+    rest = Scene(line()).state()
+    assert rest.plot().get_title(loc="left") == FIELDS["displacement"].title
+    bare = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5),
+                section=Section.numbers(EA=1e5, EI=10.0))
+    bent = Scene(bare).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    assert bent.plot().get_title(loc="left") == FIELDS["displacement"].title
+
+
+def test_beside_obstacles_sections_are_to_scale_and_all_of_them_is_seen():
+    thin = Beam(MeshBeam.init_line(np.linspace(0, 2, 9), 0.01), ElementBeamCable(5), STEEL, 0.1)
+    ax = Scene(thin).clamp("left").gravity((0, -1e-3)).obstacle(Circle((1.0, -0.3), 0.25)).plot()
+    assert not ax.texts or all("thick" not in text.get_text() for text in ax.texts)
+    state = Scene(thin).clamp("left").obstacle(Circle((1.0, -0.3), 0.25)).state()
+    low, high = state.plot().get_ylim()
+    assert low < -0.55 and high > 0.0
+    assert any("thick" in text.get_text() for text in Scene(thin).state().plot().texts)
+
+
+def test_axes_and_loads_have_units():
+    scene = Scene(line()).units("N", "mm").clamp("left").point_force((0, -25e3), at=(2, 0))
+    ax = scene.moment("right", 7.0).pressure("top", 3.0).plot()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "y (mm)")
+    found = {text.get_text() for text in ax.texts}
+    assert {"25 kN", "7 N mm", "p = 3"} <= found
+    assert scene.state().plot().get_xlabel() == "x (mm)"
 
 
 # symbols, and displacements that are magnified

@@ -336,13 +336,13 @@ class History(MaterialPoints, SpringForces):
         """
         return Series(self, fields, subdivide, lagrange, undeformed, recover)
 
-    def plot(self, field: Any = "eps_yy", times: ArrayLike | None = None, ax: Any = None, *,
+    def plot(self, field: Any = None, times: ArrayLike | None = None, ax: Any = None, *,
              thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
              cmap: Any = None, limits: tuple[float, float] | None = None, title: str | None = None,
              unit: str | None = None, subdivide: tuple[int, int] = (16, 8),
              filename: StrPath | None = None, dpi: float = 200, recover: bool = True,
              scale: float | str = 1.0, loads: bool = False, supports: bool = False) -> Any:
-        """Draw the body at several times in one plot.
+        """Draw the body at several times in one plot, the earlier ones paler.
 
         Parameters
         ----------
@@ -384,7 +384,7 @@ class History(MaterialPoints, SpringForces):
         return plot_state(list(self.states(instants)), field, ax, thickness=thickness,
                           undeformed=undeformed, colorbar=colorbar, cmap=cmap, limits=limits,
                           title=title, unit=unit, subdivide=subdivide, filename=filename, dpi=dpi,
-                          recover=recover, scale=scale, loads=loads, supports=supports)
+                          recover=recover, scale=scale, loads=loads, supports=supports, fade=True)
 
     def plot_curve(self, x: Any, y: Any, ax: Any = None, *, xlabel: str | None = None,
                    ylabel: str | None = None, title: str | None = None,

@@ -17,9 +17,10 @@ from ..core.archive import output_file
 from ..core.errors import AncfError, require_path, require_text
 from ..core.types import Array, StrPath
 from ..recovery.fields import PRESSURES, units_of
-from ..visuals.diagrams import ROOM, lines_of, rounded, unit_of_resultant
+from ..visuals.diagrams import ROOM, lines_of
 from ..visuals.html import history_picture, picture
 from ..visuals.matplotlib import figure_class, plot_scene
+from ..visuals.scenery import rounded, unit_of_resultant
 from ..visuals.symbols import symbols_of
 
 #: Fields whose largest values are listed, with their units.

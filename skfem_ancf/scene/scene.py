@@ -389,7 +389,7 @@ class Scene(Model):
 
     def explore(self, load: PointForce | Callable[[float], Item | Scene],
                 interval: ArrayLike = (0.0, 1.0), value: float | None = None, *, title: str = "",
-                field: Any = "eps_yy", limits: ArrayLike | None = None,
+                field: Any = None, limits: ArrayLike | None = None,
                 thickness: float | str = "auto", off_screen: bool | None = None,
                 window_size: tuple[int, int] = (1000, 700)) -> Explorer:
         """A pyvista view in which the equilibrium follows a slider, or a force that is dragged.

@@ -12,7 +12,7 @@ from ..core.archive import output_file
 from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
                            require_like, require_path, require_positive, require_text, shown)
 from ..core.types import StrPath
-from .matplotlib import colormap, colour_bar, figure_class, paint, plain
+from .matplotlib import FLAT, colormap, colour_bar, figure_class, paint, plain
 from .scenery import INK, MUTED, Scenery
 
 SUFFIXES = (".gif", ".mp4")
@@ -24,11 +24,12 @@ FPS, PIXELS = (0.01, 1000), (100, 10000)
 FRAMES, DPI = 100, 100
 
 
-def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
+def animate(history: Any, filename: StrPath, field: Any = None, *,
             frames: int | None = None, fps: float | None = None,
             thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,
             limits: Any = None, unit: str | None = None, subdivide: tuple[int, int] = (8, 4),
-            recover: bool = True, size: tuple[int, int] = (800, 600)) -> Path:
+            recover: bool = True, size: tuple[int, int] | None = None,
+            scale: float | str = 1.0) -> Path:
     """Write a film of a motion, coloured by a field; returns its file.
 
     All frames have the same range of colours and the same thickness factor.
@@ -47,16 +48,19 @@ def animate(history: Any, filename: StrPath, field: Any = "eps_yy", *,
     field, thickness, undeformed, cmap, limits, unit, subdivide, recover
         As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     size
-        Width and height of the film in pixels, shape (2,).
+        Width and height of the film in pixels, shape (2,); by default 800 wide, and as high as what
+        moves needs.
+    scale
+        Magnification of displacements, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
     """
     require_like("history", history, "History", "states", "t")
     path, undeformed = _file(filename), require_flag("undeformed", undeformed)
     chosen = _chosen(history, frames)
     figure_class()
     cmap, unit = colormap(cmap), require_text("unit", unit)
-    fps, size = _fps(history, chosen, fps), pixels("size", size)
+    fps, size = _fps(history, chosen, fps), size if size is None else pixels("size", size)
     scenery = Scenery(list(history.states(chosen)), field, thickness, undeformed, limits,
-                      subdivide, recover)
+                      subdivide, recover, scale)
     images = _frames(scenery, history.t[chosen], size, cmap, unit)
     with output_file(path) as temporary:
         if path.suffix.lower() == ".gif":
@@ -113,15 +117,19 @@ def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) ->
     """Pictures, shape (height, width, 3), one at a time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+    (x0, y0, _), (x1, y1, _) = scenery.every.min(axis=0), scenery.every.max(axis=0)
+    if size is None:  # no white bands; a flat picture has its colours below
+        aspect = (y1 - y0 + 0.08 * (x1 - x0)) / max(x1 - x0, 1e-300)
+        wide = 680 if aspect < FLAT else 620
+        size = 800, int(np.clip(wide * aspect + (190 if aspect < FLAT else 90), 240, 900)) // 2 * 2
     figure = figure_class()(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, layout="constrained")
     canvas, ax, field = FigureCanvasAgg(figure), figure.add_subplot(), scenery.field
-    (x0, y0, _), (x1, y1, _) = scenery.every.min(axis=0), scenery.every.max(axis=0)
     margin = 0.04 * max(x1 - x0, y1 - y0)
     ax.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), aspect="equal")
     plain(ax)
     image, artists = paint(ax, scenery, [0], cmap)
     if image is not None:
-        colour_bar(ax, image, "neither", scenery.label(field.title or field.name, unit))
+        colour_bar(ax, image, "neither", scenery.label(field.symbol, unit))
     ax.set_title(scenery.note, loc="left", fontsize=8, color=MUTED)
     clock = ax.set_title(" ", loc="right", fontsize=8, color=INK)
     canvas.draw()

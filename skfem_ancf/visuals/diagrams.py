@@ -11,7 +11,7 @@ from ..core.errors import InputError, require_flag, require_like, require_option
 from ..core.types import Array, StrPath
 from ..recovery.fields import units_of
 from .matplotlib import dress, figure_class, page, plain, save
-from .scenery import INK, MUTED
+from .scenery import INK, MUTED, rounded, unit_of_resultant
 from .symbols import Sketch, symbols_of
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
@@ -136,19 +136,6 @@ def _clear_of_noise(ax):
     others = [max(map(abs, other.get_ylim())) for other in ax.figure.axes if other is not ax]
     if size < 1e-9 * max(others, default=0.0):
         ax.set_ylim(-1.0, 1.0)
-
-
-def unit_of_resultant(name: str, units: tuple[str, str] | None) -> str:
-    """The unit of N, Q or M; "" if the scene has no units."""
-    return "" if units is None else units[0] if name in "NQ" else f"{units[0]} {units[1]}"
-
-
-def rounded(value: float, unit: str) -> str:
-    """A number with four digits and its unit, of newtons in N, kN or MN."""
-    if unit.split(" ")[0] == "N" and abs(value) >= 1e4:
-        power = 2 if abs(value) >= 1e7 else 1
-        value, unit = value / 1000.0**power, "kM"[power - 1] + unit
-    return f"{float(f'{value:.4g}'):.9g} {unit}".strip()
 
 
 def lines_of(state: Any, beams: Any, recover: bool = True) -> list[Any]:

@@ -51,7 +51,7 @@ class Explorer:
         The slider or the handle of the arrow, a VTK widget.
     """
 
-    def __init__(self, solve: Callable[[Any, Any], Any], values: Any, *, field: Any = "eps_yy",
+    def __init__(self, solve: Callable[[Any, Any], Any], values: Any, *, field: Any = None,
                  limits: Any = None, thickness: Any = "auto", off_screen: bool | None = None,
                  window_size: tuple[int, int] = (1000, 700)) -> None:
         states: list[Any] = []

@@ -31,9 +31,8 @@ def _words(text):
 
 
 def state_html(state: Any) -> str:
-    """The text of a State, and its strain across the section."""
-    field = "eps_yy" if any(np.any(state.u_of(b)) for b in state.beams) else "displacement"
-    return _words(str(state)) + picture(lambda: state.plot(field))
+    """The text of a State, and its picture."""
+    return _words(str(state)) + picture(state.plot)
 
 
 def scene_html(scene: Any) -> str:

@@ -14,23 +14,28 @@ from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text)
 from ..core.types import StrPath
+from ..recovery.fields import units_of
 from .scenery import BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, layers_of
 from .symbols import Sketch, symbols_of
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400
+#: Opacity of the first of several states.
+FADED = 0.2
+#: Height over width below which the colour bar is below a picture.
+FLAT = 0.35
 
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
            (True, True): "both"}
 
 
-def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
+def plot_state(state: Any, field: Any = None, ax: Any = None, *,
                thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
                cmap: Any = None, limits: tuple[float, float] | None = None,
                title: str | None = None, unit: str | None = None,
                subdivide: tuple[int, int] = (16, 8), filename: StrPath | None = None,
                dpi: float = 200, recover: bool = True, scale: float | str = 1.0,
-               loads: bool = False, supports: bool = False) -> Any:
+               loads: bool = False, supports: bool = False, fade: bool = False) -> Any:
     """Draw the deformed body of a state, coloured by a field; returns the Axes.
 
     Parameters
@@ -39,14 +44,16 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         A :class:`~skfem_ancf.results.State`, or an object with ``beams`` and ``u_of``; or a list of
         them, drawn over each other with one range of colours.
     field
-        The name of a scalar field in :data:`skfem_ancf.recovery.fields.FIELDS`, as "S_xx",
+        By default the stress "S_xx" along the beams, or "displacement" where there is none; the
+        name of a scalar field in :data:`skfem_ancf.recovery.fields.FIELDS`, as "eps_yy",
         "von_mises" or "eps_1"; "displacement" for its magnitude; or a function or Field, see
         :mod:`skfem_ancf.recovery.fields`.
     ax
         matplotlib Axes to draw in; a new figure by default, which needs no display.
     thickness
         Magnification of the section, for slender beams, noted in the picture. "auto": the integer
-        that makes the section about 1/25 of the picture, less where bends would fold, at least 1.
+        that makes the section about 1/25 of the picture, less where bends would fold, at least 1;
+        1 in scenes with obstacles or members that touch each other.
     undeformed
         Draw the reference configuration of the first state in grey behind.
     colorbar
@@ -74,6 +81,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     loads, supports
         Draw the symbols of :func:`plot_scene`, for several states those of the last, with loads at
         its load factor or time.
+    fade
+        Of several states draw the earlier ones paler, with the outlines of all on top.
 
     Examples
     --------
@@ -89,6 +98,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     colorbar, unit = require_flag("colorbar", colorbar), require_text("unit", unit)
     filename, dpi = page(ax, title, filename, dpi)
     loads, supports = require_flag("loads", loads), require_flag("supports", supports)
+    fade = require_flag("fade", fade)
     symbols = symbols_of(states[-1], loads, supports)
     scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover, scale)
     drawn, values = scenery.field, scenery.found
@@ -97,11 +107,17 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     if ax is None:
         ax = Figure(figsize=_figsize(scenery.every[:, :2], colorbar),
                     layout="constrained").add_subplot()
-    image, _ = paint(ax, scenery, range(len(states)), cmap)
+    _ = scenery.every  # with the reference configuration, which is drawn once
+    parts = [[k] for k in range(len(states))] if fade else [range(len(states))]
+    for k, part in enumerate(parts, 1):
+        image, artists = paint(ax, scenery, part, cmap)
+        for artist in artists:
+            artist.set_alpha(None if k == len(parts) else FADED + (1.0 - FADED) * k / len(parts))
+        scenery.undeformed = False
     if symbols:
         sketch(ax, scenery, states[-1]).draw(symbols)
     frame(ax, scenery, bool(symbols))
-    dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note)
+    dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note, scenery.length)
     if colorbar and image is not None:
         ends = bool(np.any(values < scenery.low)), bool(np.any(values > scenery.high))
         colour_bar(ax, image, _EXTEND[ends], scenery.label(drawn.symbol, unit))
@@ -153,7 +169,7 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
     if names:
         drawn.names(scenery.names)
     frame(ax, scenery, True)
-    dress(ax, title, scenery.note)
+    dress(ax, title, scenery.note, scenery.length)
     save(ax, filename, dpi=dpi, bbox_inches="tight")
     return ax
 
@@ -193,15 +209,16 @@ def _materials(ax, scenery, beams, subdivide, inside):
 
 def sketch(ax: Any, scenery: Scenery, state: Any) -> Sketch:
     """A Sketch of symbols at the drawn state, the last of a scenery."""
-    return Sketch(ax, scenery.scale * state.u, scenery.points(-1)[:, :2])
+    return Sketch(ax, scenery.scale * state.u, scenery.points(-1)[:, :2], units_of(state))
 
 
 def frame(ax: Any, scenery: Scenery, wide: bool) -> None:
-    """Set the limits; wide ones have room for symbols, and show obstacles near the body."""
+    """Set the limits, with obstacles near the body; wide ones have room for symbols."""
     if wide:
         box = around(scenery.every[:, :2].T)
         room = 0.1 * np.max(np.ptp(box, axis=1)) * np.array([[-1.0], [1.0]])
-        ax.update_datalim(np.vstack([box.mean(axis=1) + room, scenery.near_walls]))
+        ax.update_datalim(box.mean(axis=1) + room)
+    ax.update_datalim(scenery.near_walls)
     ax.set_aspect("equal")
     ax.margins(AROUND if len(scenery.walls[0]) and not wide else 0.04)
     ax.autoscale_view()
@@ -256,7 +273,7 @@ def _states(state):
 def colour_bar(ax: Any, image: Any, extend: str, label: str) -> None:
     """A colour bar as high as the picture, or below a flat one."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
-    flat = (y1 - y0) < 0.35 * (x1 - x0)
+    flat = (y1 - y0) < FLAT * (x1 - x0)
     place: dict[str, Any] = (dict(ax=ax, location="bottom", shrink=0.6, aspect=45, pad=0.06)
                              if flat else dict(cax=ax.inset_axes([1.03, 0.0, 0.03, 1.0])))
     bar = ax.figure.colorbar(image, extend=extend, **place)
@@ -397,13 +414,13 @@ def plain(ax: Any) -> None:
     ax.tick_params(color=MUTED, labelcolor=INK, labelsize=8)
 
 
-def dress(ax: Any, title: str | None, note: str = "") -> None:
+def dress(ax: Any, title: str | None, note: str = "", unit: str = "") -> None:
     """Title, or None, labels of the axes, and a small note above the picture."""
     if title:
         ax.set_title(title, loc="left", fontsize=10, color=INK, pad=18 if note else 6)
     plain(ax)
-    ax.set_xlabel("x", fontsize=9, color=INK)
-    ax.set_ylabel("y", fontsize=9, color=INK)
+    ax.set_xlabel(f"x ({unit})" if unit else "x", fontsize=9, color=INK)
+    ax.set_ylabel(f"y ({unit})" if unit else "y", fontsize=9, color=INK)
     if note:
         ax.annotate(note, (0, 1), (0, 5), va="bottom",
                     xycoords="axes fraction", textcoords="offset points", fontsize=8, color=MUTED)

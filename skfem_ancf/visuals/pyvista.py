@@ -165,7 +165,7 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def view(state: Any, field: Any = "eps_yy", plotter: Any = None, *,
+def view(state: Any, field: Any = None, plotter: Any = None, *,
          thickness: Any = "auto", undeformed: bool = True, cmap: Any = None, limits: Any = None,
          unit: str | None = None,
          subdivide: tuple[int, int] = (16, 8), recover: bool = True,

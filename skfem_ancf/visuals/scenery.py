@@ -163,6 +163,20 @@ def _limits(limits, values, field):
     return (start - size if field.signed else start), start + size
 
 
+def _default(states):
+    """The stress along the beams; the displacement where there is no stress."""
+    stressed = any(beam.section.has_fields and np.any(state.u_of(beam))
+                   for state in states for beam in state.beams)
+    return "S_xx" if stressed else "displacement"
+
+
+def _touches(state):
+    """True with obstacles or contact of members: thicker sections would enter each other."""
+    forces = getattr(getattr(state, "system", None), "forces", None)
+    return forces is not None and bool(forces.contacts.obstacles or any(
+        hasattr(element, "look") for element, _ in forces.changing))
+
+
 class Scenery:
     """States of the same beams with one thickness factor and one range of colours.
 
@@ -177,7 +191,7 @@ class Scenery:
     def __init__(self, states: list[Any], field: Any, thickness: Any, undeformed: bool,
                  limits: Any, subdivide: tuple[int, int], recover: bool,
                  scale: Any = 1.0) -> None:
-        self.field: Field = find_field(field, DRAWN)
+        self.field: Field = find_field(_default(states) if field is None else field, DRAWN)
         self.undeformed = require_flag("undeformed", undeformed)
         self.frames: list[list[Any]] = []
         self.rigid: list[list[Grid]] = []
@@ -191,6 +205,8 @@ class Scenery:
             self.frames[-1] += [solid for _, solid in others if solid is not None]
             self.rigid.append([grid for grid, solid in others if solid is None])
         self.beams = [body for frame in self.frames for body in frame]
+        if isinstance(thickness, str) and thickness == "auto" and any(map(_touches, states)):
+            thickness = 1.0
         self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
         self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
         if self.found.size and not np.any(np.isfinite(self.found)):
@@ -284,6 +300,11 @@ class Scenery:
         return ", ".join(said + [f"displacements {self.scale:g} times as large"] * (
             self.scale != 1.0))
 
+    @property
+    def length(self) -> str:
+        """Unit of length of the scene, or ""."""
+        return (units_of(self._states[0]) or ("", ""))[1]
+
     def label(self, text: str, unit: str | None) -> str:
         """A text with the unit; by default that of the field in the scene; "" for none."""
         unit = unit_of(self.field, units_of(self._states[0])) if unit is None else unit
@@ -296,3 +317,15 @@ class Scenery:
         return cmap or (LinearSegmentedColormap.from_list("signed", SIGNED)
                         if self.field.signed else "viridis")
 
+
+def unit_of_resultant(name: str, units: tuple[str, str] | None) -> str:
+    """The unit of N, Q or M; "" if the scene has no units."""
+    return "" if units is None else units[0] if name in "NQ" else f"{units[0]} {units[1]}"
+
+
+def rounded(value: float, unit: str) -> str:
+    """A number with four digits and its unit, of newtons in N, kN or MN."""
+    if unit.split(" ")[0] == "N" and abs(value) >= 1e4:
+        power = 2 if abs(value) >= 1e7 else 1
+        value, unit = value / 1000.0**power, "kM"[power - 1] + unit
+    return f"{float(f'{value:.4g}'):.9g} {unit}".strip()

@@ -14,7 +14,7 @@ from ..actions.symbols import LOADS, Symbol
 from ..beam.layout import Layout
 from ..core.errors import InputError
 from ..core.types import Array
-from .scenery import INK, MUTED
+from .scenery import INK, MUTED, rounded, unit_of_resultant
 
 #: Colours of loads and of supports.
 LOAD, HOLD = "#b3261e", "#1f5f8b"
@@ -54,8 +54,9 @@ class Sketch:
     ``u`` (N,) is the drawn displacement, ``points`` (n, 2) are drawn points of the bodies.
     """
 
-    def __init__(self, ax: Any, u: Array, points: Array) -> None:
-        self.ax, self.u, self.points = ax, u, points
+    def __init__(self, ax: Any, u: Array, points: Array,
+                 units: tuple[str, str] | None = None) -> None:
+        self.ax, self.u, self.points, self.units = ax, u, points, units
         self.size = float(np.max(np.ptp(points, axis=0)))
         #: Where arrows and texts are.
         self.taken = np.full((1, 2), np.inf)
@@ -115,7 +116,13 @@ class Sketch:
             self.taken = np.vstack([self.taken, 0.5 * (tails[1:] + tails[:-1])])
         if s.show:
             free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
-            self._text(f"{s.text}{abs(s.value):.6g}", free, free - other, LOAD, s.kind)
+            self._text(self._value(s, "N" if len(at) == 1 and not s.text else ""), free,
+                       free - other, LOAD, s.kind)
+
+    def _value(self, s, what):
+        """Text and value, with the unit of a force or moment of one point."""
+        unit = unit_of_resultant(what, self.units) if what else ""
+        return s.text + (rounded(abs(s.value), unit) if unit else f"{abs(s.value):.6g}")
 
     def _weight(self, s, at, largest):
         """One arrow to the right of the picture for all members of one gravity."""
@@ -128,7 +135,7 @@ class Sketch:
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
         arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
         self._arrow(*arc, kind=s.kind, color=color)
-        self._beside(s.text or f"{abs(s.value):.6g}", at[0], color, s.kind)
+        self._beside(s.text or self._value(s, "M"), at[0], color, s.kind)
 
     def _eigenstrain(self, s, at, largest):
         self._beside(s.text, at[0], LOAD, s.kind)
