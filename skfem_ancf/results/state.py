@@ -473,7 +473,14 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         InputError
             If several lines or beams are equally near to a point, as at a node.
         """
-        values = self._at_points(lambda v: v.strain, point, beam, recover, line)
+        require_flag("recover", recover)
+        at = self.system.points.find(point, beam, line, ask=True)
+        values = at.gather([
+            self._values(part, recover).strain if isinstance(part, DomainPoints) else
+            part.strain(self._places, self._recovery_of(part.number) if recover else None)
+            for part in at.parts])
+        if np.iscomplexobj(values):
+            values = first_order(values)
         return (values.T * [1.0, 1.0, 0.5]).T
 
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
