@@ -572,6 +572,12 @@ def test_domains_whose_stress_is_not_known():
         solid_of(strip(0, 1, 2), StVenantKirchhoff(lambda x, y: x - 0.5, 0.3))
     with pytest.raises(InputError, match="material"):
         solid_of(strip(0, 1, 2), 2e11)
+    light = solid_of(strip(0, 1, 2), StVenantKirchhoff(E, 0.3))
+    with pytest.raises(InputError, match="density"):
+        Scene(light).clamp("left").gravity((0, -9.81))
+    stiff = BilinearForm(lambda u, v, w: ddot(grad(u), grad(v)))
+    with pytest.raises(InputError, match=r"a\(w\['u'\], v, w\)"):
+        Domain(light.basis, stiff, stiff)
     state = Scene(domain_of(strip(0, 1, 2))).clamp("left").state()
     assert_allclose(state.strain((0.5, 0.0), 0), np.zeros(3))
     with pytest.raises(InputError, match="Domain.solid"):

@@ -104,8 +104,10 @@ class Domain(Immutable):
         for what, form, kind in (("residual", residual, LinearForm),
                                  ("tangent", tangent, BilinearForm), ("mass", mass, BilinearForm)):
             if not (isinstance(form, kind) or (form is None and what == "mass")):
+                hint = ("; of a linear problem with the form a(u, v) it is LinearForm(lambda v, w: "
+                        "a(w['u'], v, w))" if isinstance(form, BilinearForm) else "")
                 raise InputError(f"{what} of a Domain is a {kind.__name__} of scikit-fem, got "
-                                 f"{shown(form)}")
+                                 f"{shown(form)}{hint}")
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass
         self.name = require_label("name", name)
         self.N: int = basis.N
@@ -326,8 +328,9 @@ class Domain(Immutable):
     @cached_property
     def _mass(self):
         if self.mass is None:
-            raise InputError(f"{self!r} has no mass: give its form, Domain(..., mass=BilinearForm("
-                             "lambda u, v, w: rho * width * dot(u, v)))")
+            how = ("give its form, Domain(..., mass=BilinearForm(lambda u, v, w: rho * width * "
+                   "dot(u, v)))" if self._solid is None else "give its material a density")
+            raise InputError(f"{self!r} has no mass: {how}")
         M = sparse.csr_array(self._ask("mass", self.mass.assemble, self.basis))
         require_finite(f"the mass of {self!r}", M.data)
         low, size = M.diagonal().min(), abs(M).max()
