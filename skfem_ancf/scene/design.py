@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -405,9 +404,6 @@ class Gradient(Design):
         if state.t is not None or state.base is not None:
             raise InputError("derivatives are of static solutions, and this state is "
                              + ("linear" if state.t is None else "an instant of a motion"))
-        if not all(a is b for a, b in zip_longest(scene.items, state.system.items or ())):
-            raise InputError("items were added to the scene since this state was found: solve it "
-                             "again")
         self.build: Parameters = Parameters(scene, wrt)
         super().__init__(self.build, readings)
         self._begin(self.build.start, scene, state)

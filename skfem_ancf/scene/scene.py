@@ -126,9 +126,14 @@ class Scene(Model):
             if self._system is None:
                 self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
                 self._system.items = self.items
-                self._system.derivatives = partial(Gradient, self)
+                self._system.derivatives = self._gradient()
             self._system.units = self._units
             return self._system
+
+    def _gradient(self):
+        scene = copy(self)
+        scene._system = None  # memory would wait for the garbage collection of a circle
+        return partial(Gradient, scene)
 
     @property
     def free(self) -> Array:
@@ -792,6 +797,8 @@ class Scene(Model):
         with self._lock:
             locate(sensor, self.system)
             self._sensors = {**self._sensors, name: sensor}
+            if self._system is not None:
+                self._system.derivatives = self._gradient()
         return self
 
     def _located(self, names=None):
