@@ -5,7 +5,7 @@ from pathlib import Path
 ORDER = [
     "first_beam", "rollup", "plain_scikit_fem", "cantilever", "choose_element",
     "poisson_locking", "thick_beam",
-    "tapered_blade", "catenary", "spring", "leaf_spring", "leaves_with_friction",
+    "tapered_blade", "catenary", "spring", "leaf_spring", "leaves_with_friction", "soft_gripper",
     "measured_clip", "rubber_block",
     "bimetal", "springback", "wire_forming", "polymer_clip", "thermostat", "snap_fit",
     "clip_strength", "bow", "soft_finger", "compliant_gripper", "live_view",

@@ -12,6 +12,7 @@ from skfem.helpers import ddot, sym_grad
 
 from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf.actions.obstacles import Line
 from skfem_ancf.actions.forces.base import bind_force, recalled
 from skfem_ancf.beam.layout import Layout
 
@@ -215,6 +216,83 @@ def test_a_ring_is_pressed_flat_until_it_touches_itself():
     state = scene.run(1.0, increments=1).state(1)
     assert state.displacement("right", 0)[1] == pytest.approx(h - 2 * R, abs=0.02 * h)
     assert len(state.contact()) and state.contact().penetration < 0.01 * h
+
+
+def test_wires_that_nothing_holds_are_squeezed_in_a_box():
+    h, n, rng = 0.02, 3, np.random.default_rng(3)
+    wires = [Beam(MeshBeam.init_curve(
+        lambda s, c=c, k=k: np.array([s, (3.6 * k + 1.2 * np.sin(2 * np.pi * s + c)) * h]),
+        np.linspace(0, 1, 5), height=h), ElementBeamCable(3), StVenantKirchhoff(1e6, 0.0, 1.0),
+        width=1.0) for k, c in enumerate(rng.uniform(0, 2 * np.pi, n))]
+    scene, low, top = Scene(*wires).contact("all"), -1.8 * h, (3.6 * n - 1.8) * h
+    for point, normal in (((-0.02, 0), (1, 0)), ((1.02, 0), (-1, 0)), ((0, low), (0, 1))):
+        scene.obstacle(Line(point, normal))
+    scene.obstacle(Line((0, top), (0, -1)), position=lambda t: (0.0, -0.5 * t * (top - low)))
+    state = scene.run(1.0, increments=20).state(-1)
+    assert state.contact().penetration < 0.01 * h
+    floor, lid = (state.contact(k).total[1] for k in (2, 3))
+    assert lid < -1.0 and abs(floor + lid) < -0.06 * lid  # the rest is drag
+    y = np.array([state.u[s][1::4] + b.mesh.p[1] for s, b in zip(scene.system.slices, wires)])
+    assert np.all(np.diff(y, axis=0) > 0.5 * h)  # no wire has passed through another one
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_clip_of_two_flexible_parts(friction):
+    """A finger is moved over an arch and back: force against travel, and balance of work."""
+    R, h = 0.1, 0.004
+    arch = Beam(MeshBeam.init_curve(lambda s: R * np.array([np.sin(s), np.cos(s)]),
+                                    np.linspace(-0.5, 0.5, 9), height=h), ElementBeamCable(3),
+                RUBBER, width=0.02)
+    finger = line(0.03, 3, 0.006, (-0.02, R + 0.5 * h - 6e-4 + 0.03), ElementBeamCable(3), RUBBER,
+                  -np.pi / 2)
+    scene = Scene(arch, finger).contact(0, 1, friction=friction).clamp("left", 0).clamp("right", 0)
+    scene.fix("left", "r^1", lambda t: 0.04 * min(t, 2 - t), 1)
+    scene.fix("left", "r^2", 0.0, 1).fix("left", "r_X", 0.0, 1)
+    run = scene.run([1.0, 2.0], increments=32)
+    x, states = 0.04 * np.minimum(run.t, 2 - run.t), [run.state(k) for k in range(len(run.t))]
+    force = np.array([state.reactions("left", 1).force[0] for state in states])
+    energy = np.array([state.strain_energy for state in states])
+    work = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
+    assert max(state.contact().penetration for state in states) < 0.01 * h
+    assert force.max() > 0.01 and energy[-1] < 1e-9 * energy.max()
+    assert_allclose(work - energy, run.dissipated, rtol=0.2, atol=0.1 * energy.max())
+    if friction:
+        assert work[-1] > energy.max() and force.max() > -1.2 * force[:33].min()
+    else:  # up the arch as down, there as back
+        half = np.interp([0.013, 0.016], x[:33], force[:33])
+        assert_allclose(np.interp([0.027, 0.024], x[:33], force[:33]), -half, rtol=1e-2)
+        assert abs(work[-1]) < 1e-6 * energy.max() and run.dissipated[-1] < 1e-6 * energy.max()
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.05])
+def test_what_passes_a_body_in_a_step_is_seen(dt):
+    """A rod 0.02 high meets a plate 0.02 thick, and would be beyond it at the end of the step."""
+    plate = RigidBody(1.0, 1.0, (0.5, 0.0), outline=[[-0.3, 0.3, 0.3, -0.3],
+                                                     [-0.01, -0.01, 0.01, 0.01]])
+    rod = line(1.0, 4, 0.02, (0.0, 0.1), element=ElementBeamCable(3))
+    scene = Scene(rod, plate).contact(rod, plate).initial_velocity((0.0, -6.0), rod)
+    for name in ("r", "d"):
+        scene.fix(None, name, 0.0, plate)
+    history = scene.integrate(0.1, dt)
+    assert history.u[:, 1].min() > -0.1 and np.ptp(history.total_energy) < 1e-9 * (
+        history.total_energy[0])
+    x = np.zeros((2, rod.N // 2 + 2, 2))
+    x[1, :rod.N // 2:rod.nd // 2] = 0.0, -0.2
+    contact = recalled(bind_force(BodyContact(), Layout(rod, plate)))
+    with_bodies = np.flatnonzero(np.isin(np.arange(rod.N + 4) // 2, [
+        link.dofs[0, 0] // 2 for link in contact.links]))
+    assert "into a body" in contact.passed(*(y.ravel()[with_bodies].reshape(-1, 2) for y in x), 0.0)
+
+
+def test_pressure_begins_at_the_face():
+    """A gap that a cantilever has to close is not smaller for the pressure: closed form."""
+    E, b, h, L, gap = 2e11, 0.02, 0.01, 0.5, 2e-5
+    scene = Scene(line(L, 8, h), line(L, 8, h, (0.0, -h - gap))).clamp("left", 0).clamp("left", 1)
+    k = 3 * E * b * h**3 / 12 / L**3
+    scene.contact(0, 1).point_force((0.0, -1.2 * k * gap), at=(L, 0.0), beam=0)
+    state = scene.solve_static()
+    below = -state.displacement("right", 1)[1]
+    assert below == pytest.approx(0.1 * gap, rel=0.02)  # half of the rest of the force
 
 
 def test_a_motion_with_contact_goes_on_from_a_checkpoint(tmp_path):

@@ -385,6 +385,14 @@ def diagonal(A, d):
         d[j] = rows[j, A.top]
 
 
+@source
+def add_to_diagonal(A, d):
+    """Add d to the diagonal."""
+    rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
+    for j in indices(d.size):
+        rows[j, A.top] += d[j]
+
+
 @primitive("skfem_ancf.core.loops")
 def dot(a, b):
     """Scalar product."""

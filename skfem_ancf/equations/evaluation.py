@@ -10,7 +10,7 @@ from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, ca
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
                                   body_tangent)
-from ..core.band import diagonal, dot, largest, weighted_square
+from ..core.band import add_to_diagonal, diagonal, dot, largest, weighted_square
 from ..core.source import F1, F2, MADE, apart, indices, source
 from .tables import Equations
 
@@ -66,9 +66,9 @@ class Target(NamedTuple):
 
 
 #: Rows of the vectors of a static iteration: displacement and its last correction, internal and
-#: external force, residual, inverse diagonal of the tangent; residual that may remain, and
-#: prescribed changes of the fixed DOFs.
-U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, MOVED, ROWS = range(9)
+#: external force, residual, inverse diagonal of the tangent; residual that may remain, prescribed
+#: changes of the fixed DOFs, and drag: a force on each DOF per displacement.
+U, DU, FORCE, LOAD, RESIDUAL, WEIGHTS, GAP, MOVED, DRAG, ROWS = range(10)
 #: Which residual of an iteration is evaluated.
 BETWEEN, AT_START, AT_END = range(3)
 #: Smallest stiffness of a DOF in norms, relative to the mean; DOFs of a rigid body have none.
@@ -87,7 +87,7 @@ def balance(e, target, factors, which, mixed, g, x, m, stresses, norms):
     ``norms`` gets those of residual and larger force, and the largest relative residual of joints.
     """
     u, f, load, R, weights, phi = x[U], x[FORCE], x[LOAD], x[RESIDUAL], x[WEIGHTS], m[1]
-    gap, opened = x[GAP], 0.0
+    gap, drag, opened = x[GAP], x[DRAG], 0.0
     if e.lasting >= MATERIALS:
         carry_eigenstrains(e.loads, factors[0])
     if which == AT_END:
@@ -101,11 +101,12 @@ def balance(e, target, factors, which, mixed, g, x, m, stresses, norms):
         t = np.inf if which == AT_START and np.isnan(target.when) else target.when
         tangent(e, u, factors[1 if which == AT_START else 0], t, target.scale, target.at, mixed,
                 stresses[0], stresses[1], f)
+        add_to_diagonal(e.K, drag)
         diagonal(e.K, weights)
         invert(weights, e.sizes)
     external_force(e.loads, factors[0], target.when, target.scale, u, load)
     for i in indices(u.size):
-        R[i] = load[i] - f[i] - gap[i]
+        R[i] = load[i] - f[i] - gap[i] - drag[i] * u[i]
     if phi.size > 0:
         constraint(e.joints, m[3], g, target.at, u, phi)
         opening, pull = np.empty(phi.size), np.zeros(u.size)
@@ -143,9 +144,11 @@ def mean_stiffness(diagonal, sizes):
 LEFT, TRIES, PARTS = 0.5, 12, 16
 
 
-@apart("contacts", Equations, float, F1, F1, F1, F1)
-def hold_back(e, t, u, R, du, dm):
+@apart("contacts", Equations, float, float, F1, F1, F1, F1)
+def hold_back(e, t, loose, u, R, du, dm):
     """Line search for a correction that runs into obstacles; scales du and dm.
+
+    If ``loose`` is 1, bodies move by no more than an interval, as nothing but contact stops them.
 
     The residual along the correction, of the equations linearised without contact plus the actual
     contact forces, has to be small, see Crisfield (1991), 9.2. Otherwise contacts open and close in
@@ -155,19 +158,19 @@ def hold_back(e, t, u, R, du, dm):
     contact_along(e.forces, t, u, du, two)
     if not work > 0.0:
         return
-    parts = int(min(max(np.ceil(two[1]), 1.0), PARTS))
-    before, low, high = contact_work(e.forces, t, u, du, scratch), 0.0, 1.0
+    parts, most = int(min(max(np.ceil(two[1]), 1.0), PARTS)), 1.0
+    if loose > 0.0 and two[1] > 1.0:
+        parts, most = 1, 1.0 / two[1]
+    before, low, high, s = contact_work(e.forces, t, u, du, scratch), 0.0, most, most
     left, left_low = work, work
     for k in range(parts):
-        high = (k + 1.0) / parts
+        high = most * (k + 1.0) / parts
         left = _left(e, t, u, du, high, work, two[0], before, scratch)
         if left < -LEFT * work:
             break
         low, left_low = high, left
-    if left >= -LEFT * work:
-        return
-    s = high
-    for k in range(TRIES):
+    tries = 0 if left >= -LEFT * work else TRIES
+    for k in range(tries):
         s = 0.5 * (low + high) if left_low <= 0.0 or k > 2 else max(
             low + 0.1 * (high - low), low + (high - low) * left_low / (left_low - left))
         now = _left(e, t, u, du, s, work, two[0], before, scratch)

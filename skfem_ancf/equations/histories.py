@@ -128,6 +128,12 @@ class Histories:
                     lost += e.accept(u0[s], u[s])
         return self.get(), lost
 
+    def relaxed(self, u: Array) -> Array | None:
+        """The history with contact between members no stiffer than it needs to be at u."""
+        for item in self.forces.remembering:
+            item.relax(u)
+        return self.get()
+
     def of_state(self, state: Any) -> Array | None:
         """The history of a State, as far as obstacles and beams are those of its scene, or None."""
         if state is None or state.memory is None:

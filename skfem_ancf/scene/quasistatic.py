@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..actions.forces.springs import Turns
+from ..actions.obstacles.obstacle import stiffest
 from ..core.errors import (ConvergenceError, InputError, Interrupted, ModelWarning, NameUnknown,
                            require_finite, require_flag, require_increasing, require_integer,
                            require_positive, shown, warn)
@@ -19,7 +20,7 @@ from ..core.types import Array
 from ..dynamics.base import Motion, Scheme
 from ..dynamics.history import COLUMNS, History, state_of
 from ..dynamics.sensors import Recorder, Sensor
-from ..equations.stability import largest_displacement
+from ..equations.stability import largest_displacement, position_weights
 from ..equations.system import System
 from ..results.state import State
 from ..solvers.increment import Increment, Options, Route
@@ -47,6 +48,10 @@ SLOW, PATIENCE = 1e-2, 30
 #: Largest displacement of a node in an increment: in the first one relative to the scene's size,
 #: then relative to that at the last rate, or to the size.
 FAR, FASTER, NEAR = 0.05, 4.0, 1e-3
+#: Drag of loose beams relative to their softest bending, that of a free beam over E I / L^4; its
+#: least value per length and width, relative to E; factors for an increment that fails. Iterations
+#: from a guess.
+DRAG, FREE, LEAST_DRAG, MORE_DRAG, GUESSED = 0.02, 500.0, 1e-9, (10.0, 100.0, 1e3), 15
 
 
 # named steps of a quasi-static run
@@ -260,6 +265,7 @@ class Instant(NamedTuple):
     result: StaticResult
     way: str  # how it was found: the name of a strategy
     rate: float | None = None  # largest displacement of a node over the last increment of time
+    velocity: Array | None = None  # change of displacements over that time, of a loose bundle
 
 
 def _begin(system, t, start, u, rules, stable):
@@ -307,11 +313,11 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
     ConvergenceError.
     """
     yield begin
-    jumps = slow = 0
+    jumps, slow, drag = 0, 0, drag_of(system)
     for end in ends[ends > begin.t]:
         grid = np.linspace(begin.t, end, increments + 1)[1:]
         most = (end - begin.t) / increments
-        size, least = most, rules.min_step * most
+        size, least = most, (rules.min_step if drag is None else CUT**2) * most
         while begin.t < end:
             stalled = slow > PATIENCE
             if stalled:
@@ -326,7 +332,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
                 least = max(least, CUTS_AT_REST * most)
             smallest = stalled or size <= least
             try:
-                found = _next(system, begin, t, rules, stable, smallest)
+                found = _next(system, begin, t, rules, stable, smallest, drag)
             except (LoadStepFailed, ConvergenceError) as failure:
                 if smallest and (begin.way != AT_REST or size < 2.0 * LAST_AT_REST * most):
                     raise
@@ -345,7 +351,7 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
 
 
 def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
-          smallest: bool) -> Instant:
+          smallest: bool, drag: Array | None) -> Instant:
     """The equilibrium at t; by all strategies if the increment is the smallest."""
     route = Route(last.result.u, None, (1.0, 1.0), (last.t, t), t - last.t)
     start = StaticResult(**vars(last.result) | {
@@ -357,6 +363,9 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
         far = max(NEAR * system.size, FASTER * last.rate * (t - last.t))
 
     with system.stopped_at(t):
+        if drag is not None:
+            return _loose(system, last, t, drag, start, Options(
+                route, "mixed", rules.tol, rules.max_iterations, close=True), smallest)
         search = Search(system, last.result.u, last.result.memory, rules, stable, False,
                         t - last.t)
         bounded = search.touches or search.stabilised_by_loads
@@ -388,6 +397,53 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
     moved = largest_displacement(system, result.u - last.result.u)
     way = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
     return Instant(t, result, way, moved / (t - last.t))
+
+
+def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticResult,
+           options: Options, smallest: bool) -> Instant:
+    """The equilibrium at t of loose members that may touch, with the drag of :func:`drag_of`.
+
+    First from a guess by the last change. The smallest increment is tried with more drag, with
+    which bodies snap through in several increments.
+    """
+    dt, u = t - last.t, last.result.u
+    start.memory = system.histories.after(start.memory).relaxed(u)
+    tries: list[Any] = [] if last.velocity is None else [
+        options._replace(drag=drag, guess=u + dt * last.velocity, most=min(GUESSED, options.most))]
+    tries += [options._replace(drag=factor * drag, method="newton")
+              for factor in (1.0, *(MORE_DRAG if smallest else ()))]
+    for k, one in enumerate(tries):
+        step = Increment(system, start, 1.0, one)
+        try:
+            with np.errstate(all="ignore"):  # overflow shows in the residual
+                result = step.reached(step.solve(False))
+            break
+        except LoadStepFailed:
+            if k == len(tries) - 1:
+                raise
+    moved = largest_displacement(system, result.u - u)
+    return Instant(t, result, FOLLOWED, moved / dt, (result.u - u) / dt)
+
+
+def drag_of(system: System) -> Array | None:
+    """Drag on each DOF per displacement in an increment, (N,), of loose members that may touch.
+
+    What no other member touches has no position of its own. With the drag it stays where it was,
+    and what is pushed moves no further than it has to. Other scenes have none.
+    """
+    if not (system.constraints.missing_supports and system.forces.changing):
+        return None
+    out = np.zeros(system.N)
+    for beam, s in zip(system.beams, system.slices):
+        mesh, E = beam.mesh, stiffest(beam.across, np.arange(beam.mesh.nelements))[0]
+        length = mesh.lengths.sum() / len(np.unique(mesh.chains))
+        bending = FREE * mesh.height**3 / 12.0 / length**4
+        drag = DRAG * E * max(bending, LEAST_DRAG) * beam.across.outline(np.full((2, 1), 0.5))[0]
+        parts = 0.5 * drag * np.bincount(mesh.t.ravel(), np.tile(mesh.lengths, 2))
+        out[s].reshape(-1, beam.nd)[:, :2] = parts[:, None]
+    bodies = np.setdiff1d(position_weights(system).nonzero()[0], out.nonzero()[0])
+    out[bodies] = out[out > 0.0].mean() if out.any() else 0.0
+    return out
 
 
 class _Record:

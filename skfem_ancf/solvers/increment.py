@@ -62,7 +62,8 @@ class Options(NamedTuple):
     """Options of an iteration: method "mixed" or "newton", tolerance, largest number of iterations.
 
     If ``watched``, the iteration stops where the mixed method does not seem to converge. ``close``:
-    the start is close to the equilibrium.
+    the start is close to the equilibrium. ``drag`` (N,) is a force on each DOF per displacement in
+    the increment, and ``guess`` (N,) a first displacement.
     """
 
     route: Route
@@ -71,6 +72,8 @@ class Options(NamedTuple):
     most: int
     watched: bool = False
     close: bool = False
+    drag: Any = None
+    guess: Any = None
 
 
 class Increment:
@@ -120,6 +123,8 @@ class Increment:
         """The result after the increment, with updated contact history."""
         start = self.start
         memory, lost = self.system.accept(start.u, found.u, self.load, self.time)
+        if (drag := self.options.drag) is not None:
+            lost += float(drag @ (found.u - start.u) ** 2)
         return StaticResult(**vars(start) | {
             "steps": [*start.steps, self.record], "load": self.level,
             "rubbed": start.rubbed + lost, "memory": memory, "u": found.u,
@@ -167,7 +172,7 @@ class Increment:
         before = self.start.u, options.route.acting(self.start.load)[1]
         return found_touching(contacts, before, self.time, solve,
                               lambda u: self.system.strain_energy(u, self.time), self._response,
-                              LoadStepFailed, options.close)
+                              LoadStepFailed, options.close, options.drag is not None)
 
     def _response(self, found):
         """The response at an equilibrium."""
@@ -206,7 +211,8 @@ class Increment:
         stops if the third correction is not smaller than the first.
         """
         system, options = self.system, options or self.options
-        u, multipliers = (begin or (self.start.u, self.start.multipliers))[:2]
+        u = self.start.u if options.guess is None else options.guess
+        u, multipliers = (begin or (u, self.start.multipliers))[:2]
         backend = backend or system.backend
         rules = rules_of(system, options.method, options.tol, options.most,
                          FIRST if wary else WATCHED if options.watched and not solver else 0)
@@ -254,6 +260,8 @@ class Increment:
             begin = route.u[fixed]
             values = begin + self.level * (values - begin)
             gap = (1.0 - self.level) * gap
+        drag = 0.0 if self.options.drag is None else self.options.drag
+        gap = gap - drag * self.start.u
         moved, changes = 0.0, values - u[fixed]
         if moving := bool(np.logical_or.reduce(changes)):
             moved = np.zeros(system.N)
@@ -266,7 +274,7 @@ class Increment:
         when = np.nan if clock is None else clock
         definite = solver is system.solver and system.symmetric and not solver.coupled
         target = Target(self.load, when, self.time, moving, solver.handle, definite)
-        return target, Start(u, multipliers, gap, moved), np.array([factors, first])
+        return target, Start(u, multipliers, gap, moved, drag), np.array([factors, first])
 
     def _require_converged(self, status, n, rules):
         if status == CONVERGED:

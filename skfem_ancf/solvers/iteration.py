@@ -7,13 +7,13 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..actions.tables import add_constraint_rate
-from ..core.band import dot, multiply, solve_definite
+from ..core.band import dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
 from ..core.source import F1, MADE, apart, indices, source
 from ..core.types import Array
 from ..equations.backend import Backend
 from ..equations.tables import Equations
-from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DU, FORCE, GAP, LOAD, MOVED,
+from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, GAP, LOAD, MOVED,
                                     RESIDUAL, ROWS, U, Target, balance, hold_back)
 
 #: Approximate iterations to an equilibrium, by which work in NumPy is counted.
@@ -50,6 +50,7 @@ class Start(NamedTuple):
     multipliers: Array  # (m,)
     gap: Any  # residual that may remain, (N,), or 0
     moved: Any  # prescribed changes of fixed DOFs, (N,), or 0
+    drag: Any = 0.0  # force on each DOF per displacement, (N,), or 0
 
 
 class Iterate(NamedTuple):
@@ -84,7 +85,7 @@ def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any
     x, m = np.zeros((ROWS, len(start.u))), np.zeros((4, len(start.multipliers)))
     stresses, record = np.zeros((2, backend.tables.stresses_size)), np.empty(
         (2, rules.iterations + 1))
-    x[U], x[GAP], x[MOVED] = start.u, start.gap, start.moved
+    x[U], x[GAP], x[MOVED], x[DRAG] = start.u, start.gap, start.moved, start.drag
     m[0], m[3] = start.multipliers, joints[0]
     run = backend.of(equilibrium, ITERATIONS, calls=not target.definite)
     status, n, k, definite = run(target, rules, factors, joints[1], x, m, stresses, record)
@@ -108,6 +109,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     multipliers, phi, dm = m[0], m[1], m[2]
     by_band = target.definite and e.factors.flat.size > 0
     norms = np.empty(3)
+    loose = 1.0 if largest(x[DRAG]) > 0.0 else 0.0
     quiet, last, moving, k = False, False, target.moving, 0
     work = before = reference = np.inf
     while True:
@@ -149,7 +151,7 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
             for i in indices(u.size):
                 du[i] += moved[i]
         elif e.forces.contacts.number > 0 or e.forces.changing > 0:
-            hold_back(e, target.at, u, R, du, dm)
+            hold_back(e, target.at, loose, u, R, du, dm)
         moving = False
         for i in indices(u.size):
             u[i] += du[i]

@@ -108,7 +108,7 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -
 def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
                    respond: Callable[..., Any], failed: type[Exception],
-                   close: bool = False) -> Any:
+                   close: bool = False, dragged: bool = False) -> Any:
     """An equilibrium in contact at the time t, from a displacement and its time.
 
     Obstacles have the contact history at the start of the load step. ``solve`` takes the last
@@ -119,6 +119,8 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
     before = contacts.tables.memory.copy()
     climb = _Climb(contacts, start, t, solve, energy, respond, failed)
     ways = [_at_once, _soon] if close else [_released, _from_soft, _directly]
+    if dragged:  # which already stabilises the iteration
+        ways = [_directly]
     flags = lies_near(contacts, *start)
     for way in ways:
         if way is _released and flags is None:

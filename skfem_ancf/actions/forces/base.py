@@ -344,6 +344,11 @@ class Remembering:
         x, y = (positions(self, w) for w in (u0, u))
         return self.accept(x, y, 0.0 * y, t)
 
+    def relax(self, u: Array) -> None:
+        """Set a history with less stiffness, of contact between members at u (N,)."""
+        if hasattr(self.element, "relaxed"):
+            self._values[:] = self.element.relaxed(positions(self, u), self.history)
+
     def correct(self, u: Array, t: float) -> bool:
         """Set a history with which to repeat an increment that ends at u (N,); False for none."""
         new = self.element.corrected(positions(self, u), t, self.history)

@@ -133,7 +133,8 @@ def run_kinds(tables, what, y, w, factor, out):
 @source
 def _evaluate(tables, what, t, factor, y, w, out):
     """Evaluate ``what`` for all kinds and for user-defined elements."""
-    run_kinds(tables, what, y, w, factor, out)
+    if tables.number > 0:
+        run_kinds(tables, what, y, w, factor, out)
     if tables.custom > 0:
         custom_elements(tables.custom, what, t, factor, y, w, out)
 

@@ -20,11 +20,14 @@ from .facets import facets_of
 from .gap import Pairs, Surfaces, curvature, dot, gaps, mean_slope, slip_row
 from .search import Search, Touching
 
-#: The pressure begins that far before the face, in heights; it is proportional from the face on.
-WIDTH = 0.01
+#: Width of the transition from no pressure to proportional pressure, in heights, as of obstacles.
+WIDTH = 1e-3
 #: Penetration in heights at which a default stiffness is increased, the one aimed at, and the
 #: largest factor.
 DEEP, AIM, FIRMEST = 0.01, 0.005, 1e4
+#: Of loose members: largest decrease of the stiffness in an increment, smallest stiffness, and the
+#: depth relative to the one aimed at from which on it stays.
+SOFTER, SOFTEST, PRESSED = 0.1, 1e-4, 0.3
 #: Overlap of the reference configuration, in heights, that is an error: meshes of curves are
 #: approximate.
 CUT = 0.02
@@ -59,8 +62,8 @@ class BodyContact(ForceElement):
     """Contact of beams, rigid bodies and domains with each other, and of beams with themselves.
 
     Points of all surfaces, with the ends of beams, are pressed out of the surfaces that they face.
-    The pressure of a point begins a hundredth of the height before the face, or at the gap of the
-    reference configuration if that is smaller, and grows by ``stiffness`` times the further way.
+    The pressure of a point begins at the face, or at the gap of the reference configuration if that
+    is negative, and grows by ``stiffness`` times the penetration.
 
     Parameters
     ----------
@@ -167,8 +170,9 @@ class BodyContact(ForceElement):
     def _begin(self, layout):
         """Set the gaps at which the pressure begins; InputError if members overlap."""
         search, h = self.search, self.search.height
-        search.begins, z = self.width, np.zeros(len(self.dofs), complex)
-        found, begins = search.touching(z), np.full(len(search.surfaces.facets.of), self.width)
+        z, begins = np.zeros(len(self.dofs), complex), np.zeros(len(search.surfaces.facets.of))
+        search.begins = begins
+        found = search.touching(z)
         if len(found.p):
             k, f = int(np.argmin(found.gap)), search.surfaces.facets
             if found.gap[k] < -CUT * h:
@@ -179,7 +183,7 @@ class BodyContact(ForceElement):
                     f"({x.real:.4g}, {x.imag:.4g}): move them apart, or name in scene.contact(a, "
                     "b) only those that may touch")
             begins[found.p] = found.gap
-        search.begins = begins
+        search.forget()
 
     # states
 
@@ -363,13 +367,33 @@ class BodyContact(ForceElement):
     # solvers
 
     def corrected(self, x: Array, t: float, history: Array) -> Array | None:
-        found, h = self.search.touching(_complex(x, x)[0]), self.search.height
-        deep = -float(np.min(found.gap, initial=0.0)) / h
+        found, deep = self._depth(x)
         if self.penalty is not None or deep <= DEEP or history[0] >= FIRMEST:
             return None
-        new, factor = history.copy(), max(deep / AIM, 2.0)
+        return self._stiffened(history, found, max(deep / AIM, 2.0))
+
+    def relaxed(self, x: Array, history: Array) -> Array:
+        """A history with less stiffness, down to what the depth at x needs.
+
+        Of loose members the pressure is small at first: on stiff faces contacts would open and
+        close in turn.
+        """
+        found, deep = self._depth(x)
+        factor = max(deep / AIM, SOFTER, SOFTEST / (1.0 + history[0]))
+        if self.penalty is not None or factor > PRESSED:
+            return history
+        return self._stiffened(history, found, factor)
+
+    def _depth(self, x):
+        """Points in contact and the largest depth in heights."""
+        found = self.search.touching(_complex(x, x)[0])
+        return found, -float(np.min(found.gap, initial=0.0)) / self.search.height
+
+    def _stiffened(self, history, found, factor):
+        """A history with a factor on the stiffness and the same tractions of friction."""
+        new = history.copy()
         new[0] = (1.0 + new[0]) * factor - 1.0
-        if self.friction:  # tractions stay
+        if self.friction:
             anchor = new[1:].reshape(2, -1)[1]
             place = np.zeros(len(anchor))
             place[found.p] = self.search.place(found.e, found.zeta)
@@ -382,13 +406,17 @@ class BodyContact(ForceElement):
         return float(np.max(np.abs(b - a)) / (STRIDE * self.search.height))
 
     def passed(self, x: Array, y: Array, t: float) -> str | None:
-        z = _complex(y, y)[0]
-        if self.stride(x, y) < 1.0 and not len(self.search.candidates(z)[0].p):
+        z0, z1 = _complex(x, y)
+        if self.stride(x, y) < 1.0 and not len(self.search.candidates(z1)[0].p):
             return None
-        if (met := self.search.crossed(z)) is None:
+        if (met := self.search.crossed(z1)) is not None:
+            what = "beams have passed through each other"
+        elif (met := self.search.entered(z0, z1)) is not None:
+            what = "a member has passed into a body"
+        else:
             return None
         at = met + self.origin
-        return f"{self!r}: beams have passed through each other at ({at.real:.4g}, {at.imag:.4g})"
+        return f"{self!r}: {what} at ({at.real:.4g}, {at.imag:.4g})"
 
     # results
 

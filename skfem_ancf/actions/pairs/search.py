@@ -12,8 +12,9 @@ from ...core.types import Array
 from .gap import Surfaces, cross, dot
 
 #: Distance of seeds along facets, largest number on a facet, and the distance for which a list of
-#: candidates is enough, in heights.
+#: candidates is enough, in heights; larger ones tried where nothing is near.
 SEEDS, MOST, SKIN = 1.2, 10, 0.5
+SKINS = 64.0, 16.0, 4.0
 #: No contact of a beam with itself, or with a beam that it is joined to, within so many heights.
 APART = 3.0
 #: Distance of axes that are joined, in heights; parts of an element in which they are searched.
@@ -31,7 +32,10 @@ OPPOSED = -0.2
 
 
 class Candidates(NamedTuple):
-    """Pairs of points and facets, a guess of zeta, and where all points were at the search."""
+    """Pairs of points and facets, a guess of zeta, and where all points were at the search.
+
+    It is complete until points or facets have moved by half of ``skin``.
+    """
 
     p: Array
     e: Array
@@ -39,6 +43,7 @@ class Candidates(NamedTuple):
     seeds: tuple[Array, Array]
     x: Array
     z: Array
+    skin: float
 
 
 class Touching(NamedTuple):
@@ -80,19 +85,24 @@ class Search:
         """The candidates at displacements z, with points and normals of the surfaces there."""
         x, n = self.surfaces.outside(z)
         known = self._known
-        if known is None or np.max(np.abs(x - known.x)) > 0.5 * SKIN * self.height:
-            self._known = known = self._search(x, z)
+        if known is None or np.max(np.abs(x - known.x)) > 0.5 * known.skin:
+            self._known = known = self._search(x, z, SKIN * self.height)
+            for skin in SKINS if not len(known.p) else ():  # how far may it move unseen?
+                wide = self._search(x, z, skin * self.height)
+                if not len(wide.p):
+                    self._known = known = wide
+                    break
         return known, x, n
 
-    def _search(self, x, z):
+    def _search(self, x, z, skin):
         f, m = self.surfaces.facets, len(self._seed_zeta)
         e, zeta = np.repeat(np.arange(len(f.sides)), m), np.tile(self._seed_zeta, len(f.sides))
         y = self.surfaces.along(e, zeta, 0, z)
         trees = [scipy.spatial.cKDTree(np.column_stack([a.real, a.imag])) for a in (x, y)]
-        reach = float(np.max(self._near)) + (1.0 + SKIN) * self.height
+        reach = float(np.max(self._near)) + self.height + skin
         found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
         p, k, far = found["i"], found["j"], found["v"]
-        which = (far < self._near[e[k]] + (1.0 + SKIN) * self.height) & self.allowed[
+        which = (far < self._near[e[k]] + self.height + skin) & self.allowed[
             f.members[f.of[p]], f.members[e[k]]] & ~self._together(p, e[k], zeta[k], f.lengths)
         p, k, far = p[which], k[which], far[which]
         order = np.lexsort((far, e[k], p))
@@ -100,21 +110,25 @@ class Search:
         first = np.append(True, (np.diff(p) != 0) | (np.diff(e[k]) != 0))[:len(p)]
         p, k = p[first], k[first]
         return Candidates(p, e[k], zeta[k], self.surfaces.curve(e[k], zeta[k], 0), x,
-                          z.copy())
+                          z.copy(), skin)
 
     def touching(self, z: Array) -> Touching:
         """The pairs with a gap below the one at which the pressure begins.
 
         The last ones are kept: forces and stiffnesses ask for the same states in turn.
         """
+        if self._nothing_near(z):
+            return NONE
         for at, found in self._last:
             if np.array_equal(at, z):
                 return found
-        if self._nothing_near(z):
-            return NONE
         found = self._touching(z)
         self._last = [*self._last[1 - KEPT:], (z.copy(), found)]
         return found
+
+    def forget(self) -> None:
+        """Forget the last states."""
+        self._last = []
 
     def _nothing_near(self, z):
         """True if nothing was near at the last search, and no point can have come near since.
@@ -123,7 +137,7 @@ class Search:
         """
         known = self._known
         return known is not None and not len(known.p) and np.max(
-            self._moves * np.abs(z - known.z)) < 0.5 * SKIN * self.height
+            self._moves * np.abs(z - known.z)) < 0.5 * known.skin
 
     def _touching(self, z):
         known, x, n = self.candidates(z)
@@ -237,6 +251,55 @@ class Search:
                 np.abs(s[j] - q) < apart)
             i, j = i[~known], j[~known]
         return ends[i[0]].mean() if len(i) else None
+
+
+    def entered(self, z0: Array, z1: Array) -> complex | None:
+        """A place where an axis, or the middle of a solid, enters a solid on a straight path from
+        z0 to z1; None if none does.
+        """
+        f, (ends, chains, s, members) = self.surfaces.facets, self._axes(z0, COARSE)
+        solid = np.flatnonzero(~np.isin(f.members, members))  # edges of bodies and domains
+        if not len(solid):
+            return None
+        sides = [np.array([self.surfaces.along(solid, np.full(len(solid), end), 0, z)
+                           for end in (-1.0, 1.0)]) for z in (z0, z1)]
+        known = np.unique(f.members[solid])
+        middles = [np.array([x[:, f.members[solid] == k].mean() for k in known]) for x in sides]
+        a, b = (np.append(x.mean(axis=1), y) for x, y in zip(
+            (ends, self._axes(z1, COARSE)[0]), middles))
+        first = np.array([f.chains[solid[f.members[solid] == k][0]] for k in known], int)
+        chains, s = np.append(chains, first), np.append(s, 0.0 * known)
+        members = np.append(members, known)
+        # near enough to its edge on the way, not joined to it
+        (c0, d0), (c1, d1) = sides
+        low, high = (np.array([g(a.real, b.real), g(a.imag, b.imag)])[:, :, None]
+                     for g in (np.minimum, np.maximum))
+        edges = np.array([c0, d0, c1, d1])
+        edges = np.array([edges.real, edges.imag])
+        may = np.all((low <= edges.max(axis=1)[:, None]) & (high >= edges.min(axis=1)[:, None]),
+                     axis=0)
+        p, e = np.nonzero(may & self.allowed[members[:, None], f.members[solid]])
+        for i, r, j, _ in self.joined:
+            some = (chains[p] == i) & (f.chains[solid[e]] == j) & (
+                np.abs(s[p] - r) < 2.0 * APART * self.height)
+            p, e = p[~some], e[~some]
+        # times at which the point, and both ends of the edge, lie in a line
+        u, v = (x[p] - c[e] for x, c in ((a, c0), (b, c1)))
+        g, h = ((d - c)[e] for c, d in sides)
+        k0, k2 = cross(g, u), cross(h - g, v - u)
+        k1 = cross(g, v - u) + cross(h - g, u)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(k1 * k1 - 4.0 * k2 * k0)
+            far = -0.5 * (k1 + np.copysign(root, k1))
+            for t in (far / k2, k0 / far):
+                edge, way = g + t * (h - g), u + t * (v - u)
+                share = dot(edge, way) / np.abs(edge) ** 2
+                inward = f.sides[solid[e]] * (k1 + 2.0 * t * k2) < 0.0
+                hit = (t >= 0.0) & (t <= 1.0) & (share >= 0.0) & (share <= 1.0) & inward
+                if np.any(hit):
+                    n = int(np.argmax(hit))
+                    return a[p[n]] + t[n] * (b - a)[p[n]]
+        return None
 
 
 def crossing(a: Array, b: Array) -> Array:
