@@ -71,6 +71,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "skfem-ancf"
 html_static_path = ["static"]
 html_css_files = ["pages.css"]
+html_search_scorer = "scorer.js"
 html_show_sourcelink = False
 html_copy_source = False
 html_sidebars = {"index": [], "tutorial": []}
