@@ -159,8 +159,8 @@ class Domain(Immutable):
         >>> strip = Domain.solid(Basis(mesh, ElementVector(ElementQuad2())),
         ...                      StVenantKirchhoff(E=100.0, nu=0.3), width=0.1)
         >>> scene = Scene(strip).fix("left", "u^1").fix("bottom", "u^2").fix("right", "u^1", 0.2)
-        >>> scene.solve_static().stress((1, 0.5), strip).round(9).tolist()  # E (1.1^2 - 1) / 2
-        [10.5, 0.0, 0.0]
+        >>> float(scene.solve_static().stress((1, 0.5), strip)[0].round(6))  # E (1.1^2 - 1) / 2
+        10.5
         """
         forms = SolidForms(material, width)
         domain = cls(basis, forms.residual, forms.tangent, forms.mass, name)
