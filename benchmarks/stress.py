@@ -238,6 +238,13 @@ def _picture_orders(table, families, out):
     figure.savefig(out / "orders.png", dpi=150)
 
 
+def frequencies_of(scene):
+    """Three frequencies, on a coarse mesh."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "the mesh is coarse", ModelWarning)
+        return scene.modes(3).frequencies
+
+
 def units(quick, out):
     """The same digits from micrometres and GPa to kilometres and Pa."""
     check = "units"
@@ -255,7 +262,7 @@ def units(quick, out):
             history = Scene(beam).pin("left").gravity((0, -G / a)).integrate(t_end=0.05, dt=2.5e-3)
             found[system] = (state.displacement((1 / a, 0)) * a, state.iterations,
                              state.strain((0.3 / a, 0.004 / a)),
-                             Scene(beam).clamp("left").modes(3).frequencies,
+                             frequencies_of(Scene(beam).clamp("left")),
                              history.displacement((1 / a, 0))[-1] * a)
         base = found["m, Pa"]
         for system in list(systems)[1:]:

@@ -7,6 +7,7 @@ import re
 from dataclasses import is_dataclass
 from functools import cached_property
 from importlib.util import find_spec
+from typing import get_origin
 
 import pytest
 import test_reference as reference
@@ -45,7 +46,7 @@ def functions(module):
         if name.startswith("_") or getattr(thing, "__module__", None) != module:
             continue
         if not inspect.isclass(thing):
-            if callable(thing) and thing not in MARKED:
+            if callable(thing) and get_origin(thing) is None and thing not in MARKED:
                 yield name, inspect.unwrap(thing), None
             continue
         if getattr(thing, "_is_protocol", False):  # the classes that have it describe it

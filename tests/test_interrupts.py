@@ -15,7 +15,8 @@ import pytest
 from skfem import BilinearForm, LinearForm
 from skfem.generic_utils import OrientedBoundary
 
-from skfem_ancf import (Beam, ElementBeamCable, Interrupted, MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, Circle, ElementBeamCable, Interrupted, MeshBeam, Scene,
+                        StVenantKirchhoff)
 
 
 @pytest.fixture(autouse=True)
@@ -59,6 +60,34 @@ def test_ctrl_c_in_a_users_function_keeps_the_steps_before(scheme, stop):
     rest = scene.integrate(0.1, 2e-3, scheme=scheme, start=kept.state(-1))
     assert np.allclose(rest.u[-1], whole.u[-1], rtol=0.0, atol=1e-7)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("part", [0.3, 0.55, 0.8])
+@pytest.mark.parametrize("acts", ["spring", "obstacle"])
+def test_no_step_is_kept_after_the_function_stopped(acts, part):
+    """Wherever in a step that is: iterations go on without what the function gives, and fail."""
+    asked, last = [0], [10**9]
+
+    def given(x):
+        asked[0] += 1
+        if asked[0] > last[0]:
+            raise KeyboardInterrupt
+        return 1e2 * x if acts == "spring" else (0.9, -0.113 + 0.05 * x)
+
+    scene = swinging()
+    if acts == "spring":
+        scene.spring(given, ((1.0, 0.0), (1.0, -1.0)))
+    else:
+        scene.obstacle(Circle((0.0, 0.0), 0.1), position=given)
+    whole = scene.integrate(0.1, 2e-3, scheme="energy-momentum")
+    number, asked[0] = asked[0], 0
+    for k in range(5):
+        last[0], asked[0] = int(part * number) + k, 0
+        with pytest.raises(Interrupted) as caught:
+            scene.integrate(0.1, 2e-3, scheme="energy-momentum")
+        kept = caught.value.state
+        assert len(kept) < len(whole)
+        assert np.array_equal(kept.u, whole.u[:len(kept)])
 
 
 @pytest.mark.parametrize("handled", [signal.default_int_handler, "own"])

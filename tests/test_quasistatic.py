@@ -374,13 +374,13 @@ def slow_path(monkeypatch, whole):
     """A cantilever that is followed only by increments of a thousandth; or as a whole."""
     follow, asked = quasistatic._next, []
 
-    def only_small(system, last, t, rules, stable, smallest):
+    def only_small(system, last, t, rules, stable, smallest, *more):
         asked.append(t - last.t)
         if smallest and not whole:
             raise ConvergenceError("none", None)
         if not smallest and t - last.t > 2e-4:
             raise LoadStepFailed("far")
-        return follow(system, last, t, rules, stable, smallest)
+        return follow(system, last, t, rules, stable, smallest, *more)
 
     monkeypatch.setattr(quasistatic, "_next", only_small)
     scene = Scene(cantilever()).clamp("left").point_force(

@@ -76,8 +76,10 @@ def handle_of(thing: Any) -> int:
 
 
 def owner(handle: int) -> Any:
-    """The object of a handle."""
+    """The object of a handle; raises the exception of an earlier callback of this kernel again."""
     raise_pending()
+    if _raised and get_ident() in _raised:
+        raise _raised[get_ident()]
     return _objects[handle]
 
 
@@ -131,8 +133,6 @@ def call_solver(handle, t, u, multipliers, R, phi, du, dm):
     return bool(owner(handle).solve_into(t, u, multipliers, R, phi, du, dm))
 
 
-#: Number of the question for poses.
-POSES = 5
 #: Callbacks of compiled code by number, with one signature: a handle, a selector, a time, a factor
 #: and three arrays.
 _QUESTIONS = (
@@ -148,14 +148,17 @@ _raised: dict[int, BaseException] = {}
 
 
 def kept(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that keeps its exception for :func:`raise_kept`, and then does nothing."""
+    """A function that keeps its first exception for :func:`raise_kept` and returns zero.
+
+    The kernel goes on until it returns: what it asks for after an exception has to fail again, so
+    that it accepts no step or solution.
+    """
     def run(*args):
-        if get_ident() not in _raised:
-            try:
-                return function(*args)
-            except BaseException as error:
-                _raised[get_ident()] = error
-        return 0
+        try:
+            return function(*args)
+        except BaseException as error:
+            _raised.setdefault(get_ident(), error)
+            return 0
 
     return run
 
@@ -182,8 +185,7 @@ def ask(question, handle, what, t, x, places):
     try:
         _QUESTIONS[question](handle, what, t, x, a, b, answer)
     except BaseException:
-        if question != POSES:
-            answer[:] = np.nan  # ends the iteration
+        answer[:] = np.nan  # ends the iteration
         raise
 
 

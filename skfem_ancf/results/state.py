@@ -476,8 +476,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         require_flag("recover", recover)
         at = self.system.points.find(point, beam, line, ask=True)
         values = at.gather([
-            self._values(part, recover).strain if isinstance(part, DomainPoints) else
             part.strain(self._places, self._recovery_of(part.number) if recover else None)
+            if isinstance(part, BeamPoints) else self._values(part, recover).strain
             for part in at.parts])
         if np.iscomplexobj(values):
             values = first_order(values)

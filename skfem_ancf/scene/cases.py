@@ -68,8 +68,8 @@ class LoadCases(Mapping):
     ...     "self": lambda scene: scene.gravity((0, -9.81)),
     ...     "live": lambda scene: scene.line_load((0, -1e4))},
     ...     {"1.35 self + 1.5 live": {"self": 1.35, "live": 1.5}, "self": {"self": 1.0}})
-    >>> round(float(cases["1.35 self + 1.5 live"].resultants((2, 0)).M))  # 15000 and 2079 per m
-    34159
+    >>> round(float(cases["1.35 self + 1.5 live"].resultants((2, 0)).M), -1)  # 15000 and 2079 N/m
+    34160.0
     """
 
     def __init__(self, scene: Scene, cases: Mapping[str, Callable[[Any], Any]],

@@ -4,7 +4,7 @@ A contact pair is the surface of one beam with one obstacle. Its arrays are cons
 those in :class:`ContactTables`; :func:`pair_of` returns views with names.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -109,7 +109,7 @@ class Pair(NamedTuple):
 
 
 #: The type of a pair in compiled code.
-PAIR = Annotated[Pair, MADE]
+PAIR: TypeAlias = Annotated[Pair, MADE]
 
 
 @source

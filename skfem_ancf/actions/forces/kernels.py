@@ -176,6 +176,10 @@ def add_contact(contacts, asked, u, v, out):
     """Add the answer of obstacles to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     if contacts.moving > 0:
         custom_poses(contacts.custom, asked.t, asked.span, contacts.poses)
+        if np.isnan(contacts.poses[0]):  # a user's function failed: no iteration may end with it
+            for i in range(out.size):
+                out[i] = np.nan
+            return
     of_contacts(contacts, asked, u, v, out)
 
 
