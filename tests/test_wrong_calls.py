@@ -113,6 +113,8 @@ WRONG = [
     (lambda: clamped().sensor("grows", lambda s: np.zeros(round(1 + 1e3 * s.t))).integrate(
         0.003, 0.001), r"sensor .grows. must .* the same shape.*got \(2,\), then \(3"),
     (lambda: clamped().run(1.0, min_step=2), "min_step must be at most 1.*got 2"),
+    (lambda: Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5), MATERIAL),
+     "give width=, that of a rectangle, or section="),
     # the order of arguments
     (lambda: clamped().load(LinearForm(lambda v, w: v[1]), BilinearForm(lambda u, v, w: 0.0)),
      "second argument of a load is the boundary.*tangent="),

@@ -383,6 +383,9 @@ class Beam(Immutable):
 
 def _section(section, width):
     """The section, or a rectangle of the given width."""
+    if section is None and width is None:
+        raise InputError("a beam has a section: give width=, that of a rectangle, or section=, as "
+                         'Section.profile("IPE 200")')
     if section is None:
         return Rectangle(width)
     if width is not None:
