@@ -115,6 +115,19 @@ def test_view_shows_both_signs(state, tmp_path):
     plotter.close()
 
 
+def test_the_camera_is_close(state, tmp_path):
+    """The body fills the width of a picture, or what the bar and the text leave of its height."""
+    for size in ((1000, 700), (400, 700)):
+        path = tmp_path / "view.png"
+        plotter = state.view("S_xx", thickness=1, filename=path, window_size=size)
+        low, high = state.to_pyvista().bounds[:4:2], state.to_pyvista().bounds[1:4:2]
+        tall = 2.0 * plotter.camera.parallel_scale
+        shares = (high[0] - low[0]) / (tall * size[0] / size[1]), (high[1] - low[1]) / tall
+        assert 0.85 < max(shares[0], shares[1] / 0.68) <= 1.0
+        assert "load 1" in plotter.actors["title"].GetText(2)
+        plotter.close()
+
+
 def test_film(history, tmp_path):
     from PIL import Image
 

@@ -11,15 +11,13 @@ from numpy.typing import ArrayLike
 from ..core.errors import (ConvergenceError, InputError, SupportError, require_finite,
                            require_finite_scalar, shown)
 from ..core.types import Array
-from .pyvista import view
+from .pyvista import look, view
 from .scenery import Scenery
 
 #: Points along and across an element.
 SUBDIVIDE = (8, 4)
 #: Length of the arrow of the first force, and margin of the picture, relative to the body.
-ARROW, MARGIN = 0.25, 0.06
-#: Parts of the height at the top and at the bottom where slider and colours are.
-BAR = 0.16
+ARROW, MARGIN = 0.18, 0.06
 #: Colour of arrows.
 LOAD = "#a50026"
 
@@ -68,18 +66,10 @@ class Explorer:
         self.mesh = next(m for m in self.plotter.meshes if self._name in m.point_data)
         self._low, self._high = every.every.min(axis=0), every.every.max(axis=0)
         self._size = float(max(self._high - self._low))
-        self._look(MARGIN)
+        look(self.plotter, self._low, self._high, MARGIN)
 
     def __repr__(self) -> str:
         return f"<Explorer at {shown(self.value)}: {self.state!r}>"
-
-    def _look(self, margin):
-        """Point the camera at the body, with margins for dragging and for the bars."""
-        low, high = self._low - margin * self._size, self._high + margin * self._size
-        width, height = self.plotter.window_size
-        self.plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
-        self.plotter.camera.parallel_scale = 0.5 * max(
-            (high[1] - low[1]) / (1.0 - 2.0 * BAR), (high[0] - low[0]) * height / width)
 
     def set(self, value: Any) -> Any:
         """Solve for a number or a force, and update the body; returns the State.
@@ -142,17 +132,18 @@ class Explorer:
         def draw() -> None:
             start, arrow = place(self.state), scale * np.array(self.value)
             length = float(np.hypot(*arrow))
-            drawn.copy_from(pyvista.Arrow(start=(*start, 0.0), scale=max(length, 1e-9 * scale),
-                                          direction=(*arrow, 0.0) if length else (1.0, 0.0, 0.0)))
+            drawn.copy_from(pyvista.Arrow(
+                start=(*start, 0.0), scale=max(length, 1e-9 * scale), shaft_radius=0.02,
+                tip_radius=0.07, direction=(*arrow, 0.0) if length else (1.0, 0.0, 0.0)))
             handle.SetCenter(*start + arrow, 0.0)
 
         self.widget = handle = self.plotter.add_sphere_widget(
             dragged, center=(*place(self.state) + scale * np.array(self.value), 0.0),
-            radius=0.025 * self._size, color=LOAD, pass_widget=True, test_callback=False,
+            radius=0.02 * self._size, color=LOAD, pass_widget=True, test_callback=False,
             interaction_event="always")
         self._follow = draw
         draw()
-        self._look(MARGIN + 1.5 * ARROW)
+        look(self.plotter, self._low, self._high, MARGIN + ARROW)
         self.plotter.add_mesh(drawn, color=LOAD, lighting=False)
 
 

@@ -12,7 +12,7 @@ from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
                            require_path, require_text, shown)
-from ..core.types import StrPath
+from ..core.types import Array, StrPath
 from ..recovery.fields import FIELDS, find_fields
 from ..recovery.grids import CELL_TYPES, COMPONENTS, body_of, facts_of, grids, in_space
 from .animation import pixels
@@ -21,6 +21,8 @@ from .scenery import RIGID, WALL, Scenery
 
 #: Pictures that a plotter writes.
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+#: Parts of the height at the top and at the bottom where text, sliders and colours are.
+BAR = 0.16
 
 
 def _pyvista():
@@ -215,18 +217,36 @@ def view(state: Any, field: Any = None, plotter: Any = None, *,
                              height=0.09, fmt="%.3g"))
     if len(scenery.walls[0]):
         plotter.add_mesh(_lines(scenery.walls[0]), color=WALL, line_width=2, lighting=False)
-    if scenery.note:
-        plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
+    title = f"load {state.load:g}" if state.t is None else f"t = {state.t:g}"
+    plotter.add_text("\n".join([title, scenery.note][:1 + bool(scenery.note)]),
+                     position="upper_left", font_size=9, color="#444444", name="title")
     plotter.set_background("white")
     plotter.enable_parallel_projection()
-    low, high = scenery.every.min(axis=0), scenery.every.max(axis=0)
-    width, height = plotter.window_size
-    low[1] -= 0.25 * max(high[1] - low[1], (high[0] - low[0]) * height / width)  # the colour bar
-    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
+    look(plotter, scenery.every.min(axis=0), scenery.every.max(axis=0))
     if path is not None:
         with output_file(path) as temporary:
             plotter.screenshot(str(temporary))
     return plotter
+
+
+def look(plotter: Any, low: Array, high: Array, margin: float = 0.04) -> None:
+    """Fill the picture with a box, between parts of its height for text and colours.
+
+    Parameters
+    ----------
+    plotter
+        A ``pyvista.Plotter``.
+    low, high
+        Opposite corners of the box, shape (2,) or (3,).
+    margin
+        Added on each side, relative to the larger side of the box.
+    """
+    around = margin * float(np.max(high - low))
+    low, high = low - around, high + around
+    width, height = plotter.window_size
+    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
+    plotter.camera.parallel_scale = 0.5 * max(
+        (high[1] - low[1]) / (1.0 - 2.0 * BAR), (high[0] - low[0]) * height / width)
 
 
 def _lines(walls):
