@@ -383,7 +383,7 @@ class Traction(Load):
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         for at, _, _ in faces_of(layout, layout.beam(self.beam), self.boundary):
-            yield force_symbol(at, values_at(self.t, at))
+            yield force_symbol(at, values_at(self.t, at))._replace(per=2)
 
 
 class DeadLoad(Load):
@@ -496,7 +496,7 @@ class Pressure(Load):
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         for at, normals, turns in faces_of(layout, layout.beam(self.beam), self.boundary):
-            yield force_symbol(at, -self.p * normals, turns)._replace(text="p = ")
+            yield force_symbol(at, -self.p * normals, turns)._replace(text="p = ", per=2)
 
 
 class EndMoment(Load):
@@ -702,7 +702,8 @@ class LineLoad(Load):
             at = [inside(layout, beam, *place) for place in arrows_along(
                 np.flatnonzero(beam.mesh.chains == chain), len(chains))]
             found = [values_at(function, at) for function in functions]
-            yield force_symbol(at, next(filter(np.any, found), found[0]), show=k == 0)
+            yield force_symbol(at, next(filter(np.any, found), found[0]), show=k == 0)._replace(
+                per=1)
 
 
 def _along_axis(beam, chains, given, name):

@@ -46,6 +46,8 @@ class Symbol(NamedTuple):
         Vectors with which the directions rotate, n or none.
     show
         Show the value.
+    per
+        Power of length in the denominator of the unit of a force: 1 along a line, 2 on a face.
     """
 
     kind: str
@@ -55,6 +57,7 @@ class Symbol(NamedTuple):
     text: str = ""
     turn: tuple[Vector, ...] = ()
     show: bool = False
+    per: int = 0
 
 
 def force_symbol(at: Iterable[Vector], force: Any, turn: Iterable[Vector] = (),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
@@ -325,7 +326,7 @@ def unit_of_resultant(name: str, units: tuple[str, str] | None) -> str:
 
 def rounded(value: float, unit: str) -> str:
     """A number with four digits and its unit, of newtons in N, kN or MN."""
-    if unit.split(" ")[0] == "N" and abs(value) >= 1e4:
+    if re.match(r"N\b", unit) and abs(value) >= 1e4:
         power = 2 if abs(value) >= 1e7 else 1
         value, unit = value / 1000.0**power, "kM"[power - 1] + unit
     return f"{float(f'{value:.4g}'):.9g} {unit}".strip()

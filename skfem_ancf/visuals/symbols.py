@@ -116,12 +116,14 @@ class Sketch:
             self.taken = np.vstack([self.taken, 0.5 * (tails[1:] + tails[:-1])])
         if s.show:
             free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
-            self._text(self._value(s, "N" if len(at) == 1 and not s.text else ""), free,
+            self._text(self._value(s, "N"), free,
                        free - other, LOAD, s.kind)
 
     def _value(self, s, what):
-        """Text and value, with the unit of a force or moment of one point."""
+        """Text and value, with the unit of a force or moment."""
         unit = unit_of_resultant(what, self.units) if what else ""
+        if unit and s.per:
+            unit += f"/{self.units[1]}" + "^2" * (s.per == 2)
         return s.text + (rounded(abs(s.value), unit) if unit else f"{abs(s.value):.6g}")
 
     def _weight(self, s, at, largest):
