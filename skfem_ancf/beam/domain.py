@@ -527,7 +527,7 @@ class DomainPoints:
 
 def grade_of(domain: Domain, x: Array) -> Any:
     """Modulus at points (2, n) of a domain over that of ``material.reference()``."""
-    return grade_at(domain._solid.grade, x, "E(x, y)") if domain._solid else 1.0
+    return grade_at(domain._solid.grade, x, "E") if domain._solid else 1.0
 
 
 def drawn(domain: Domain, u: Array, parts: int = 1) -> tuple[Array, Array, Array, Array]:

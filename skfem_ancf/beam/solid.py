@@ -9,9 +9,10 @@ from skfem.assembly import BilinearForm, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.helpers import dot
 
-from ..core.errors import InputError, ask, require_finite, require_like, require_positive
+from ..core.errors import InputError, require_like, require_positive
 from ..core.types import Array
 from ..materials import HistoryMaterial, Material
+from ..sections.section import evaluated
 
 
 def tensor(S: Array) -> Array:
@@ -115,7 +116,7 @@ class SolidForms:
         self.mass = None if material.density is None else BilinearForm(self._mass)
 
     def _factor(self, w):
-        return self.width * grade_at(self.grade, np.asarray(w.x), "E(x, y)")
+        return self.width * grade_at(self.grade, np.asarray(w.x), "E")
 
     def _energy(self, w):
         return self._factor(w) * self.law.energy(displacement_strain(w["u"].grad))
@@ -131,7 +132,7 @@ class SolidForms:
 
     def _mass(self, u, v, w):
         density = self.material.density
-        rho = grade_at(density, np.asarray(w.x), "density(x, y)") if callable(density) else density
+        rho = grade_at(density, np.asarray(w.x), "density") if callable(density) else density
         return self.width * rho * dot(u, v)
 
 
@@ -139,9 +140,4 @@ def grade_at(function: Any, x: Array, what: str) -> Any:
     """A positive function of coordinates at points (2, ...); 1 for None."""
     if function is None:
         return 1.0
-    found = require_finite(what, np.broadcast_to(ask(what, function, *x), x.shape[1:]))
-    if np.any(found <= 0.0):
-        k = np.unravel_index(np.argmin(found), found.shape)
-        raise InputError(f"{what} of a material must be positive, got {found[k]:.6g} at "
-                         f"({x[0][k]:.6g}, {x[1][k]:.6g})")
-    return found
+    return evaluated(what, function, *x)

@@ -7,8 +7,8 @@ import signal
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import count
 from ctypes import c_double, c_int64
+from itertools import count
 from threading import current_thread, get_ident, main_thread
 from typing import Any
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ..beam.domain import Domain
 from ..beam.layout import Layout
 from ..core.archive import output_file
 from ..core.errors import AncfError, require_path, require_text
@@ -152,8 +151,7 @@ def total_force(system: Any, u: Array, force: Array) -> Array:
     out = np.zeros(3)
     for member, s in zip(system.members, system.slices):
         f, q = force[s], (member.q0 + u[s]).reshape(-1, 2)
-        out[:2] += (member.rigid_motions()[:, :2].T @ f if isinstance(member, Domain) else
-                    f.reshape(-1, member.nd)[:, :2].sum(axis=0))
+        out[:2] += member.rigid_motions()[:, :2].T @ f
         f = f.reshape(-1, 2)
         out[2] += np.sum(q[:, 0] * f[:, 1] - q[:, 1] * f[:, 0])
     return out
@@ -194,6 +192,7 @@ class _Page:
     def __init__(self, state: Any) -> None:
         self.state, self.system = state, state.system
         self.units = units_of(state)
+        self.strong = any(map(_strengths, state.beams))
 
     def number(self, value: float, kind: str = "") -> tuple[str]:
         """A number with the unit of a length, force, moment or stress, as a cell."""
@@ -315,7 +314,7 @@ class _Page:
         rows = []
         for field, kind in LISTED.items():
             stress = [b for b in self.state.beams if b.section.has_fields]
-            if field == "utilisation" and not any(map(_strengths, stress)):
+            if field == "utilisation" and not self.strong:
                 continue
             try:
                 every = [self.state.extremes(field, 1, beam=b)[0] for b in (
@@ -330,13 +329,12 @@ class _Page:
         return _table(("", "value", "at", "beam"), rows)
 
     def _pictures(self):
-        strong = any(map(_strengths, self.state.beams))
         yield _figure(lambda: self.state.plot("displacement", scale="auto"))
-        yield _figure(lambda: self.state.plot("utilisation" if strong else "von_mises",
+        yield _figure(lambda: self.state.plot("utilisation" if self.strong else "von_mises",
                                               scale="auto"))
 
     def _worst(self):
-        if not any(map(_strengths, self.state.beams)):
+        if not self.strong:
             return ""
         return _table(("utilisation", "at", "beam"), [
             ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))

@@ -473,12 +473,12 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         InputError
             If several lines or beams are equally near to a point, as at a node.
         """
-        require_flag("recover", recover)
-        at = self.system.points.find(point, beam, line, ask=True)
-        values = at.gather([
-            part.strain(self._places, self._recovery_of(part.number) if recover else None)
-            if isinstance(part, BeamPoints) else self._values(part, recover).strain
-            for part in at.parts])
+        def of(part):
+            if not isinstance(part, BeamPoints):
+                return self._values(part, recover).strain
+            return part.strain(self._places, self._recovery_of(part.number) if recover else None)
+
+        values = self._at_points(of, point, beam, recover, line)
         if np.iscomplexobj(values):
             values = first_order(values)
         return (values.T * [1.0, 1.0, 0.5]).T
@@ -486,7 +486,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
     def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n)."""
-        return self._at_points(lambda v: v.S, point, beam, recover, line)
+        return self._at_points(lambda part: self._values(part, recover).S, point, beam, recover,
+                               line)
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
@@ -502,12 +503,15 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         >>> float(state.field("von_mises", (0.5, 0.05)).round(-1))
         300.0
         """
-        return self._at_points(find_field(field).of, point, beam, recover, line)
+        found = find_field(field)
+        return self._at_points(lambda part: found.of(self._values(part, recover)), point, beam,
+                               recover, line)
 
-    def _at_points(self, ask, point, beam, recover, line):
+    def _at_points(self, of, point, beam, recover, line):
+        """What a function returns of the points of each member, in the order of the points."""
         require_flag("recover", recover)
         at = self.system.points.find(point, beam, line, ask=True)
-        return at.gather([ask(self._values(part, recover)) for part in at.parts])
+        return at.gather([of(part) for part in at.parts])
 
     def _values(self, part, recover):
         """Fields at points of a member, for DOFs of the scene."""

@@ -111,7 +111,7 @@ class LoadCases(Mapping):
                                 bound=tuple(one.times(factor) for one in entry.bound))
                  for case, factor in self.combinations[name].items() if factor
                  for entry in self.cases[case]]
-        scene._entries, scene._system = (*scene._entries, *added), None
+        scene._entries = (*scene._entries, *added)
         return scene
 
     def __getitem__(self, name: str) -> State:

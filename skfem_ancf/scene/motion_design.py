@@ -104,6 +104,7 @@ class MotionDesign(Design):
             raise InputError(f"derivatives of a motion need the scheme 'generalized-alpha', 'hht' "
                              f"or 'newmark', got {self.scheme!r}")
         self.history: Any = None
+        self._static = self.static
 
     def _begin(self, p, scene, state):
         """Integrate at p."""
@@ -117,36 +118,38 @@ class MotionDesign(Design):
         if self.history.substeps:
             raise InputError(f"{self.history.substeps} steps were halved, since they did not "
                              "converge: derivatives need equal steps, so give a smaller dt")
-        self._values = np.concatenate([self._seen(scene, self.history.state(k)._motion)
+        own = self._located(scene)
+        self._values = np.concatenate([self._seen(*own, self.history.state(k)._motion)
                                        for k in range(len(self.history))])
 
-    def _solve(self, p):
-        self._static = self.static
-        super()._solve(p)
-
-    def _seen(self, scene, y):
-        """Readings at an instant."""
+    def _located(self, scene):
+        """The system of a scene, and the sensors read in it with their places."""
         for name in self.readings:
             if not isinstance(name, str) or name not in scene.sensors:
                 raise NameUnknown("sensor", name, scene.sensors)
-        state = state_of(scene.system, self.scheme, y)
-        return np.concatenate([np.ravel(read(one, locate(one, scene.system), state))
-                               for one in map(scene.sensors.get, self.readings)])
+        return scene.system, [(one, locate(one, scene.system))
+                              for one in map(scene.sensors.get, self.readings)]
+
+    def _seen(self, system, located, y):
+        """Readings at an instant."""
+        state = state_of(system, self.scheme, y)
+        return np.concatenate([np.ravel(read(one, place, state)) for one, place in located])
 
     def _jacobian(self, p, scene, state):
         sizes = np.abs(p) if self._sizes is None else self._sizes
         h = STEP * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
         moved = [[(c / step, s * step, self._scene(p + s * step * unit)) for s, c in STENCIL]
                  for step, unit in zip(h, np.eye(len(p)))]
+        located = [[self._located(other) for _, _, other in some] for some in moved]
         change = self._start(moved)
         y, rows = self.history.state(0)._motion, []
         for k in range(len(self.history)):
             if k:
                 y = self.history.state(k)._motion
                 change = self._step(k, y, change, moved, h)
-            rows.append(np.array([sum(c * self._seen(other, _moved(y, s, change, i))
-                                      for c, s, other in some)
-                                  for i, some in enumerate(moved)]).T)
+            rows.append(np.array([sum(c * self._seen(*own, _moved(y, s, change, i))
+                                      for (c, s, _), own in zip(some, places))
+                                  for i, (some, places) in enumerate(zip(moved, located))]).T)
         return np.concatenate(rows)
 
     def _start(self, moved):

@@ -131,9 +131,8 @@ class Scene(Model):
             return self._system
 
     def _gradient(self):
-        scene = copy(self)
-        scene._system = None  # memory would wait for the garbage collection of a circle
-        return partial(Gradient, scene)
+        # a copy has no equations: with self, memory would wait for the collection of a circle
+        return partial(Gradient, copy(self))
 
     @property
     def free(self) -> Array:

@@ -555,7 +555,7 @@ def evaluated(what: str, function: Callable[..., Any], x: Array, y: Array) -> Ar
     out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
     if not np.all(out > 0.0):
         k = np.unravel_index(np.argmin(out), out.shape)
-        raise InputError(f"the {what} must be positive all over the body: the function returns "
+        raise InputError(f"{what}(x, y) must be positive all over the body: the function returns "
                          f"{out[k]:.6g} at x = {x[k]:.6g}, y = {y[k]:.6g}")
     return out
 

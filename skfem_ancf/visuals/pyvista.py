@@ -218,7 +218,7 @@ def view(state: Any, field: Any = None, plotter: Any = None, *,
     if len(scenery.walls[0]):
         plotter.add_mesh(_lines(scenery.walls[0]), color=WALL, line_width=2, lighting=False)
     title = f"load {state.load:g}" if state.t is None else f"t = {state.t:g}"
-    plotter.add_text("\n".join([title, scenery.note][:1 + bool(scenery.note)]),
+    plotter.add_text("\n".join(filter(None, (title, scenery.note))),
                      position="upper_left", font_size=9, color="#444444", name="title")
     plotter.set_background("white")
     plotter.enable_parallel_projection()

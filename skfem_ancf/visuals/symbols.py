@@ -121,7 +121,7 @@ class Sketch:
 
     def _value(self, s, what):
         """Text and value, with the unit of a force or moment."""
-        unit = unit_of_resultant(what, self.units) if what else ""
+        unit = unit_of_resultant(what, self.units)
         if unit and s.per:
             unit += f"/{self.units[1]}" + "^2" * (s.per == 2)
         return s.text + (rounded(abs(s.value), unit) if unit else f"{abs(s.value):.6g}")

@@ -52,8 +52,7 @@ class OnLine(ComposedJoint):
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
-        x, y = self.normal
-        return (Symbol("slider", (at,), (np.array([-y, x]) / np.hypot(x, y),)),)
+        return (_slider(at, self.normal),)
 
 
 class OnCircle(ComposedJoint):
@@ -89,8 +88,13 @@ class OnCircle(ComposedJoint):
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
-        x, y = at.start - self.center
-        return (Symbol("slider", (at,), (np.array([-y, x]) / np.hypot(x, y),)),)
+        return (_slider(at, at.start - self.center),)
+
+
+def _slider(at: Vector, normal: Array) -> Symbol:
+    """The symbol at a point that slides across a normal (2,)."""
+    x, y = normal / np.hypot(*normal)
+    return Symbol("slider", (at,), (np.array([-y, x]),))
 
 
 # the axis of a beam as a curve, and the closest point on it
