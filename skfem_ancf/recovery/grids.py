@@ -85,14 +85,19 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
                         body.outline_at(state.u_of(body)) - x, "polygon",
                         np.arange(x.shape[1])[None], np.zeros(1, dtype=int), 1, None))
     for k, domain in enumerate(getattr(getattr(state, "system", None), "domains", ())):
-        x, u, gradient, cells = drawn(domain, state._places_of(domain))
+        values, cells = values_of_domain(state, domain)
         number = domain.basis.mesh.nelements
-        values = DomainValues(domain, x, u, gradient)
-        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, x, values.u,
+        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, values.x, values.u,
                         "triangle" if cells.shape[1] == 3 else "quad", cells,
                         np.repeat(np.arange(number), len(cells) // number), 1,
                         values))
     return out
+
+
+def values_of_domain(state: Any, domain: Any) -> tuple[DomainValues, Array]:
+    """Values of a domain at points of its cells, and the cells of a grid."""
+    *at, cells = drawn(domain, state._places_of(domain))
+    return DomainValues(domain, *at), cells
 
 
 def _between(mesh, n, rows):
