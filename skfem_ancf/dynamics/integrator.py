@@ -19,11 +19,11 @@ from ..core.types import Array
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import Motion, Scheme, in_steps, interpolate
-from .convergence import FAILURES, new_state
 from .time_functions import SAMPLES, TimeFunctions, TimeValues, rates
 from .energy_momentum import EnergyMomentum
-from .records import (Dampers, JointMotion, JointMotions, LowRankRows, Matrices, Rule, StepData,
-                      acceleration_of_joints, drive_rate, mass_factor, new_work, solve_rows)
+from .records import (FAILURES, Dampers, JointMotion, JointMotions, LowRankRows, Matrices, Rule,
+                      StepData, acceleration_of_joints, drive_rate, mass_factor, new_state,
+                      new_work, solve_rows)
 from .steps import steps
 from .tangent import factors
 
