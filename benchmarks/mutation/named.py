@@ -182,7 +182,7 @@ NAMED = [
      "factors = load * tables.factors(np.array([t]))[0]",
      "factors = tables.factors(np.array([t]))[0]",
      "test_tangent_of_a_moment_that_varies"),
-    ("joints: slope of the first time at all", "actions/joints/base.py",
+    ("joints: slope of the first time at all", "actions/bound.py",
      "np.array([self.jacobian(zero, t) for t in times])",
      "np.array([self.jacobian(zero, times[0]) for t in times])",
      "test_slope_of_a_joint_that_does_not_say_it"),

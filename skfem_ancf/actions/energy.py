@@ -19,7 +19,8 @@ from ..core.errors import (InputError, MissingExtra, NameUnknown, ask, require_f
                            require_function, require_slope, shown)
 from ..core.quadrature import gauss, product_rule
 from ..core.types import Array, Place, TimeFunction
-from .item import Item, at_generic_displacements
+from .bound import at_generic_displacements
+from .item import Item
 from .loads import Load
 
 # loads given by densities at points, for all local functions at once

@@ -13,10 +13,10 @@ from weakref import proxy
 import numpy as np
 from scipy import sparse
 
-from ..actions.forces.base import ForceElement
+from ..actions.bound import BoundConstraint, BoundForce
 from ..actions.forces.kernels import add_resisting_force
 from ..actions.forces.system import DomainForce, Forces
-from ..actions.joints.base import Joint, UnitDirector
+from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
@@ -174,8 +174,8 @@ class System:
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
-                 joints: Sequence[Joint] = (), damping: Damping | None = None,
-                 elements: Sequence[ForceElement] = (), bodies: Sequence[RigidBody] = (),
+                 joints: Sequence[BoundConstraint] = (), damping: Damping | None = None,
+                 elements: Sequence[BoundForce] = (), bodies: Sequence[RigidBody] = (),
                  rest_modes: Callable[[System, int], tuple[Array, Array]] | None = None,
                  domains: Sequence[Domain] = ()) -> None:
         self._given: tuple[Any, ...] = (

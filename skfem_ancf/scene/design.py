@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..actions.forces.base import derivative
+from ..actions.bound import derivative
 from ..core.errors import (ConvergenceError, InputError, MissingExtra, NameUnknown, ask, ask_array,
                            require_finite, require_function, shown)
 from ..core.linalg import NO_FACTORS
