@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import wraps
 from itertools import accumulate, count, pairwise
 from math import sqrt
@@ -170,7 +169,7 @@ class System:
     units : tuple of str or None
         Units of force and length, for plots and files.
     clock : float or None
-        The time of functions of time in statics, see :meth:`stopped_at`; None for full load.
+        The time of functions of time in statics, see :meth:`at`; None for full load.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
@@ -297,14 +296,13 @@ class System:
 
     # loads
 
-    @contextmanager
-    def stopped_at(self, t: float) -> Iterator[None]:
-        """Evaluate functions of time at t in statics."""
-        before, self.clock = self.clock, t
-        try:
-            yield
-        finally:
-            self.clock = before
+    def at(self, t: float) -> System:
+        """The equations in which functions of time are those at t in statics; all else is shared.
+        """
+        other = object.__new__(System)
+        vars(other).update(vars(self), clock=t, backend=self.backend, solver=self.solver,
+                           _whole=self._whole or self)
+        return other
 
     def external_force(self, u: Array, t: float | None = None) -> Array:
         """The force of all loads at full size, shape (N,)."""

@@ -22,7 +22,7 @@ class KernelElement(NamedTuple):
     numbers: tuple[float, ...]
 
 
-class ForceElement(Item, BoundForce):
+class ForceElement(BoundForce, Item):
     """Forces on points and sections of beams as functions of positions, velocities and time.
 
     A user-defined element, for :meth:`skfem_ancf.Scene.add`, is a subclass that defines

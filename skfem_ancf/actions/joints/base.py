@@ -42,7 +42,7 @@ def rotation(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-class Joint(Item, BoundConstraint):
+class Joint(BoundConstraint, Item):
     """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
 
     :meth:`bind` finds the points of a joint in a scene; ``u`` is the displacement of all its
