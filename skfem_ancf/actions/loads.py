@@ -12,14 +12,13 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..beam.beam import Beam
-from ..beam.distribution import (AXIS, Distribution, Sampled, on_facets, on_points,
-                                 stations_of_vector)
+from ..beam.distribution import (AXIS, Distribution, Sampled, add_nodal, divided, on_facets,
+                                 on_points, stations_of_vector, surfaces_of)
 from ..beam.domain import Domain
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moments
 from ..beam.kinematics import direction, element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam, WhichMember
 from ..beam.rigid import RigidBody, on_body
-from ..beam.surfaces import add_nodal, divided, surfaces_of
 from ..core.errors import (AncfError, InputError, ModelWarning, ask_field, ask_number,
                            require_finite, require_finite_scalar, require_function, require_slope,
                            sample, shown, warn)

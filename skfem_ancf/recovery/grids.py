@@ -31,24 +31,17 @@ MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 
 class Grid(NamedTuple):
-    """One member as points and cells.
-
-    ``x`` and ``u`` are reference positions and displacements, (2, n). ``kind`` is meshio's name of
-    the cells: "quad", "triangle", "VTK_LAGRANGE_QUADRILATERAL" or "polygon"; ``cells`` (nc, k) are
-    point numbers, ``elements`` (nc,) their elements. ``rows`` points across a section are
-    consecutive. ``values`` are those of a beam or domain, None for a rigid body. ``between`` (2, k)
-    are numbers of coincident points of neighbouring elements.
-    """
+    """One member as points and cells."""
 
     name: str
-    x: Array
-    u: Array
-    kind: str
-    cells: Array
-    elements: Array
-    rows: int
-    values: Values | DomainValues | None
-    between: Array = np.zeros((2, 0), dtype=int)
+    x: Array  # reference positions, (2, n)
+    u: Array  # displacements, (2, n)
+    kind: str  # of the cells, by meshio's name
+    cells: Array  # point numbers, (nc, k)
+    elements: Array  # of the cells, (nc,)
+    rows: int  # so many points across a section are consecutive
+    values: Values | DomainValues | None  # None for a rigid body
+    between: Array = np.zeros((2, 0), dtype=int)  # coincident points of neighbouring elements
 
     def points(self, undeformed: bool = False) -> Array:
         """Positions with a zero third component, shape (n, 3)."""
@@ -63,7 +56,11 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
     is one Lagrange cell.
     """
     require_like("state", state, "State", "beams", "u_of")
-    m, n = subdivision(subdivide)
+    try:
+        m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in subdivide)
+    except (TypeError, ValueError, InputError):
+        raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
+                         f"and across an element, got {shown(subdivide)}") from None
     lagrange, recover = require_flag("lagrange", lagrange), require_flag("recover", recover)
     total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
     if total > MAX_POINTS and not lagrange:
@@ -74,11 +71,14 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
         values, ne = values_on_grid(state, beam, X, recover), beam.mesh.nelements
         start = X.shape[-1] * np.arange(ne)
         rows = X.shape[-1] // (1 + m) if not lagrange else round(X.shape[-1] ** 0.5)
+        # first points of elements that are joined to the one before, whose last ones are there
+        next_ones = 1 + np.flatnonzero(beam.mesh.t[1, :-1] == beam.mesh.t[0, 1:])
+        first = start[next_ones, None] + np.arange(rows)
         out.append(Grid(f"beam {k}" if beam.name is None else beam.name, values.x, values.u,
                         "VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
                         (start[:, None, None] + local).reshape(-1, local.shape[1]),
                         np.repeat(np.arange(ne), len(local)), rows, values,
-                        _between(beam.mesh, X.shape[-1], rows)))
+                        np.array([first - rows, first]).reshape(2, -1)))
     for k, body in enumerate(getattr(state, "bodies", ())):
         x = body.outline_at(np.zeros(4))
         out.append(Grid(f"body {k}" if body.name is None else body.name, x,
@@ -98,27 +98,6 @@ def values_of_domain(state: Any, domain: Any) -> tuple[DomainValues, Array]:
     """Values of a domain at points of its cells, and the cells of a grid."""
     *at, cells = drawn(domain, state._places_of(domain))
     return DomainValues(domain, *at), cells
-
-
-def _between(mesh, n, rows):
-    """Last points of elements and first points of the next ones, (2, k); n points each."""
-    e = np.flatnonzero(mesh.t[1, :-1] == mesh.t[0, 1:])[:, None]
-    first = n * (e + 1) + np.arange(rows)
-    return np.array([first - rows, first]).reshape(2, -1)
-
-
-def subdivision(subdivide: Any) -> tuple[int, int]:
-    """Checked numbers of intervals along and across an element."""
-    try:
-        m, n = subdivide
-    except (TypeError, ValueError):
-        m = n = None
-    try:
-        m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in (m, n))
-        return m, n
-    except InputError:
-        raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
-                         f"and across an element, got {shown(subdivide)}") from None
 
 
 def in_space(x: Array) -> Array:
@@ -200,19 +179,10 @@ class Body(NamedTuple):
 
 def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenient: bool = False,
             share: bool = True) -> Body:
-    """The points, cells and arrays of a grid.
+    """The points, cells and arrays of a grid; undefined values are NaN.
 
-    Parameters
-    ----------
-    grid, fields
-        The member and its fields; undefined values are NaN.
-    undeformed
-        Points in the reference configuration.
-    lenient
-        Fields that a material does not define are NaN; by default they raise InputError.
-    share
-        Merge the coincident points of neighbouring elements where the displacement and all fields
-        are continuous; otherwise each element has its own points.
+    ``lenient``: so are fields that a material does not define, instead of an InputError. ``share``:
+    neighbouring elements share points where the displacement and all fields are continuous.
     """
     points, cells = grid.points(undeformed), grid.cells
     data = {field.name: _array(field, grid, lenient) for field in fields}

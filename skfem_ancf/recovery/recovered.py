@@ -42,8 +42,8 @@ from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from ..mesh.numbering import by_element
 from ..sections.across import SIDE, off_ends
-from .section_forces import (AcrossPoints, ArcLength, Intervals, NotFound, NotRecovered,
-                             SectionForces, Sections, Together)
+from .section_forces import (ArcLength, Intervals, NotFound, NotRecovered, SectionForces, Sections,
+                             Together)
 
 #: Largest relative change of the strain in the last round, and strain that is round-off.
 UNSETTLED, TINY = 0.01, 1e-12
@@ -191,7 +191,7 @@ class Segment:
         moved = np.zeros(len(xi))  # loads may jump at ends inside elements
         moved[0], moved[-1] = SIDE, -SIDE
         xi = xi + moved * ((xi > 0.0) & (xi < 1.0))
-        self.points = at = r.points(e, xi)
+        self.points = at = r.intervals.points(r._heights(e, xi))
         sections = Sections(self.beam, e, xi, at.eta, self.forces.lifted, r.geometry)
         axis = Sections(self.beam, e, xi, mapping=r.geometry)
         X, speed = off_ends(sections.X), np.hypot(*axis.J[:, 0, :, 0])
@@ -555,10 +555,6 @@ class Recovery:
 
     def _heights(self, e, xi):
         return (self.beam.mesh.mapping().height(xi[:, None], e)[0] + 0.0 * xi[:, None])[:, 0]
-
-    def points(self, e: Array, xi: Array) -> AcrossPoints:
-        """The :class:`.AcrossPoints` across sections at xi of elements e, shapes (n,)."""
-        return self.intervals.points(self._heights(e, xi))
 
     def modulus(self, strain: Array) -> Array:
         """dS_xx / deps_xx at constant S_yy and S_xy, at strains (3, n, m)."""

@@ -8,7 +8,7 @@ the element between a node and a section gives the section force and moment.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, partialmethod
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -115,19 +115,14 @@ class Interval(NamedTuple):
 
 
 class AcrossPoints(NamedTuple):
-    """Points across sections: arrays (n, m), or (m,) if all sections are equal.
-
-    ``eta`` are the points, ``stretch`` the relative length of their interval; ``drift`` and
-    ``swell`` the derivatives of eta and log(stretch) by the height. ``axis`` and ``till_axis`` are
-    weights for the value on the axis, and for the integral from the bottom to the axis.
-    """
+    """Points across sections: arrays (n, m), or (m,) if all sections are equal."""
 
     eta: Array
-    stretch: Any
-    drift: Any
-    swell: Any
-    axis: Array
-    till_axis: Array
+    stretch: Any  # relative length of their interval
+    drift: Any  # derivative of eta by the height
+    swell: Any  # that of log(stretch)
+    axis: Array  # weights for the value on the axis
+    till_axis: Array  # and for the integral from the bottom to the axis
 
 
 class Intervals:
@@ -556,17 +551,13 @@ class Together:
     def face(self, side: int, e: Array, xi: Array) -> tuple[None, Array]:
         return None, np.stack([one.face(side, e, xi)[1] for one in self.instants], axis=1)
 
-    def body(self, at: Sections) -> Array:
-        return np.stack([one.body(at) for one in self.instants], axis=1)
+    def _stacked(self, of: str, *where: Any) -> Array:
+        return np.stack([getattr(one, of)(*where) for one in self.instants], axis=1)
 
-    def sampled(self, at: Sections, where: int) -> Array:
-        return np.stack([one.sampled(at, where) for one in self.instants], axis=1)
-
-    def eigenstrain(self, X: Array, e: Array) -> Array:
-        return np.stack([one.eigenstrain(X, e) for one in self.instants], axis=1)
-
-    def tangent(self, axis: Sections) -> Array:
-        return np.stack([one.tangent(axis) for one in self.instants], axis=1)
+    body = partialmethod(_stacked, "body")
+    sampled = partialmethod(_stacked, "sampled")
+    eigenstrain = partialmethod(_stacked, "eigenstrain")
+    tangent = partialmethod(_stacked, "tangent")
 
 
 def _traction(beam, traction, X, e):

@@ -50,7 +50,7 @@ class ForceElement(BoundForce, Item):
         It acts along a beam instead of on a few points.
     along
         For a distributed element, once bound: the beam and the location of its parts, as returned
-        by :func:`skfem_ancf.beam.surfaces.groups_of`; None if not known.
+        by :func:`skfem_ancf.beam.distribution.groups_of`; None if not known.
     links
         The result of :meth:`bind`, once bound.
     groups

@@ -21,21 +21,6 @@ from ..item import Item
 from ..places import Vector, products
 
 
-def gradients(*equations: list) -> tuple[Array, Array, Array]:
-    """Nonzero entries of a Jacobian."""
-    none = np.zeros(0, dtype=int)
-    rows, columns, values = [none], [none], [np.zeros(0)]
-    for k, terms in enumerate(equations):
-        for vector, direction in terms:
-            found = vector.entries(direction)
-            rows.append(np.full(len(found[0]), k))
-            columns.append(found[0])
-            values.append(found[1])
-    i, j, v = map(np.concatenate, (rows, columns, values))
-    keep = v != 0.0
-    return i[keep], j[keep], v[keep]
-
-
 def rotation(angle: float) -> Array:
     """The rotation matrix."""
     c, s = np.cos(angle), np.sin(angle)
@@ -121,9 +106,8 @@ class Joint(BoundConstraint, Item):
 
 def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
     """Names of the equations between the first of n beams and each of the others."""
-    if n == 2:
-        return tuple(names)
-    return tuple(f"{name}, from number {k}" for k in range(1, n) for name in names)
+    return tuple(names) if n == 2 else tuple(
+        f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
 def angle_to(d: ArrayLike, e: ArrayLike) -> float:
@@ -131,69 +115,61 @@ def angle_to(d: ArrayLike, e: ArrayLike) -> float:
     return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
 
 
-# equations of joints: their value at displacements u (N,) of the scene, their derivative for
-# :func:`gradients`, and a factor times their second derivative, rows, columns and values (k,)
+# equations of joints
 
-class Affine:
-    """The sum of ``direction . vector`` over pairs of both, less a constant."""
+class Equation:
+    """The sum of ``n . v`` over pairs of a vector and a direction, plus ``d . M e``, less a number.
 
-    def __init__(self, *pairs: tuple[Vector, Any], less: float = 0.0) -> None:
-        self.pairs, self.less = pairs, less
+    Vectors v, d and e are affine in the degrees of freedom u (N,) of the scene; M is (2, 2).
+    """
 
-    def value(self, u: Array) -> float:
-        return sum(float(direction @ vector(u)) for vector, direction in self.pairs) - self.less
-
-    def terms(self, u: Array) -> Sequence[Any]:
-        return self.pairs
-
-    def second(self, factor: float) -> tuple[Array, Array, Array]:
-        none = np.zeros(0, dtype=int)
-        return none, none, np.zeros(0)
-
-
-class Aligned:
-    """``(Q e) x d``: zero if d is parallel to e rotated by Q."""
-
-    def __init__(self, d: Vector, e: Vector, Q: Array) -> None:
-        self.d, self.e, self.Q = d, e, Q
+    def __init__(self, *pairs: tuple[Vector, Any],
+                 product: tuple[Vector, Vector, Array] | None = None, less: float = 0.0) -> None:
+        self.pairs, self.product, self.less = pairs, product, less
 
     def value(self, u: Array) -> float:
-        e, d = self.Q @ self.e(u), self.d(u)
-        return e[0] * d[1] - e[1] * d[0]
+        out = -self.less
+        if self.product is not None:
+            d, e, M = self.product
+            out += float(d(u) @ M @ e(u))
+        return out + sum(float(direction @ vector(u)) for vector, direction in self.pairs)
 
     def terms(self, u: Array) -> Sequence[Any]:
-        e, d = self.Q @ self.e(u), self.d(u)
-        return [(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ self.Q)]
+        """Pairs of vectors and directions whose products have the same derivative at u."""
+        if self.product is None:
+            return self.pairs
+        d, e, M = self.product
+        both = [(d, (M + M.T) @ d(u))] if d is e else [(d, M @ e(u)), (e, d(u) @ M)]
+        return [*self.pairs, *both]
 
     def second(self, factor: float) -> tuple[Array, Array, Array]:
-        J = np.array([[0.0, -1.0], [1.0, 0.0]]) @ self.Q  # (Q e) x d = -d^T [[0, 1], [-1, 0]] Q e
-        rows, columns, values = products(self.d, self.e, factor * J)
+        """A factor times the second derivative: rows, columns and values (k,)."""
+        if self.product is None:
+            none = np.zeros(0, dtype=int)
+            return none, none, np.zeros(0)
+        d, e, M = self.product
+        if d is e:
+            return products(d, d, factor * (M + M.T))
+        rows, columns, values = products(d, e, factor * M)
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
 
 
-class Distant:
+def aligned(d: Vector, e: Vector, Q: Array) -> Equation:
+    """``(Q e) x d``: zero if d is parallel to e rotated by Q."""
+    return Equation(product=(d, e, np.array([[0.0, -1.0], [1.0, 0.0]]) @ Q))
+
+
+def distant(d: Vector, R: float) -> Equation:
     """``(|d|^2 - R^2) / (2 R)``: zero if a vector d has the length R."""
-
-    def __init__(self, d: Vector, R: float) -> None:
-        self.d, self.R = d, R
-
-    def value(self, u: Array) -> float:
-        d = self.d(u)
-        return float(d @ d - self.R**2) / (2 * self.R)
-
-    def terms(self, u: Array) -> Sequence[Any]:
-        return [(self.d, self.d(u) / self.R)]
-
-    def second(self, factor: float) -> tuple[Array, Array, Array]:
-        return products(self.d, self.d, factor / self.R * np.eye(2))
+    return Equation(product=(d, d, 0.5 / R * np.eye(2)), less=0.5 * R)
 
 
 class ComposedJoint(Joint):
-    """A joint whose equations are some of the above, which :meth:`bind` sets."""
+    """A joint whose equations are :class:`Equation`, which :meth:`bind` sets."""
 
-    parts: Sequence[Any] = ()
+    parts: Sequence[Equation] = ()
 
-    def parts_at(self, t: float) -> Sequence[Any]:
+    def parts_at(self, t: float) -> Sequence[Equation]:
         """The equations at a time."""
         return self.parts
 
@@ -201,7 +177,17 @@ class ComposedJoint(Joint):
         return np.array([part.value(u) for part in self.parts_at(t)])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients(*(part.terms(u) for part in self.parts_at(t)))
+        none = np.zeros(0, dtype=int)
+        rows, columns, values = [none], [none], [np.zeros(0)]
+        for k, part in enumerate(self.parts_at(t)):
+            for vector, direction in part.terms(u):
+                found = vector.entries(direction)
+                rows.append(np.full(len(found[0]), k))
+                columns.append(found[0])
+                values.append(found[1])
+        i, j, v = map(np.concatenate, (rows, columns, values))
+        keep = v != 0.0
+        return i[keep], j[keep], v[keep]
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
@@ -220,7 +206,7 @@ class UnitDirector(ComposedJoint):
 
     def __init__(self, body: RigidBody, first: int) -> None:
         self.name = body.name
-        self.parts = [Distant(Vector(body.q0[2:], first + np.array([[2], [3]]), 1.0), 1.0)]
+        self.parts = [distant(Vector(body.q0[2:], first + np.array([[2], [3]]), 1.0), 1.0)]
 
 
 # independent equations of a joint
@@ -240,18 +226,13 @@ class IndependentPart(Joint):
     def __repr__(self) -> str:
         return repr(self.joint)
 
-    def bind(self, layout: Layout) -> None:  # the joint is bound already
-        pass
-
     def _of(self, rows: Array, *others: Array) -> tuple[Any, ...]:
         rows = self._number[rows]
         keep = rows >= 0
         return (rows[keep], *(x[..., keep] for x in others))
 
     def _all(self, multipliers: Array) -> Array:
-        out = np.zeros(len(self._number))
-        out[self.kept] = multipliers
-        return out
+        return np.bincount(self.kept, multipliers, len(self._number))
 
     def value(self, u: Array, t: float) -> Array:
         return np.asarray(self.joint.value(u, t))[self.kept]
