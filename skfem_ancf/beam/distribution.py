@@ -84,9 +84,7 @@ class Sampled:
         return np.append(np.nonzero(on[1:] != on[:-1])[0] + 1.0, inside)
 
     def jumps(self, nelements: int) -> Array:
-        """Axial coordinates of jumps by more than a tenth of the largest value.
-
-        Smaller jumps are interpolation errors of a smooth density.
+        """Axial coordinates of jumps by more than a tenth of the largest value; others are errors.
         """
         eta = np.array([0.0]) if self.eta is None else self.eta
         return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
@@ -155,11 +153,7 @@ def station_of_node(mesh: MeshBeam, node: int) -> float:
 
 
 def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | None:
-    """Element + xi of a nodal force that acts on sections or points; None if it is distributed.
-
-    A force at a point inside an element acts on ``r`` of both nodes; its point follows from the
-    ratio.
-    """
+    """Element + xi of a nodal force that acts on sections or points; None if it is distributed."""
     rows, t = np.asarray(vector).reshape(-1, beam.nd), beam.mesh.t
     loaded = np.nonzero(np.any(rows != 0, axis=1))[0]
     if len(loaded) == 2 and loaded[1] == loaded[0] + 1 and np.any(t[0] == loaded[0]):

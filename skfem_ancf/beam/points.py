@@ -24,10 +24,7 @@ from .strains import strain_at
 
 
 def as_points(points: Any) -> Array:
-    """Several points as an array (2, n), or one as an array (2,); MeshError for others.
-
-    A two-dimensional array has points in its columns, also with shape (2, 2).
-    """
+    """Several points as an array (2, n), or one as an array (2,); MeshError for others."""
     if isinstance(points, np.ndarray) and points.ndim == 2:
         if len(points) == 2:
             return require_finite("points", points)
@@ -197,9 +194,7 @@ class Located:
 
 
 class Points:
-    """Locates points in beams and bodies with their ``slices`` of DOFs.
-
-    ``lines`` are the line numbers of the chains of elements of a frame.
+    """Locates points in beams and bodies; ``lines`` are the line numbers of the chains of a frame.
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
@@ -209,23 +204,12 @@ class Points:
 
     def find(self, points: Any, beam: WhichMember = None, line: int | None = None,
              ask: bool = False) -> Located:
-        """Locate points; where beams or lines overlap, in the one with the nearest axis.
+        """Locate one or several points, see :func:`as_points`, or a RigidBody for its centre of
+        mass; where beams or lines overlap, in the one with the nearest axis.
 
-        Parameters
-        ----------
-        points
-            One or several, see :func:`as_points`; a RigidBody for its centre of mass; or Located.
-        beam
-            The beam or rigid body, its name or number; searched for if None.
-        line
-            The number of the line of a frame, or of the chain of elements of the beam.
-        ask
-            Raise InputError if several axes are nearest, as at a node; else the first one is used.
-
-        Raises
-        ------
-        MeshError
-            If a point is in none of the beams.
+        ``line`` is the number of the line of a frame, or of the chain of elements of the beam. With
+        ``ask`` InputError if several axes are nearest, as at a node; MeshError if a point is in no
+        beam.
         """
         if isinstance(points, Located):
             return points

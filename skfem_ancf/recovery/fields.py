@@ -547,17 +547,8 @@ def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:
 
 
 class DomainValues(Values):
-    """Fields at points of a domain; components are in global axes.
-
-    Those of the stress need a domain with a material, see :meth:`skfem_ancf.Domain.solid`.
-
-    Parameters
-    ----------
-    domain
-        The :class:`~skfem_ancf.Domain`.
-    x, u, gradient
-        Reference positions and displacements, (2, n), and the displacement gradient, (2, 2, n); for
-        a linear solution the :func:`~skfem_ancf.core.linear.step` from its base.
+    """Fields at points x of a domain, with displacements u (2, n) and their gradient (2, 2, n), or
+    :func:`~skfem_ancf.core.linear.step` of them; components are in global axes.
     """
 
     cable = False
@@ -603,9 +594,8 @@ class DomainValues(Values):
 
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
-    """Values of a beam at points of all elements, flattened.
-
-    ``X`` are points (xi, eta) in [0, 1], shape (2, npoints) or (2, nelements, npoints).
+    """Values at points (xi, eta) of all elements, (2, npoints) or (2, nelements, npoints),
+    flattened.
     """
     ne = beam.mesh.nelements
     part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),

@@ -120,11 +120,10 @@ def quads(m: int, n: int) -> Array:
 
 
 def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
-    """Points and quads of an element with m and n intervals along and across.
-
-    Each interval of the section has at least one cell, with points on both sides of jumps. Points
-    are (2, npoints), or (2, nelements, npoints) if the intervals vary along the axis.
+    """Points (2, npoints) and quads of an element with m and n intervals along and across; for
+    intervals that vary along the axis (2, nelements, npoints).
     """
+    # each interval of the section has at least one cell, with points on both sides of jumps
     sizes = np.diff(beam.across.ends())
     if len(sizes) == 1:
         return grid(m, n), quads(m, n)
@@ -141,17 +140,14 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
 
 
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
-    """Points of an element's Lagrange cell, and their VTK order.
-
-    The order is corners, edges (bottom, right, top, left, in the direction of increasing xi and
-    eta), interior with xi fastest.
-    """
+    """Points of an element's Lagrange cell, and their VTK order."""
     p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
     if p > MAX_LAGRANGE_DEGREE:
         raise InputError(f"VTK evaluates Lagrange cells up to degree {MAX_LAGRANGE_DEGREE}, this "
                          f"element has {p}: use subdivide= instead of lagrange=True")
     k = np.arange((p + 1) ** 2).reshape(p + 1, p + 1)  # [xi, eta]
     inner = slice(1, -1)
+    # corners, edges in the direction of increasing xi and eta, the interior with xi fastest
     order = np.concatenate([
         [k[0, 0], k[-1, 0], k[-1, -1], k[0, -1]],
         k[inner, 0], k[-1, inner], k[inner, -1], k[0, inner], k[inner, inner].T.ravel()])
@@ -235,10 +231,7 @@ def _array(field, grid, lenient):
 
 
 def facts_of(state: Any) -> dict[str, Array]:
-    """Field data of a file: numbers of named members, load factor, time, version.
-
-    VTK reads ``TimeValue`` as the time of the file.
-    """
+    """Field data of a file: numbers of named members, load factor, time, version."""
     from .. import __version__
 
     members = getattr(getattr(state, "system", None), "members", state.beams)
@@ -247,6 +240,6 @@ def facts_of(state: Any) -> dict[str, Array]:
     if getattr(state, "load", None) is not None:
         found["load_factor"] = np.array([state.load], dtype=float)
     if getattr(state, "t", None) is not None:
-        found["TimeValue"] = np.array([state.t], dtype=float)
+        found["TimeValue"] = np.array([state.t], dtype=float)  # VTK reads it as the time
     version = [int(number) for number in re.findall("[0-9]+", __version__)[:3]]
     return found | {"skfem_ancf_version": np.array(version)}

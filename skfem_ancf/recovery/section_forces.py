@@ -78,10 +78,9 @@ class ArcLength:
 
 
 class Interval(NamedTuple):
-    """Part of a section from ``low`` to ``high`` (eta), with nodes of a coordinate s in [0, 1].
-
-    Fields are polynomials in s. If ``curved``, ``eta = middle - half cos(pi s)``, which smooths
-    widths with square roots at the ends; otherwise eta is linear in s.
+    """Part of a section, ``low`` to ``high`` (eta), with fields polynomial in s in [0, 1]. If
+    ``curved``, ``eta = middle - half cos(pi s)``, which smooths square roots of the width at the
+    ends.
     """
 
     low: float
@@ -126,12 +125,8 @@ class AcrossPoints(NamedTuple):
 
 
 class Intervals:
-    """Points ``eta`` (m,) across a section of layers, with weights of integrals and values.
-
-    In some tapered sections the relative intervals vary along the axis; ``eta`` then belongs to the
-    highest section, and :meth:`points` gives others. ``layers`` are the columns of each layer,
-    ``width`` (m,) its relative width. ``from_bottom`` (m, m) and ``whole`` (m,) are weights of
-    integrals over eta; ``bottom`` and ``top`` of the values at the ends.
+    """Points ``eta`` (m,) across a section of layers, the highest one, with weights of integrals
+    and values; ``layers`` are columns, ``width`` (m,) is relative.
     """
 
     def __init__(self, layers: Sequence[Layer], order: int) -> None:
@@ -431,11 +426,11 @@ class SectionForces:
         return R, cross(q[:, 0].T - r, R) - _moments(q, left)
 
     def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
-        """Force (2, n) and moment (n,) about the axis, of the right part on the left.
-
-        ``begin`` (n,) are the cuts at which the segments begin. The mean of equilibrium from both
-        ends of the element is taken; next to an unknown force inside it, only the end on this side.
+        """Force (2, n) and moment (n,) about the axis, of the right part on the left, for segments
+        that begin at the cuts ``begin`` (n,).
         """
+        # the mean of equilibrium from both ends of the element; next to an unknown force inside it,
+        # only the end on this side
         side = np.full(len(e), 0.5)
         for cut in self._unknown:
             side[e == int(cut)] = np.where(begin[e == int(cut)] >= cut, 1.0, 0.0)
@@ -526,9 +521,7 @@ class SectionForces:
 
 
 class Together:
-    """Section forces of several instants with the same cuts, as one with an axis of instants.
-
-    The axis follows that of components; moments have none.
+    """Section forces of several instants with the same cuts: the axis of instants is that before n.
     """
 
     def __init__(self, instants: Sequence[SectionForces]) -> None:

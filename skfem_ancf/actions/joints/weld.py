@@ -278,16 +278,7 @@ class PrescribedPosition(ComposedJoint):
 
 
 class PrescribedDisplacement(Joint):
-    """Degrees of freedom of a place follow a function of time: ``u[dofs] = displacement(t)``.
-
-    Parameters
-    ----------
-    boundary, names, beam
-        As for a support, see :class:`~skfem_ancf.actions.supports.Support`.
-    displacement
-        A function of time, in statics of the load factor, that returns a number in the unit of the
-        degrees of freedom.
-    """
+    """Degrees of freedom of a place follow a function of time: ``u[dofs] = displacement(t)``."""
 
     moving = True
     driver = "displacement"
