@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple, get_type_hints
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..beam.strain_energy import add_viscous_force, body_tangent
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..core.callbacks import custom_joints
 from ..core.source import F1, F2, F3, I1, MADE, apart, indices, source
+from ..core.words import hints
 from ..equations.tables import Equations
 
 
@@ -327,8 +328,7 @@ class StepState(NamedTuple):
 
 def new_state() -> StepState:
     """The StepState before the first step."""
-    return StepState._make(np.zeros(1, int if hint is I1 else float)
-                           for hint in get_type_hints(StepState, include_extras=True).values())
+    return StepState._make(np.zeros(1, int if hint is I1 else float) for hint in hints(StepState))
 
 
 #: Arguments of the functions of a step: equations, matrices, rule, step, work and state.

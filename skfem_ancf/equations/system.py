@@ -26,7 +26,7 @@ from ..beam.points import Points
 from ..beam.rigid import RigidBody
 from ..core.immutable import cached_property
 from ..core.errors import InputError
-from ..core.linalg import BandMatrix
+from ..core.band import BandMatrix
 from ..core.types import Array
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
@@ -449,7 +449,7 @@ class System:
 
     def new_band(self) -> BandMatrix:
         """A zero band matrix."""
-        return BandMatrix(self.N, self.bandwidth, self.symmetric)
+        return BandMatrix.zeros(self.N, self.bandwidth, self.symmetric)
 
     @shared
     def mass(self) -> BandMatrix:

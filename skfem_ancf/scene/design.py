@@ -13,7 +13,7 @@ from scipy import sparse
 from ..actions.bound import derivative
 from ..core.errors import (ConvergenceError, InputError, MissingExtra, NameUnknown, ask, ask_array,
                            require_finite, require_function, shown)
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of

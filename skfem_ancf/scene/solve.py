@@ -245,7 +245,7 @@ def _linear_solver(s, dynamic):
     if not dynamic and s.solver.coupled and (
             not s.constraints.few or s.forces.far or not s.symmetric):
         return "sparse LU on the null space of the joints"
-    solver = f"banded {'Cholesky' if s.symmetric else 'LU'}, half bandwidth {s.K.bandwidth}"
+    solver = f"banded {'Cholesky' if s.symmetric else 'LU'}, half bandwidth {s.K.width}"
     solver += "" if s.symmetric else ": a force has no potential"
     if s.constraints.m:
         solver += f", with a Schur complement for the {s.constraints.m} equations of joints"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
                            require_function, require_integer, require_positive, shown)
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.types import Array
 from ..equations.convergence import is_balanced, is_small, rules_of

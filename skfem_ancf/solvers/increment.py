@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.errors import ConvergenceError
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..equations import stability
 from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, NEVER, rules_of

@@ -14,7 +14,7 @@ from ..beam.kinematics import bent
 from ..core.immutable import cached_property
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
                            require_flag, require_integer, require_option, require_positive)
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.types import Array
 from ..equations import stability
