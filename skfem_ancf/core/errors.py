@@ -264,7 +264,7 @@ def require_index(name: str, value: object, n: int) -> int:
     return require_integer(name, value, -n, n - 1) % n
 
 
-_FLOAT = np.dtype(float)
+_FLOAT, _NUMBERS = np.dtype(float), {int, float, np.float64}
 
 
 def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None,
@@ -275,7 +275,8 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     """
     given = array
     if not (type(array) is np.ndarray and array.dtype is _FLOAT):
-        require_unmasked(name, given)
+        if type(given) is not tuple or not _NUMBERS.issuperset(map(type, given)):
+            require_unmasked(name, given)
         try:
             array = np.asarray(given)
             if array.dtype.kind == "c":
@@ -284,7 +285,7 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
             if not (array.dtype.kind in "iuf" or array.dtype.kind == "O" and all(
                     map(_is_real, array.flat))):
                 raise TypeError
-            array = array.astype(np.float64)
+            array = array.astype(np.float64, copy=False)
         except OverflowError:
             raise InputError(f"{name} has a value that is too large for a float: {shown(given)}"
                              ) from None
@@ -335,16 +336,16 @@ def require_increasing(name: str, values: Any) -> Array:
 
 def require_point(point: Any) -> Array:
     """A material point as an array (2,); else MeshError."""
-    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and all(
-            type(x) in (float, int, np.float64) or not (
-                isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x))
-            for x in point):
+    if isinstance(point, (list, tuple, np.ndarray)) and len(point) == 2 and (
+            _NUMBERS.issuperset(map(type, point)) or not any(
+                isinstance(x, (list, tuple, str, bytes, bool, np.bool_)) or np.ndim(x)
+                for x in point)):
         return require_finite("a material point", point, (2,))
     raise MeshError("a material point has two coordinates (x, y) in the reference configuration, "
                     f"or is the name of an end, as 'right', got {shown(point)}")
 
 
-_PLAIN = {int, float, str, bool, np.float64, np.int64, type(None)}
+_PLAIN = {*_NUMBERS, str, bool, np.int64, type(None)}
 
 
 def is_masked(value: object) -> bool:

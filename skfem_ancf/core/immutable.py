@@ -129,7 +129,7 @@ class Immutable(metaclass=_Freezing):
     _frozen = False
 
     def _freeze(self):
-        attributes = vars(self)
+        attributes = self.__dict__
         for name, value in attributes.items():
             if np.ndarray in type(value).__mro__ and value.flags.writeable:
                 attributes[name] = value = value.copy()

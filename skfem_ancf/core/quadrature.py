@@ -114,7 +114,6 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     x, degree = np.asarray(xi), 2 * m - 1 - derivative
     if degree < 0:
         return np.zeros((2 * m,) + x.shape)
-    k = _POWERS[:degree + 1]
-    if x.ndim == 1:
-        return _hermite_coefficients(m, derivative) @ ((x + 0.0)**k * (1.0 - x) ** k[::-1])
-    return hermite_basis(m, x.ravel(), derivative).reshape((2 * m,) + x.shape)
+    k, flat = _POWERS[:degree + 1], x.reshape(-1) + 0.0
+    out = _hermite_coefficients(m, derivative) @ (flat**k * (1.0 - flat) ** k[::-1])
+    return out.reshape((2 * m,) + x.shape)

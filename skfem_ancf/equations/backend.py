@@ -206,7 +206,7 @@ class Backend:
 
     def keep_factors(self) -> None:
         """Let the tangent have the factors of the last compiled iteration."""
-        self.tables.system.K.factors = self._flat[0].factors
+        self.tables.system.K.take_factors(self._flat[0].factors)
 
     def _give_up(self, kernel, error):
         if isinstance(error, code_cache.NotCompiled):
@@ -221,37 +221,39 @@ class Backend:
         """The compiled function, and its equations in ``_flat``; announces long compilations."""
         global _worked
         name = kernel.__name__
-        if self._flat is None or name not in LOADED:
+        missing = self._missing(name)
+        if missing:
             from ..core.jit import entry
-            from . import loops
 
-            missing = self._missing(name)
             if not code_cache.on_disk(*missing):
                 _worked = 0.0
             with _LOCK, announced(missing) as update:
                 for part in self._parts(name):
                     load_part(part, update)
-                self._flatten(loops)
+                equations, *_ = self._flatten()
                 if name not in LOADED:
-                    LOADED[name] = entry(kernel, (self._flat[0], *args))
+                    LOADED[name] = entry(kernel, (equations, *args))
                     code_cache.note(name)
                     update(name)
+        self._flatten()
         return LOADED[name]
 
-    def _flatten(self, loops):
+    def _flatten(self):
         """Make the equations for compiled code; returns them."""
         if self._flat is None:
+            from . import loops
+
             plain = self.tables.plain
             self._flat = loops.flat(plain) if self._base is None else loops.flat_after(
-                self._base._flatten(loops), plain)
+                self._base._flatten(), plain)
         return self._flat
 
 
 def load_part(name: str, update: Callable[[str], None]) -> None:
     """Compile a part or load it; calls ``update(name)``."""
-    from ..core import jit
-
     if name not in LOADED:
+        from ..core import jit
+
         jit.load_part(name)
         LOADED[name] = True
         code_cache.note(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class Histories:
         sizes = [sum(map(history_size, beam.kernel.tables)) for beam, _ in some]
         items, self._beams, self._all = forces.remembering, some, list(beams)
         keys = [id(beam) for beam, _ in some] + [item.element._key for item in items]
-        ends = np.cumsum([first, *sizes, *(len(item.start) for item in items)]).tolist()
+        ends = list(accumulate([first, *sizes, *(len(item.start) for item in items)]))
         self._parts: dict[Any, slice] = {
             key: slice(a, b) for key, a, b in zip(keys, ends, ends[1:])}
         self._end = ends[len(some)]
@@ -65,9 +66,11 @@ class Histories:
         self.of_beams = self._past(slice(first, self._end))
         self._kernels: dict[int, Any] = {}
         self.span[0] = span
-        self.forces = forces.after(self.of_forces, [
-            (self.values[self._parts[item.element._key]], self.span)
-            for item in forces.remembering])
+        self.forces = forces
+        if self.values.size:
+            self.forces = forces.after(self.of_forces, [
+                (self.values[self._parts[item.element._key]], self.span)
+                for item in forces.remembering])
 
     def _past(self, part):
         return Past(self.values[part], self.span, self._now[part])

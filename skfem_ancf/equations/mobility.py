@@ -207,7 +207,9 @@ def _motions(c, joints):
             others = joints[len(frame.equations):] @ motions
             held = sparse.vstack([held, others]) if number > 1 else np.concatenate([held, others])
         return motions, held, lambda: [(name, origin, c.size) for name in frame.describe(parts)]
-    values = [member.rigid_motions() / (1.0, 1.0, member.size) for member in c.members]
+    values = [member.rigid_motions().copy() for member in c.members]
+    for motions, member in zip(values, c.members):
+        motions[:, 2] /= member.size
     if len(values) == 1:
         out = values[0]
     elif c.N <= DENSE:

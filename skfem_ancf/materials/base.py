@@ -90,7 +90,7 @@ class Material(Immutable):
             require_positive("shear_correction", shear_correction))
         self.thermal_expansion = require_finite_scalar("thermal_expansion", thermal_expansion)
         self.strength: float | tuple[float, float] | None = strength
-        if np.ndim(strength) > 0:  # type: ignore[arg-type]
+        if strength is not None and np.ndim(strength) > 0:
             tension, compression = require_finite("strength", strength, (2,))
             self.strength = (require_positive("strength", tension),
                              require_positive("strength", compression))

@@ -20,11 +20,11 @@ from ..core.errors import (FileError, InputError, MeshError, NameUnknown, requir
                            require_finite_scalar, require_function, require_integer,
                            require_moderate, require_option, require_options, require_path,
                            require_positive, require_unmasked, shown)
-from ..core.immutable import cached_property, is_builtin, packed
+from ..core.immutable import Immutable, cached_property, is_builtin, packed
 from ..core.types import Array, StrPath
 from .curve import Curve, axis_of, check_curvature, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
-from .numbering import NODAL, ElementBeamP1, NumberedMesh, default_tags, halved
+from .numbering import ElementBeamP1, NumberedMesh, default_tags, halved
 from .places import Finder, as_point, is_point, points_of_rows
 
 EPS = float(np.finfo(float).eps)
@@ -259,11 +259,19 @@ class MeshBeam(NumberedMesh):
 
     @classmethod
     def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
-        height, heights, taper = heights
+        made, (height, heights, taper) = object.__new__(cls), heights
         tangent = tangent + np.zeros(p.shape)
-        return cls(p, t, default_tags(p, t), height=height, p_X=tangent, lengths=lengths, s=s,
-                   p_Y=np.array([0.0 - tangent[1], tangent[0]]), curve=curve, heights=heights,
-                   taper=taper, p_XY=np.zeros(p.shape) if turning is None else turning)
+        # without __post_init__, which checks the shapes and numbers of given arrays
+        vars(made).update(
+            doflocs=require_moderate("the nodes", p), t=t, _boundaries=default_tags(p, t),
+            _subdomains=None, height=height, p_X=tangent, lengths=lengths, s=s, curve=curve,
+            p_Y=np.array([0.0 - tangent[1], tangent[0]]), heights=heights, taper=taper,
+            p_XY=np.zeros(p.shape) if turning is None else turning)
+        if curve is None:
+            vars(made)["is_straight"] = True
+        made._check()
+        Immutable._freeze(made)
+        return made
 
     @classmethod
     def init_refdom(cls) -> MeshBeam:
@@ -307,18 +315,23 @@ class MeshBeam(NumberedMesh):
                 found = require_finite(name, value, wanted)
                 if found is not value:
                     setattr(self, name, found)
-        chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
-        has_length = (chord > 4 * EPS * np.abs(p).max()) & (self.lengths > 0.0)
-        if not has_length.all():
-            k = int(np.argmin(has_length))
-            a, b = p[:, t[:, k]].T.tolist()
-            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
         if self.heights is not None and not np.all(self.heights > 0.0):
             raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
         require_option("interpolation of the sections", self.sections, SECTIONS)
         if self.p_XY is None and self.sections != "linear":
             raise MeshError("the mesh has no derivative p_XY of its directors: build it with "
                             "MeshBeam.init_line or MeshBeam.init_curve")
+        self._check()
+
+    def _check(self):
+        """Raise MeshError where an element has no length, or the body folds."""
+        p, t = self.doflocs, self.t
+        chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
+        has_length = (chord > 4 * EPS * np.abs(p).max()) & (self.lengths > 0.0)
+        if not has_length.all():
+            k = int(np.argmin(has_length))
+            a, b = p[:, t[:, k]].T.tolist()
+            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
         self._mapping().check()
 
     def with_sections(self, sections: str) -> MeshBeam:
@@ -420,10 +433,12 @@ class MeshBeam(NumberedMesh):
             return False
         # the round-off of the nodes' positions is no difference in length
         noise = 8 * EPS * np.abs(self.doflocs).max()
-        lengths, of_chains = self.lengths, self.chain_lengths
-        return bool(np.ptp(lengths) <= 1e-13 * lengths.max() + noise
-                    and np.ptp(self.p_X, axis=1).max() <= 1e-12 + noise / lengths.min()
-                    and np.ptp(of_chains) <= 1e-12 * of_chains.max())
+        least, most = _ends(self.lengths)
+        turn = np.abs(self.p_X - self.p_X[:, :1]).max()
+        if not (most - least <= 1e-13 * most + noise and turn <= 1e-12 + noise / least):
+            return False
+        least, most = (0.0, 0.0) if self.is_chain else _ends(self.chain_lengths)
+        return bool(most - least <= 1e-12 * most)
 
     @property
     def is_chain(self) -> bool:
@@ -548,11 +563,13 @@ class MeshBeam(NumberedMesh):
         nodes = np.unique(self.t[:, elements])
         renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
         renumber[nodes] = np.arange(len(nodes))
-        kept = {**dict.fromkeys(NODAL, nodes), "lengths": elements, "heights": elements}
-        changes: dict[str, Any] = {name: getattr(self, name)[..., some] for name, some
-                                   in kept.items() if getattr(self, name) is not None}
-        changes.update(t=renumber[self.t[:, elements]], _boundaries=None, _subdomains=None)
-        m = replace(self, **changes)
+        m = type(self)(self.p[:, nodes], renumber[self.t[:, elements]], height=self.height,
+                     p_X=self.p_X[:, nodes], p_Y=self.p_Y[:, nodes],
+                     lengths=self.lengths[elements], curve=self.curve, sections=self.sections,
+                     heights=None if self.heights is None else self.heights[:, elements],
+                     taper=self.taper,
+                     p_XY=None if self.p_XY is None else self.p_XY[:, nodes],
+                     s=None if self.s is None else self.s[nodes])
         if self._subdomains is not None and not skip_subdomains:
             m._subdomains = {name: np.nonzero(np.isin(elements, e))[0].astype(np.int32)
                              for name, e in self._subdomains.items()}
@@ -748,9 +765,16 @@ class MeshBeam(NumberedMesh):
 
 
 def reach(meshes: Sequence[MeshBeam]) -> float:
-    """The size of a scene, to which tolerances of positions are relative: the diagonal of the
-    bounding box of all nodes, but at least the longest line (a curled line may be straightened) and
-    at most the total length of all lines.
+    """The size of a scene, to which tolerances of positions are relative.
+
+    It is the diagonal of the bounding box of all nodes, but at least the longest line (a curled
+    line may be straightened) and at most the total length of all lines.
+
+    Examples
+    --------
+    >>> from skfem_ancf.mesh.mesh_beam import reach
+    >>> reach([MeshBeam.init_line([0, 3], 0.1), MeshBeam.init_line([0, 4], 0.1, (3, 0), np.pi / 2)])
+    5.0
     """
     total = float(sum(mesh.lengths.sum() for mesh in meshes))
     if len(meshes) == 1 and meshes[0].is_chain:
@@ -759,6 +783,10 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     low = np.min([mesh.p.min(axis=1) for mesh in meshes], axis=0)
     high = np.max([mesh.p.max(axis=1) for mesh in meshes], axis=0)
     return min(total, max(longest, float(np.hypot(*(high - low)))))
+
+
+def _ends(values):
+    return values.min(), values.max()
 
 
 def _chain(n):

@@ -50,8 +50,10 @@ def off_ends(X: Array) -> Array:
 
 def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float | None = None
           ) -> Array:
-    """Elements at whose start a function ``ask(X, e)`` of reference points (2, n, k) jumps, by more
-    than ``size`` or 1e-3 of its largest value.
+    """Numbers of the elements at whose start a function jumps.
+
+    ``ask(X, e)`` returns its values (..., n, k) at reference points (2, n, k) of elements (n,).
+    ``size`` is the smallest change that counts as a jump, by default 1e-3 of the largest value.
     """
     e = np.arange(n)
     left, right = (ask(np.array([np.full((n, len(eta)), xi), np.tile(eta, (n, 1))]), e)
@@ -498,7 +500,8 @@ class Across(Immutable):
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
         if self.plain:
             layer, h = self.layers[0], self.heights(xi, tind) + np.zeros((ne, n))
-            size = h * self.breadth(layer, xi[None], tind, times=TIMES[what])
+            times = self.at(layer, xi).factor(TIMES[what]) if TIMES[what] else 1.0
+            size = h * (layer.width * times)
             if what in MODULI:
                 size = size * getattr(layer.material, MODULI[what])
             return np.array([size, 0.0 * size, size * h * h / 12.0])

@@ -126,7 +126,7 @@ class CableKernel(ElementKernel):
              self.constant[:, 2:, 2:])
         each = [len(x) > 1 for x in (G, frame, H, C)] + [False]
         return StrainTables(
-            pattern, nb * mesh.t[0].astype(np.int64), np.outer(np.arange(ne), each),
+            pattern, nb * mesh.t[0].astype(np.int64), np.arange(ne)[:, None] * each,
             *map(np.ascontiguousarray, (G[:, :, 1:], frame, H, C)),
             NO_LAW, np.zeros((0, 2 * n)), np.zeros((1, 0)))
 
@@ -201,9 +201,9 @@ class CableKernel(ElementKernel):
     @cached_property
     def _outer(self):
         """Of the reference: coordinates and lengths of the bottom and top fibres, and measures."""
-        Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
-        y = np.multiply.outer([-1.0, 1.0], np.atleast_2d(Y))
-        rest = self._measured(0.0)
+        h, rest = self._across.mesh.mapping().height(self.points)[0], self._measured(0.0)
+        Y = 0.5 * (np.full((1, 1), h) if isinstance(h, float) else h.T)
+        y = np.array([-Y, Y])
         return y, 1.0 - y * rest[1], rest
 
     def _measured(self, d):
@@ -214,7 +214,7 @@ class CableKernel(ElementKernel):
     def outer_stretches(self, u: Array) -> Array:
         """Stretch of the bottom and top fibres, (2, points, ne)."""
         y, length, rest = self._outer
-        if np.iscomplexobj(u):
+        if u.dtype.kind == "c":
             eps, kappa = first_order(self.strain(u))
         else:
             U = self.gather(self._checked(u))

@@ -99,7 +99,7 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
     K, Z = _symmetric_and_skew(each(t.C, OF_C), D)
     P, Q, coupled = map(np.ascontiguousarray, (
         *_products(G[0], pattern.products, own), _coupled(K, Z, D.shape[1])))
-    used = (G if own else G[:0]).any(axis=0).ravel().astype(np.int64)
+    used = G.any(axis=0).ravel().astype(np.int64) if own else np.zeros(0, np.int64)
     return CompiledTables(
         compiled_pattern(pattern), t.kind, W, t.start, np.ascontiguousarray(G[0]),
         _blocks(G.reshape(ne, -1)) if own else _NOTHING, used, *scales, _blocks(frame),
@@ -109,8 +109,8 @@ def compiled_tables(t: StrainTables) -> CompiledTables:
 
 def _rest(x):
     """|r_X| and the curvature of rows (k, 2 points, 2) of a cable."""
-    (a, b), (c, d) = x[:, ::2].T, x[:, 1::2].T
-    return _blocks(np.array([np.hypot(a, b), (a * d - b * c) / (a * a + b * b)]).T)
+    z = x.view(complex)[..., 0].T
+    return _blocks(np.array([np.abs(z[::2]), (z[1::2] / z[::2]).imag]).T)
 
 
 def _blocks(x):
@@ -139,10 +139,11 @@ def _products(G, products, own):
     """P and Q of derivatives (rows, m)."""
     if own:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    (i, j), (a, b), (g, h) = _lower(G.shape[1], 0), _lower(G.shape[1], -1), products
-    both = G[g].T[:, None] * G[h].T
-    other = both.swapaxes(0, 1)
-    return (both + other)[i, j], (both - other)[a, b][:, g != h]
+    m, (g, h) = G.shape[1], products
+    both = (G.take(g, 0).T[:, None] * G.take(h, 0).T).reshape(m * m, -1)
+    (P, other), (Q, opposite) = ((both.take(m * i + j, 0), both.take(m * j + i, 0))
+                                 for i, j in (_lower(m, 0), _lower(m, -1)))
+    return P + other, (Q - opposite).compress(g != h, 1)
 
 
 def _symmetric_and_skew(C, D):

@@ -57,7 +57,7 @@ class ElementKernel:
         if u.shape != (self.N,):
             raise InputError(f"the displacement of this beam must have the shape ({self.N},), got "
                              f"{u.shape}: is it the state of another mesh?")
-        return u if np.iscomplexobj(u) else np.ascontiguousarray(u, dtype=float)
+        return u if u.dtype.kind == "c" else np.ascontiguousarray(u, dtype=float)
 
     @property
     def shared(self) -> bool:
