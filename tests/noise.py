@@ -37,7 +37,7 @@ SEAMS = [
     ("core.band", "core.loops", "solve_complex", [], ["x", "y"]),
 ]
 #: Functions of LAPACK whose matrix, or whose solution, is changed where this module calls them.
-LAPACK = "core.linalg", ["dpbtrf", "dgbtrf"], ["dpbtrs", "dgbtrs"]
+LAPACK = "core.band", ["dpbtrf", "dgbtrf"], ["dpbtrs", "dgbtrs"]
 
 ODD, EXPONENT = 0x9E3779B97F4A7C15, 0x7FF
 

@@ -605,7 +605,7 @@ def test_corrections_far_against_the_way_of_a_step(part, far):
     v, dt = np.random.default_rng(4).standard_normal(system.N), 0.2
     x = SimpleNamespace(du=part * steps.FAR * dt * v, scratch=np.zeros(system.N))
     w = SimpleNamespace(x=x, y=np.array([0.0 * v, v]))
-    assert steps._far(system.mass.band, SimpleNamespace(dt=dt), w) == far
+    assert steps._far(system.mass, SimpleNamespace(dt=dt), w) == far
 
 
 def test_mass_of_a_tapered_round_rod():

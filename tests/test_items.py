@@ -13,7 +13,7 @@ from skfem import LinearForm
 from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, Energy, FormLoad, InputError,
                         Item, MeshBeam, Prony, Scene, StVenantKirchhoff, sweep)
 from skfem_ancf.actions.forces import point
-from skfem_ancf.actions.joints import JOINTS, Motor
+from skfem_ancf.actions.joints import JOINTS, Joint, Motor
 from skfem_ancf.dynamics import SCHEMES
 from skfem_ancf.scene.model import Model
 
@@ -183,6 +183,34 @@ class Slip(Tip):
         return 0.5 * self.k * (d @ d)
 
 
+class DragRail(Joint):
+    """The end moves along x only, given by the equation alone, with dry friction: one class."""
+
+    equations = ("height",)
+    symmetric, k, most = False, 1e4, 0.05
+
+    def __init__(self, at=(1.0, 0.0)):
+        self.at = at
+
+    def bind(self, layout):
+        self.r = point(layout, 0, self.at)
+        self.dofs = self.r.dofs
+
+    def value(self, u, t):
+        return np.array([self.r(u)[1] - self.at[1]])
+
+    def start(self):
+        return np.zeros(1)
+
+    def evaluate(self, u, v, t, history, dt):
+        way = self.r(u)[0] - self.at[0]
+        pull = np.clip(self.k * (way - history[0]), -self.most, self.most)
+        return -pull * self.r.row((1.0, 0.0), len(u)), np.array([way - pull / self.k])
+
+    def energy(self, u, history):
+        return 0.5 * self.k * (self.r(u)[0] - self.at[0] - history[0]) ** 2
+
+
 def unscaled():
     return Energy(bedding, beam=0, scaled=False)
 
@@ -191,7 +219,7 @@ def following():
     return FormLoad(across, beam=0)
 
 
-CUSTOM = (Quartic, Pull, Slip, Bob, Rail, Lift, unscaled, following)
+CUSTOM = (Quartic, Pull, Slip, Bob, Rail, Lift, DragRail, unscaled, following)
 
 
 def item_of(name):
@@ -323,6 +351,18 @@ def test_a_constraint_is_that_of_a_joint():
     a, b = one.solve_static(), two.solve_static()
     assert a.displacement((1.0, 0.0), 0)[1] == pytest.approx(0.02, abs=1e-12)
     assert a.joint_force(item)[0] == pytest.approx(b.joint_force(joint)[1], rel=0.05)
+
+
+@pytest.mark.filterwarnings("ignore:a support moves")
+def test_a_joint_with_friction_is_one_class():
+    """A bar to and fro on a rail: friction is all that the cycle of its end loses."""
+    scene = bare().add(item := DragRail()).fix("right", "r^1", beam=0, displacement=lambda t: (
+        1e-4 * np.sin(np.pi * t / 2)))
+    assert len(scene.joints) == 2 and scene.elements[0].same(item)
+    run = scene.run([1.0, 3.0, 5.0], increments=20)
+    assert np.abs(run.displacement((1.0, 0.0), 0)[:, 1]).max() < 1e-12
+    lost = run.dissipated[-1] - run.dissipated[20]
+    assert lost == pytest.approx(4 * 0.05 * (1e-4 - 0.05 / 1e4), rel=0.01)
 
 
 class Wrong(Tip):

@@ -4,6 +4,8 @@ import pickle
 
 import numpy as np
 import pytest
+from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, condense, solve
+from skfem.helpers import dot, grad
 
 from skfem_ancf import (Beam, CallError, ElasticPlastic, ElementBeamANCF, ElementBeamCable, Frame,
                         InputError, MeshBeam, NameUnknown, NeoHookean, Scene, Section,
@@ -53,6 +55,121 @@ def test_areas_and_moments_are_those_of_the_tables(name, A, I):
     EA, ES, EI = beam_of(name).across.moments(np.array([[0.5]]), np.array([0]))[:, 0, 0]
     assert EA == pytest.approx(A, rel=4e-3)
     assert EI - ES**2 / EA == pytest.approx(I, rel=4e-3)
+
+
+# areas and moments of outlines, as polygons drawn from the sizes of the standards
+
+
+def rounded(corners, radii, count=200):
+    """A closed polygon (2, n) with rounded corners."""
+    x, out = np.array(corners, float), []
+    for k, r in enumerate(radii):
+        a, b = (x[n % len(x)] - x[k] for n in (k - 1, k + 1))
+        a, b = a / np.hypot(*a), b / np.hypot(*b)
+        middle = x[k] + (a + b) / np.hypot(*(a + b)) * r / np.sqrt(0.5 - 0.5 * a @ b)
+        begin, end = (complex(*(x[k] + way * r * np.sqrt((1 + a @ b) / (1 - a @ b)) - middle))
+                      for way in (a, b))
+        z = complex(*middle) + begin * np.exp(
+            1j * np.linspace(0, np.angle(end / begin) if r else 0.0, count if r else 1))
+        out.append([z.real, z.imag])
+    return np.hstack(out)
+
+
+def mirrored(corners, radii):
+    """Right half of a symmetric outline, completed."""
+    return rounded([*corners, *((-x, y) for x, y in corners[::-1])], [*radii, *radii[::-1]])
+
+
+def box(b, h, r, y=0.0):
+    return mirrored([(b / 2, y), (b / 2, y + h)], [r, r])
+
+
+def circle(r, y):
+    z = r * np.exp(2j * np.pi * np.arange(2000) / 2000)
+    return np.array([z.real, z.imag + y])
+
+
+#: Outlines and holes of one size of each series, in mm.
+OUTLINES = {
+    "IPE 200": [mirrored([(50, 0), (50, 8.5), (2.8, 8.5), (2.8, 191.5), (50, 191.5), (50, 200)],
+                         [0, 0, 12, 12, 0, 0])],
+    "HEB 100": [mirrored([(50, 0), (50, 10), (3, 10), (3, 90), (50, 90), (50, 100)],
+                         [0, 0, 12, 12, 0, 0])],
+    "HEA 100": [mirrored([(50, 0), (50, 8), (2.5, 8), (2.5, 88), (50, 88), (50, 96)],
+                         [0, 0, 12, 12, 0, 0])],
+    # the flange is 8 and 18 thick halfway, with a slope of 8 % and 5 %
+    "UPN 80": [rounded([(0, 0), (45, 0), (45, 6.2), (6, 9.32), (6, 70.68), (45, 73.8), (45, 80),
+                        (0, 80)], [0, 0, 4, 8, 8, 4, 0, 0])],
+    "UPN 400": [rounded([(0, 0), (110, 0), (110, 15.6), (14, 20.4), (14, 379.6), (110, 384.4),
+                         (110, 400), (0, 400)], [0, 0, 9, 18, 18, 9, 0, 0])],
+    "L 50x50x5": [rounded([(0, 0), (50, 0), (50, 5), (5, 5), (5, 50), (0, 50)],
+                          [0, 0, 3.5, 7, 3.5, 0])],
+    # flange and web are 11 thick in their middle, with slopes of 2 %
+    "T 100": [mirrored([(4.5, 0), (6.27250900, 88.6254502), (50, 89.5), (50, 100)],
+                       [2.75, 11, 5.5, 0])],
+    "RHS 100x50x4": [box(50, 100, 6), box(42, 92, 4, 4)],
+    "SHS 100x5": [box(100, 100, 7.5), box(90, 90, 5, 5)],
+    "CFRHS 100x50x4": [box(50, 100, 8), box(42, 92, 4, 4)],
+    "CHS 60.3x3.2": [circle(30.15, 30.15), circle(26.95, 30.15)]}
+
+
+def moments(x):
+    """Area, first and second moment about y = 0 of a polygon."""
+    (x0, y0), (x1, y1) = x, np.roll(x, -1, axis=1)
+    c = x0 * y1 - x1 * y0
+    return np.array([np.sum(c), np.sum(c * (y0 + y1)) / 3, np.sum(c * (y0**2 + y0 * y1 + y1**2)) / 6
+                     ]) / 2
+
+
+def widths(x, y):
+    """Width of a polygon at heights y (n,)."""
+    (x0, y0), (x1, y1) = x, np.roll(x, -1, axis=1)
+    up, rise = (y[:, None] >= y0) != (y[:, None] >= y1), np.where(y1 == y0, 1.0, y1 - y0)
+    return np.sum(up * np.sign(y1 - y0) * (x0 + (y[:, None] - y0) / rise * (x1 - x0)), axis=1)
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_area_moments_and_shear_are_those_of_the_outline(name):
+    """Shear area of Jourawski's stress: I^2 over the integral of S^2 / b."""
+    signs = (1, -1)
+    A, S, I = sum(sign * moments(x) for sign, x in zip(signs, OUTLINES[name]))
+    beam = beam_of(name, "mm", ElementBeamANCF(1))
+    found, first, second = beam.across.moments(np.array([[0.5]]), np.array([0]))[:, 0, 0]
+    assert found == pytest.approx(A, rel=1e-5)
+    assert first / found + beam.mesh.height / 2 == pytest.approx(S / A, rel=1e-5)
+    assert second - first**2 / found == pytest.approx(I - S**2 / A, rel=1e-5)
+    dy = beam.mesh.height / 3000
+    y = dy * (np.arange(3000) + 0.5)
+    b = sum(sign * widths(x, y) for sign, x in zip(signs, OUTLINES[name]))
+    first = b * (y - S / A) * dy
+    compliance = np.sum((np.cumsum(first) - first / 2)**2 / b) * dy
+    shear = (I - S**2 / A)**2 / compliance
+    assert beam.across.shear * found == pytest.approx(shear, rel=1e-3)
+
+
+@pytest.mark.parametrize("shape, h, b, web, flange, ratio", [
+    ("rectangle", 100.0, 2.0, None, None, 1.0), ("I", 200.0, 100.0, 5.6, 8.5, 0.952),
+    ("T", 100.0, 100.0, 11.0, 11.0, 0.878)])
+def test_the_shear_area_beside_that_of_a_prism(shape, h, b, web, flange, ratio):
+    """Saint-Venant's flexure of the section, nu = 0, by scikit-fem: wide flanges shear more."""
+    thick, f = (b, 0.0) if web is None else (web, flange)
+    x = np.unique([*np.linspace(0, thick / 2, 7), *np.linspace(thick / 2, b / 2, 31)])
+    y = np.unique([*np.linspace(0, f, 9), *np.linspace(f, h - f, 41), *np.linspace(h - f, h, 9)])
+    mesh = MeshQuad.init_tensor(x, y)
+    cx, cy = mesh.p[:, mesh.t].mean(axis=1)
+    inside = (cx < thick / 2) | (cy > h - f) | ((cy < f) & (shape == "I"))
+    basis = Basis(mesh.restrict(np.flatnonzero(inside)), ElementQuad2())
+    height, dx = np.asarray(basis.global_coordinates())[1], 2 * basis.dx
+    A, centre = np.sum(dx), np.sum(height * dx) / np.sum(dx)
+    K = BilinearForm(lambda u, v, w: 2 * dot(grad(u), grad(v))).assemble(basis)
+    force = LinearForm(lambda v, w: 2 * (w.x[1] - centre) * v).assemble(basis)
+    warping = solve(*condense(K, force, D=np.array([0])))
+    shear = np.sum((height - centre)**2 * dx)**2 / (force @ warping)
+    sizes = {} if web is None else {"web": web, "flange": flange}
+    beam = Beam(MeshBeam.init_line([0, 1000], h), ElementBeamANCF(1), StVenantKirchhoff(1.0, 0.0),
+                section=Section.profile(shape, width=b, **sizes))
+    factor = 5 / 6 if beam.across.shear is None else beam.across.shear
+    assert shear / (factor * A) == pytest.approx(ratio, rel=0.005)
 
 
 def test_units_masses_and_names():

@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt,
-                        MeshBeam, MotionDesign, NameUnknown, RigidBody, Scene, StVenantKirchhoff)
+                        MeshBeam, MotionDesign, NameUnknown, Parameters, RigidBody, Scene,
+                        StVenantKirchhoff)
 from tests.test_design import S, beam_of, difference
 
 
@@ -18,6 +19,15 @@ def agree(design, p, rtol=1e-6):
     exact = difference(design, p, 1e-3, other)
     assert values.shape == (len(found),) and found.shape == exact.shape
     gap = np.abs(found - exact).max(axis=0) / np.abs(exact).max(axis=0)
+    assert np.all(gap < rtol), gap
+    # one number of all, by one adjoint solution, with few states kept
+    weights = np.cos(np.arange(len(values))) / np.abs(values).max()
+    design = MotionDesign(design.build, design.readings, design.t_end, design.dt, design.scheme,
+                          design.static, every=3)
+    value, gradient = design.objective(lambda y: weights @ y)(p)
+    assert len(design.history) < 0.7 * len(design.history.sensors.t)
+    assert np.isclose(value, weights @ values)
+    gap = np.abs(gradient - weights @ exact) / (np.abs(weights) @ np.abs(exact))
     assert np.all(gap < rtol), gap
 
 
@@ -69,6 +79,45 @@ def test_a_cantilever_released_with_joints():
     agree(MotionDesign(build, ["body"], 0.2, 0.01, static=True), [2e6, 0.2, 4.0])
 
 
+def test_motors_dashpots_and_drag():
+    """Joints that move, forces of the velocity, a load that follows; read forces and stress."""
+    def build(p):
+        E, k, c, drag, F = p
+        beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.05), ElementBeamCable(5),
+                    StVenantKirchhoff(E, 0.3, 1000.0), width=0.02, damping=KelvinVoigt(1e-3))
+        scene = Scene(beam).pin("left").drag(drag, normal=drag).damping(mass=0.3)
+        motor = scene.motor((0, "left"), angle=lambda t: 3.0 * t * t)
+        scene.spring(k, ((0.5, 0.0), ("ground", (0.5, 0.4))), damping=c)
+        scene.follower_force((0, F), at=(1, 0))
+        scene.sensor("torque", "joint_force", motor).sensor("a", "acceleration", at=(1, 0))
+        return scene.sensor("S", "stress", at=(0.3, 0.01))
+
+    p = [2e6, 30.0, 2.0, 0.5, 1.0]
+    for name in ("torque", "a", "S"):
+        agree(MotionDesign(build, [name], 0.1, 0.01), p)
+
+
+def test_many_heights_by_one_adjoint_solution():
+    """The time integral of the height of a tip, by heights at nodes and by element moduli."""
+    x = np.linspace(0, 1, 13)
+    scene = Scene(beam_of(mesh=MeshBeam.init_line(x, 0.05))).clamp("left").gravity((0, -9.81))
+    scene.sensor("tip", "displacement", at=(1, 0)).sensor("S", "stress", at=(0.01, 0.02))
+    beam = scene.beams[0]
+    parameters = Parameters(scene, [(beam, "height", "nodes"), (beam, "E", "elements")])
+    design = MotionDesign(parameters, ["tip", "S"], 0.12, 0.01, every=4)
+    weights = np.zeros((13, 5))
+    weights[:, 1], weights[6, 2], weights[-1, 2] = 1.0, 1e-5, 1e-5
+    p = parameters.start * (1.0 + 0.1 * np.cos(np.arange(25.0)))
+    _, gradient = design.objective(lambda y: np.sum(weights * y.reshape(13, 5)))(p)
+    exact = np.tensordot(weights.ravel(), design.jacobian(p), 1)
+    for part in (slice(0, 13), slice(13, 25)):
+        assert np.allclose(gradient[part], exact[part], rtol=1e-6,
+                           atol=1e-7 * np.abs(exact[part]).max())
+    step = 1e-4 * np.cos(np.arange(25.0)) * p  # along one direction, of whole motions
+    change = (design.values(p + step) - design.values(p - step)) @ weights.ravel() / 2.0
+    assert np.isclose(gradient @ step, change, rtol=1e-6)
+
+
 def test_a_fit_of_damping_and_modulus():
     def build(p):
         beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.02), ElementBeamCable(5),
@@ -100,6 +149,8 @@ def test_what_has_no_derivative_is_said():
 
     with pytest.raises(InputError, match="prescribed motion"):
         MotionDesign(moved, ["tip"], 0.03, 0.01)([0.1])
+    with pytest.raises(InputError, match="prescribed motion"):
+        MotionDesign(moved, ["tip"], 0.03, 0.01).objective(np.sum)([0.1])
 
     def touching(p):
         return build(p).obstacle(Circle((0.5, -0.3), 0.1))

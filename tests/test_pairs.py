@@ -13,7 +13,7 @@ from skfem.helpers import ddot, sym_grad
 from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.actions.obstacles import Line
-from skfem_ancf.actions.forces.base import bind_force, recalled
+from skfem_ancf.actions.bound import recalled
 from skfem_ancf.beam.layout import Layout
 
 ELEMENTS = (ElementBeamANCF(2), ElementBeamANCFCubic(1), ElementBeamCable(3), ElementBeamCable(5))
@@ -34,7 +34,7 @@ def strips(element, friction=0.0):
     layout = Layout(*beams)
     u = 3e-4 * layout.sizes * np.cos(np.arange(layout.N))
     u[1:beams[0].N:beams[0].nd] -= 6e-4
-    contact = recalled(bind_force(BodyContact(friction=friction), layout))
+    contact = recalled(BodyContact(friction=friction).bound_on(layout)[0])
     if friction:
         x = u.reshape(-1, 2)
         contact.accept(x, x, 0.0 * x, 0.0)
@@ -278,7 +278,7 @@ def test_what_passes_a_body_in_a_step_is_seen(dt):
         history.total_energy[0])
     x = np.zeros((2, rod.N // 2 + 2, 2))
     x[1, :rod.N // 2:rod.nd // 2] = 0.0, -0.2
-    contact = recalled(bind_force(BodyContact(), Layout(rod, plate)))
+    contact = recalled(BodyContact().bound_on(Layout(rod, plate))[0])
     with_bodies = np.flatnonzero(np.isin(np.arange(rod.N + 4) // 2, [
         link.dofs[0, 0] // 2 for link in contact.links]))
     assert "into a body" in contact.passed(*(y.ravel()[with_bodies].reshape(-1, 2) for y in x), 0.0)

@@ -5,8 +5,9 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from skfem import Basis, ElementQuad2, ElementVector, MeshQuad
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, FileError, Frame,
+from skfem_ancf import (Beam, Circle, Domain, ElementBeamANCF, ElementBeamCable, FileError, Frame,
                         InputError, MeshBeam, RigidBody, Scene, Section, StVenantKirchhoff)
 from skfem_ancf.results.report import total_force
 
@@ -138,3 +139,84 @@ def test_wrong_files(tmp_path):
     for wrong in ("report.pdf", 3):
         with pytest.raises((InputError, FileError)):
             state.report(wrong)
+
+
+def a_domain_and_a_beam(load=-1e4, name="root", E=2.1e11):
+    """A cantilever of length 2 of one law: its first half is a domain, its second half a beam."""
+    mesh = MeshQuad.init_tensor(np.linspace(0, 1, 17), np.linspace(-0.1, 0.1, 5)).with_defaults()
+    law = STEEL.replace(E=E, nu=0.0)
+    root = Domain.solid(Basis(mesh, ElementVector(ElementQuad2())), law, 0.1, name)
+    arm = Beam(MeshBeam.init_line(np.linspace(1, 2, 9), 0.2), ElementBeamANCF(2), law, 0.1,
+               name="arm")
+    scene = Scene(root, arm).units("N", "m").clamp("left", root).point_force((0, load), at=(2, 0))
+    scene.weld((root, "right"), (arm, "left"))
+    return scene
+
+
+@pytest.mark.parametrize("solve", ["solve_static", "solve_linear"])
+def test_a_domain_has_its_rows_beside_the_beams(tmp_path, solve):
+    """Stress 6 F x / (b h^2): that of the clamp is in the domain, half of it in the beam.
+
+    The clamp holds the warping of its section, which adds 2 %.
+    """
+    state = getattr(a_domain_and_a_beam().line_load((0, -100.0), beam="arm"), solve)()
+    sigma, small = 6 * (1e4 * 2 + 150) / (0.1 * 0.2**2), 6 * (1e4 + 50) / (0.1 * 0.2**2)
+    worst = state.extremes(count=4)
+    assert {(one.beam, one.kind) for one in worst} == {("root", "domain")}
+    assert worst[0].value == pytest.approx(sigma / 235e6, rel=0.03)
+    assert np.abs(worst[0].point) == pytest.approx([0, 0.1], abs=1e-9)
+    assert np.hypot(*(worst[2].point - worst[0].point)) >= 0.1 * (1 - 1e-12)
+    assert str(worst[0]).endswith(" of domain 'root'")
+    assert state.extremes(count=1, beam="root")[0].value == worst[0].value
+    assert state.extremes(count=1, beam="arm")[0].value == pytest.approx(small / 235e6, rel=0.03)
+    assert state.checks.utilisation.kind == "domain"
+    page = Page(state.report(tmp_path / "both.html"))
+    rows = {row[3]: row for row in page.rows if row[0] == "largest utilisation"}
+    assert float(rows["root"][1]) == pytest.approx(sigma / 235e6, rel=0.03)
+    assert float(rows["arm"][1]) == pytest.approx(small / 235e6, rel=0.03)
+    assert page.row("distributed force")[3] == "100 N/m" and page.row("force")[3] == "10 kN"
+    assert page.row("root")[1].startswith("Domain root of 64 MeshQuad1 cells")
+    assert len([row for row in page.rows if row[0].startswith("StVenantKirchhoff")]) == 1
+    assert page.row("(0, 0) of root")[2] == "10.1 kN"  # no round-off in the place
+    assert page.row("maximum M")[1] == "0 N m"
+    axes = state.plot_resultants(on="structure")
+    box = np.vstack([path.vertices for artist in axes[2].collections
+                     for path in artist.get_paths() if len(path.vertices) == 5])
+    assert box.min(axis=0) == pytest.approx([0, -0.1]) and axes[2].get_xlim()[0] < 0.0
+
+
+def test_domains_alone_are_reported_and_checked(tmp_path):
+    mesh = MeshQuad.init_tensor(np.linspace(0, 2, 9), np.linspace(0, 1, 3)).with_defaults()
+    strip = Domain.solid(Basis(mesh, ElementVector(ElementQuad2())), STEEL, 0.1)
+    scene = Scene(strip).fix("left", "u^1").fix("bottom", "u^2").fix("right", "u^1", 0.2)
+    state = scene.solve_static()
+    wide = 0.5 * 2.1e11 * (1.1**2 - 1) / 235e6  # second Piola-Kirchhoff over the strength
+    narrow = np.sqrt(1 - 0.3 * (1.1**2 - 1))  # stretch across, and of the thickness
+    assert state.extremes(count=1)[0].value == pytest.approx(wide * 1.1 / narrow**2, rel=1e-6)
+    assert state.extremes(count=1)[0].beam == 0
+    assert state.checks.largest_stretch == pytest.approx(1.1, rel=1e-9)
+    assert state.checks.smallest_det == pytest.approx(1.1 * narrow, rel=1e-9)
+    assert any(text.startswith("the strain is 0.1: Hooke's law") for text in state.checks.findings)
+    assert any("of domain 0 is" in text for text in state.checks.findings)
+    page = Page(state.report(tmp_path / "strip.html"))
+    assert page.row("largest displacement")[1:] == ["0.2025", "(2, 1)", "0"]
+    assert sum("times the strength" in text for text in page.text["p"]) == 1
+    with pytest.raises(InputError, match=r"those of beams, .*extremes\(.von_mises.\)"):
+        state.plot_resultants()
+
+
+def test_extremes_of_what_has_no_stress():
+    """A domain of user-defined forms has displacements alone; a rigid body has no field."""
+    scene = a_domain_and_a_beam()
+    solid = scene.domains[0]
+    bare = Domain(solid.basis, solid.residual, solid.tangent, name="bare")
+    body = RigidBody(1.0, 1.0, (5.0, 0.0), name="block")
+    scene = Scene(scene.beams[0], bare, body).clamp("left", bare).clamp((5, 0), "block")
+    scene.weld((bare, "right"), ("arm", "left"))
+    state = scene.point_force((0, -1e4), at=(2, 0)).solve_static()
+    assert {one.beam for one in state.extremes()} == {"arm"}
+    assert state.extremes("displacement", 1, beam="bare")[0].value > 0
+    with pytest.raises(InputError, match="Domain.solid"):
+        state.extremes("von_mises", beam="bare")
+    with pytest.raises(InputError, match="beams and domains"):
+        state.extremes("displacement", beam="block")

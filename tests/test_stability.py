@@ -12,7 +12,7 @@ from skfem import asm
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
                         StabilityWarning, StVenantKirchhoff, forms)
-from skfem_ancf.core.linalg import dense
+from skfem_ancf.core.band import dense
 from skfem_ancf.equations.stability import Verdict
 from skfem_ancf.results.state import State
 

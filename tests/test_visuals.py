@@ -192,7 +192,7 @@ def test_axes_and_loads_have_units():
     ax = scene.moment("right", 7.0).pressure("top", 3.0).plot()
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "y (mm)")
     found = {text.get_text() for text in ax.texts}
-    assert {"25 kN", "7 N mm", "p = 3 N/mm^2"} <= found
+    assert {"25 kN", "7 N mm", "p = 3 N/mm²"} <= found
     assert scene.state().plot().get_xlabel() == "x (mm)"
 
 

@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..beam.beam import Beam
-from ..beam.distribution import AXIS, BODY, Distribution, Sampled
+from ..beam.distribution import (AXIS, BODY, LEFT, RIGHT, UPPER, Distribution, Sampled, groups_of,
+                                 surfaces_of)
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.layout import Layout, WhichBeam
 from ..beam.masses import points_along
-from ..beam.surfaces import LEFT, RIGHT, TOP, groups_of, surfaces_of
 from ..core.errors import (InputError, MissingExtra, NameUnknown, ask, require_finite, require_flag,
                            require_function, require_slope, shown)
 from ..core.quadrature import gauss, product_rule
 from ..core.types import Array, Place, TimeFunction
-from .item import Item, at_generic_displacements
+from .bound import at_generic_displacements
+from .item import Item
 from .loads import Load
 
 # loads given by densities at points, for all local functions at once
@@ -568,7 +569,7 @@ def _parts_of(beam, over):
         except NameUnknown as error:
             raise NameUnknown("place", error.name, EVERYWHERE + error.known) from None
         for one in surfaces:
-            where = -1 if one.side in (LEFT, RIGHT) else one.side // TOP
+            where = -1 if one.side in (LEFT, RIGHT) else one.side // UPPER
             out.append(_points(beam, one.elements, one.X, one.areas,
                                _Where(where, one.elements, rule)))
     return out

@@ -19,7 +19,7 @@ from ..core.errors import (CallbackError, InputError, explained, require_finite,
 from ..core.quadrature import gauss
 from ..core.types import Array, Place, TimeFunction
 from .energy import Density, points_of
-from .item import at_generic_displacements
+from .bound import at_generic_displacements
 from .loads import DeadLoad
 
 logger = logging.getLogger(__name__)

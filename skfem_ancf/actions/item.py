@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from os import urandom
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from ..beam.layout import Layout
-from ..core.errors import InputError, require_finite
+from ..core.errors import InputError, explained, shown
 from ..core.immutable import Immutable
-from ..core.types import Array
+from .bound import Bound, user_parts
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-class Item(Immutable):
+class Item(Immutable, Bound):
     """Base class of loads, supports, joints, force elements and user-defined items.
 
     An item is described without a mesh. :meth:`skfem_ancf.Scene.add` binds a copy to the degrees of
@@ -87,8 +84,6 @@ class Item(Immutable):
     symmetric = True
     moving = True
     dofs: Any = None
-    name: str | None = None
-    _key: bytes
 
     def __new__(cls, *args: Any, **options: Any) -> Self:
         made = super().__new__(cls)
@@ -106,6 +101,21 @@ class Item(Immutable):
         Do not change ``self``, which is bound to other meshes later.
         """
         return self._thawed()
+
+    def bound_on(self, layout: Layout) -> list[Any]:
+        """What equations see of it, bound and checked: forces, constraints, loads, supports."""
+        hint = ("its energy(u, t), force(u, v, t) and constraint(u, t) take displacements and "
+                f"velocities of all degrees of freedom, shape ({layout.N},)")
+        with explained("{!r} fails in the reference configuration", hint, InputError, self):
+            bound = self.bind(layout)
+            if not isinstance(bound, Item):
+                raise InputError(f"bind(layout) of {self!r} must return an Item, got "
+                                 f"{shown(bound)}")
+            out = user_parts(bound, layout)
+        if not out:
+            raise InputError(f"{self!r} does nothing: an item defines energy(u, t), force(u, v, "
+                             "t), constraint(u, t) or mass()")
+        return out
 
     def symbols(self, layout: Layout) -> Iterable[Any]:
         """What a picture shows of it, with its beam by number; nothing by default.
@@ -133,10 +143,6 @@ class Item(Immutable):
         """
         return ()
 
-    def same(self, other: Any) -> bool:
-        """True if both are copies of one item, bound or not."""
-        return self._key == getattr(other, "_key", None)
-
     def __repr__(self) -> str:
         parts = [type(self).__name__, self.name]
         return f"<{' '.join(part for part in parts if part)}>"
@@ -149,18 +155,6 @@ class Item(Immutable):
         return other
 
 
-def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
-    """Raise InputError unless rows, columns and values are entries of an n x n matrix."""
-    i, j = np.asarray(i), np.asarray(j)
-    v = require_finite(what, v, (None,))
-    if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
-        raise InputError(f"{what} must be rows, columns and values of one length, got shapes "
-                         f"{i.shape}, {j.shape}, {v.shape}")
-    if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
-        raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
-                         f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
-
-
 def takes_time(function: Any) -> bool:
     """True for a function of three arguments, x, y and t."""
     if not callable(function):
@@ -171,15 +165,3 @@ def takes_time(function: Any) -> bool:
         return False
     return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
                for p in kinds) == 3
-
-
-def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array) -> None:
-    """Call a check of derivatives at two generic displacements.
-
-    It may fail at one of them, where there may be a kink.
-    """
-    angles = np.arange(len(sizes))
-    try:
-        check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
-    except InputError:
-        check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))

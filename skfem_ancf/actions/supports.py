@@ -60,6 +60,9 @@ class Support(Item):
         beam, first = layout.beam(self.beam), layout.offset(self.beam)
         return self._with(dofs=beam.dofs(self.boundary, self.names) + first, _member=(beam, first))
 
+    def bound_on(self, layout: Layout) -> list[Any]:
+        return [self.bind(layout)]
+
     def hold(self, fixed: dict[int, float]) -> None:
         """Add its prescribed DOFs to ``fixed``; SupportError where two displacements conflict."""
         value: Any = self.displacement  # a number: functions are joints

@@ -1,4 +1,4 @@
-"""Distribution of forces over a beam: on its volume, faces, sections and points."""
+"""Points on the surface of a beam, and distribution of forces on it, its volume and sections."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..core.quadrature import lagrange
-from ..core.types import Array
-from ..elements.base import ElementBeam
+from ..core.quadrature import gauss, lagrange
+from ..core.types import Array, Place
 from ..mesh.mesh_beam import MeshBeam
-from ..sections.across import jumps
+from ..mesh.places import facets_of
+from ..sections.across import jumps, pieces
 from .beam import Beam
 from .kinematics import direction_weights, probe_reference
 
@@ -84,9 +84,7 @@ class Sampled:
         return np.append(np.nonzero(on[1:] != on[:-1])[0] + 1.0, inside)
 
     def jumps(self, nelements: int) -> Array:
-        """Axial coordinates of jumps by more than a tenth of the largest value.
-
-        Smaller jumps are interpolation errors of a smooth density.
+        """Axial coordinates of jumps by more than a tenth of the largest value; others are errors.
         """
         eta = np.array([0.0]) if self.eta is None else self.eta
         return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
@@ -155,56 +153,139 @@ def station_of_node(mesh: MeshBeam, node: int) -> float:
 
 
 def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | None:
-    """Element + xi of a nodal force that acts on sections or points; None if it is distributed.
-
-    A force at a point inside an element acts on ``r`` of both nodes; its point follows from the
-    ratio.
-    """
-    rows = np.asarray(vector).reshape(-1, beam.nd)
+    """Element + xi of a nodal force that acts on sections or points; None if it is distributed."""
+    rows, t = np.asarray(vector).reshape(-1, beam.nd), beam.mesh.t
     loaded = np.nonzero(np.any(rows != 0, axis=1))[0]
-    if len(loaded) == 2 and np.any(beam.mesh.t[0] == loaded[0]) and loaded[1] == loaded[0] + 1:
-        a, b = rows[loaded, :2]
-        total = a + b
-        if total @ total <= FLAT * np.max(rows[loaded] ** 2):
-            xi = _where_turned(beam, int(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]),
-                               rows[loaded])
-            if xi is not None:
-                return (float(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]) + xi,)
-        elif total @ total > 0:
-            value = float(b @ total / (total @ total))
-            xi = _where(beam.element, value)
-            if xi is not None:
-                return (float(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]) + xi,)
+    if len(loaded) == 2 and loaded[1] == loaded[0] + 1 and np.any(t[0] == loaded[0]):
+        e, total = int(np.flatnonzero(t[0] == loaded[0])[0]), rows[loaded, :2].sum(axis=0)
+        xi = None
+        size = total @ total
+        if size <= FLAT * np.max(rows[loaded] ** 2):
+            # a moment: the section with a direction of these weights, in both components
+            parts = rows[loaded].reshape(2, -1, 2)
+            v = parts[..., np.argmax(np.sum(parts**2, axis=(0, 1)))].ravel()
+
+            def gap(xi: float) -> float:
+                w = direction_weights(beam, e, xi)
+                return float(1.0 - (v @ w) ** 2 / ((v @ v) * (w @ w)))
+
+            tries = np.linspace(0.0, 1.0, TRIES)
+            best = tries[int(np.argmin([gap(x) for x in tries]))]
+            bounds = max(best - 1.0 / TRIES, 0.0), min(best + 1.0 / TRIES, 1.0)
+            found = scipy.optimize.minimize_scalar(gap, bounds=bounds, method="bounded",
+                                                   options={"xatol": 1e-10})
+            xi = float(found.x) if found.fun < FLAT else None
+        elif size > 0:
+            # where the shape function of r at the right node is its part of the force
+            value = float(rows[loaded[1], :2] @ total / size)
+            if min(abs(value), abs(1.0 - value)) <= FLAT:
+                xi = float(round(value))
+            elif 0.0 < value < 1.0:
+                element = beam.element
+                xi = scipy.optimize.brentq(lambda xi: float(element.local(
+                    np.array([[xi], [0.5]]), 1.0)[0][element.nodal_dofs, 0]) - value, 0.0, 1.0,
+                    xtol=1e-15)
+        if xi is not None:
+            return (e + xi,)
     if np.any(np.diff(loaded) == 1):
         return None
     return tuple(station_of_node(beam.mesh, int(k)) for k in loaded)
 
 
-def _where_turned(beam: Beam, e: int, rows: Array) -> float | None:
-    """The section of element e with a direction of these weights (2, nd), in both components."""
-    parts = rows.reshape(2, -1, 2)
-    v = parts[..., np.argmax(np.sum(parts**2, axis=(0, 1)))].ravel()
+# points on the surface
 
-    def gap(xi: float) -> float:
-        w = direction_weights(beam, e, xi)
-        return float(1.0 - (v @ w) ** 2 / ((v @ v) * (w @ w)))
-
-    tries = np.linspace(0.0, 1.0, TRIES)
-    best = tries[int(np.argmin([gap(x) for x in tries]))]
-    found = scipy.optimize.minimize_scalar(
-        gap, bounds=(max(best - 1.0 / TRIES, 0.0), min(best + 1.0 / TRIES, 1.0)), method="bounded",
-        options={"xatol": 1e-10})
-    return float(found.x) if found.fun < FLAT else None
+#: Sides of an element in the order of its facets; the body is on the left along the first two.
+LOWER, RIGHT, UPPER, LEFT = range(4)
 
 
-def _where(element: ElementBeam, value: float) -> float | None:
-    """Solve for xi at which the shape function of ``r`` at the right node has a value."""
-    if not -FLAT <= value <= 1.0 + FLAT:
-        return None
-    if min(value, 1.0 - value) < FLAT:
-        return float(round(value))
+class Surface(NamedTuple):
+    """Points of facets on the same side of their elements: LOWER, RIGHT, UPPER or LEFT."""
 
-    def rest(xi: float) -> Any:
-        return element.local(np.array([[xi], [0.5]]), 1.0)[0][element.nodal_dofs, 0] - value
+    side: int
+    facets: Array  # numbers, (nf,)
+    elements: Array  # numbers, (nf,)
+    X: Array  # points of the reference cell, (2, np)
+    along: Array  # derivative of the position along a facet, the body on its left, (2, nf, np)
+    weights: Array  # those of the quadrature times the width, (nf, np)
 
-    return scipy.optimize.brentq(rest, 0.0, 1.0, xtol=1e-15)
+    @property
+    def areas(self) -> Array:
+        """Areas of the points, shape (nf, np)."""
+        return self.weights * np.sqrt(self.along[0] ** 2 + self.along[1] ** 2)
+
+    @property
+    def normals(self) -> Array:
+        """Outward unit normals, shape (2, nf, np)."""
+        x, y = self.along
+        return np.array([y, -x]) / np.sqrt(x * x + y * y)
+
+
+def surfaces_of(beam: Beam, place: Place, points: int) -> list[Surface]:
+    """Surfaces of a place by side and layer, with Gauss points on each facet."""
+    mesh, across, out = beam.mesh, beam.across, []
+    found = np.asarray(facets_of(mesh, place))
+    n, ne, rule = mesh.p.shape[1], mesh.nelements, gauss(points)
+    for side, first in ((LOWER, n), (UPPER, n + ne)):
+        on = found[(found >= first) & (found < first + ne)]
+        if len(on):
+            X = np.array([rule[0], np.full(points, 0.5 * side)])
+            out.append(_along(beam, side, on, on - first, X, rule[1]))
+    # right and left ends of elements at nodes, each once, and the elements
+    nodes = found[found < n]
+    left, right = np.full((2, n), -1)
+    left[mesh.t[0]] = right[mesh.t[1]] = np.arange(ne)
+    ends = right[nodes] >= 0
+    for side, on, of in ((RIGHT, nodes[ends], right), (LEFT, nodes[~ends], left)):
+        elements = of[on]
+        for layer, (eta, w) in [] if not len(on) else [(None, rule)] if across.plain else (
+                across.rules(beam.element.order + 3)):
+            X = np.array([np.full(len(eta), float(side == RIGHT)), eta])
+            width = across.layers[0].width if layer is None else across.breadth(layer, X, elements)
+            out.append(_surface(beam, side, on, elements, X, width * w))
+    return out
+
+
+def divided(beam: Beam, one: Surface, ask: Callable[[Array, Array], Array]) -> Surface:
+    """A surface in parts, where a function jumps inside elements; ``ask`` as for pieces()."""
+    if one.side not in (LOWER, UPPER):
+        return one
+    part, (x, w) = pieces(ask, one.elements, 0.5 * one.side), gauss(one.X.shape[-1])
+    size = (part.end - part.begin)[:, None]
+    xi = part.begin[:, None] + size * x
+    return _along(beam, one.side, part.elements + one.facets[0] - one.elements[0], part.elements,
+                  np.array([xi, np.full(xi.shape, 0.5 * one.side)]), size * w)
+
+
+def groups_of(mesh: MeshBeam, surfaces: Sequence[Surface]
+              ) -> tuple[list[Facets], tuple[float, ...]]:
+    """Facets along a beam, numbered as the points of ``surfaces``, and stations of others."""
+    groups, stations, first = [], [], 0
+    for one in surfaces:
+        if one.side in (LOWER, UPPER):
+            groups.append(Facets(one.side // UPPER, first + np.arange(len(one.facets)),
+                                 one.elements, one.X[0]))
+            first += len(one.facets)
+        else:
+            stations += [station_of_node(mesh, k) for k in one.facets.tolist()]
+    return groups, tuple(dict.fromkeys(stations))
+
+
+def _along(beam: Beam, side: int, facets: Array, elements: Array, X: Array, weights: Array
+           ) -> Surface:
+    across = beam.across
+    width = across.layers[0].width if across.plain else across.face(side // UPPER, X, elements)
+    return _surface(beam, side, facets, elements, X, width * weights)
+
+
+def _surface(beam: Beam, side: int, facets: Array, elements: Array, X: Array, weights: Array
+             ) -> Surface:
+    slopes = beam.mesh.mapping().DF(X, elements)[:, side % 2]
+    return Surface(side, facets, elements, X, slopes if side in (LOWER, RIGHT) else -slopes,
+                   np.broadcast_to(weights, slopes.shape[1:]))
+
+
+def add_nodal(beam: Beam, elements: Array, forces: Array, out: Array) -> None:
+    """Add nodal forces (n, 2 nodal_dofs, 2) of elements (n,) to a vector (N,)."""
+    half, nodes = forces.shape[1] // 2, out.reshape(-1, forces.shape[1] // 2, 2)
+    np.add.at(nodes, beam.mesh.t[0, elements], forces[:, :half])
+    np.add.at(nodes, beam.mesh.t[1, elements], forces[:, half:])

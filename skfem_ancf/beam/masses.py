@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.linalg import BandMatrix
+from ..core.band import BandMatrix
 from ..core.quadrature import gauss, product_rule, tensor
 from ..core.types import Array, Rule
 from ..formulations import AXIS
@@ -133,7 +133,7 @@ def projected(beam: Any, field: Callable[[Array], Array]) -> Array:
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
     N = element.of_mesh(mapping, X)[0].transpose(1, 0, 2)
     weighted, back = N * (mapping.full_volume(X) * W)[:, None], N.transpose(0, 2, 1)
-    gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
+    gram = BandMatrix.zeros(beam.N // 2, nd - 1)  # of one component
     gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])
     rest, v = field(mapping.F(X)).transpose(1, 2, 0), np.zeros((beam.N // 2, 2))
     for _ in range(2):  # refined, since masses of high degree are ill-conditioned

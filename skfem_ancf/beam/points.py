@@ -23,29 +23,18 @@ from .rigid import RigidBody
 from .strains import strain_at
 
 
-def is_many(points: Any) -> bool:
-    """True for a two-dimensional array, or a list or tuple of points."""
-    if isinstance(points, np.ndarray):
-        return points.ndim == 2
-    several = list, tuple, np.ndarray
-    return isinstance(points, (list, tuple)) and len(points) > 0 and isinstance(
-        points[0], several) and all(isinstance(p, several) for p in points)
-
-
 def as_points(points: Any) -> Array:
-    """Several points as an array (2, n), or one as an array (2,); MeshError for others.
-
-    A two-dimensional array has points in its columns, also with shape (2, 2).
-    """
-    if not is_many(points):
-        return require_point(points)
-    if isinstance(points, np.ndarray):
+    """Several points as an array (2, n), or one as an array (2,); MeshError for others."""
+    if isinstance(points, np.ndarray) and points.ndim == 2:
         if len(points) == 2:
             return require_finite("points", points)
         hint = "; give its transpose, or a list" if points.shape[1] == 2 else ""
         raise MeshError("an array of points has shape (2, n), with x in the first row and y in "
                         f"the second, got {points.shape}{hint}")
-    return np.array([require_point(p) for p in points]).T
+    if isinstance(points, (list, tuple)) and len(points) and all(
+            isinstance(p, (list, tuple, np.ndarray)) for p in points):
+        return np.array([require_point(p) for p in points]).T
+    return require_point(points)
 
 
 #: Tolerance of points on the axis of a cable, relative to the height.
@@ -53,11 +42,9 @@ ON_AXIS = 1e-12
 
 
 class BeamPoints:
-    """Points of one beam.
+    """Points ``X`` (2, n) of the reference cells of elements ``e`` (n,) of one beam.
 
-    ``index`` (n,) are their numbers among the requested points, or None for all; ``e`` (n,) are
-    elements, ``X`` (2, n) points of the reference cell, ``slice`` the DOFs of the beam in the
-    scene.
+    Among the requested points they have the numbers ``index`` (n,), None if they are all.
     """
 
     def __init__(self, beam: Any, number: int, dofs: slice, index: Array | None,
@@ -207,9 +194,7 @@ class Located:
 
 
 class Points:
-    """Locates points in beams and bodies with their ``slices`` of DOFs.
-
-    ``lines`` are the line numbers of the chains of elements of a frame.
+    """Locates points in beams and bodies; ``lines`` are the line numbers of the chains of a frame.
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
@@ -219,23 +204,12 @@ class Points:
 
     def find(self, points: Any, beam: WhichMember = None, line: int | None = None,
              ask: bool = False) -> Located:
-        """Locate points; where beams or lines overlap, in the one with the nearest axis.
+        """Locate one or several points, see :func:`as_points`, or a RigidBody for its centre of
+        mass; where beams or lines overlap, in the one with the nearest axis.
 
-        Parameters
-        ----------
-        points
-            One or several, see :func:`as_points`; a RigidBody for its centre of mass; or Located.
-        beam
-            The beam or rigid body, its name or number; searched for if None.
-        line
-            The number of the line of a frame, or of the chain of elements of the beam.
-        ask
-            Raise InputError if several axes are nearest, as at a node; else the first one is used.
-
-        Raises
-        ------
-        MeshError
-            If a point is in none of the beams.
+        ``line`` is the number of the line of a frame, or of the chain of elements of the beam. With
+        ``ask`` InputError if several axes are nearest, as at a node; MeshError if a point is in no
+        beam.
         """
         if isinstance(points, Located):
             return points
@@ -257,8 +231,13 @@ class Points:
             beam = self.beams[0]
         x = as_points(points)
         one, x = x.ndim == 1, x.reshape(2, -1)
-        return Located(one, x.shape[1], self._in_all(x, ask) if beam is None else
-                       [self._in_one(x, beam, chain, ask)])
+        if beam is None:
+            return Located(one, x.shape[1], self._in_all(x, ask))
+        e, X, tied = beam.finder.inside(x, chain)
+        if ask and np.any(tied):
+            self._ask(x[:, [np.argmax(tied)]], [beam])
+        k = self.beams.index(beam)
+        return Located(one, x.shape[1], [BeamPoints(beam, k, self.slices[k], None, e, X)])
 
     @cached_property
     def _chains(self):
@@ -310,18 +289,8 @@ class Points:
 
     def _in_body(self, body, index, start):
         kind = DomainPoints if isinstance(body, Domain) else BodyPoints
-        return kind(body, self._slice_of(body), index, start)
-
-    def _slice_of(self, body):
-        return self.slices[len(self.beams) + self.bodies.index(body)]
-
-    def _in_one(self, x, beam, chain, ask):
-        """Points (2, n) of one beam."""
-        e, X, tied = beam.finder.inside(x, chain)
-        if ask and np.any(tied):
-            self._ask(x[:, [np.argmax(tied)]], [beam])
-        k = self.beams.index(beam)
-        return BeamPoints(beam, k, self.slices[k], None, e, X)
+        dofs = self.slices[len(self.beams) + self.bodies.index(body)]
+        return kind(body, dofs, index, start)
 
     def _in_all(self, x, ask):
         """Points (2, n), each in the beam with the nearest axis, or in a body."""

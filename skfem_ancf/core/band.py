@@ -1,4 +1,4 @@
-"""Band matrices for kernels and LAPACK.
+"""Band matrices of chains of elements, for kernels and with LAPACK.
 
 Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each
 column; L D L^T factors replace it. In two halves (``top`` < 0): each column of the lower half, then
@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
+from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.linalg import blas, lapack
+from scipy.linalg import blas, eigh, lapack
 from scipy.sparse.linalg import splu
 
 from .source import F1, I1, apart, indices, primitive, shaped, source
@@ -29,6 +30,43 @@ LOST = 1e-13
 HALVES = -1
 #: Relative squared remainder of a redundant equation.
 REPEATED = 1e-13
+#: Eigenvalue that is round-off, for a unit diagonal.
+SINGULAR = 4.0 * np.finfo(float).eps
+#: Exceptions of factorisations and eigenvalue solvers.
+NO_FACTORS = np.linalg.LinAlgError, RuntimeError
+#: Pivot below which the smallest eigenvalue may be round-off, for a unit diagonal.
+SMALL = 1e-7
+#: Growth of entries at which a pivot block is enlarged, for a unit diagonal.
+GROWTH = 1e2
+
+
+def dense(A: Any) -> Array:
+    """A dense matrix in C order."""
+    return A.toarray(order="C") if sparse.issparse(A) else np.ascontiguousarray(A)
+
+
+class Inertia(NamedTuple):
+    """Signs of the eigenvalues of a symmetric matrix.
+
+    Attributes
+    ----------
+    negative : int
+        Number of negative eigenvalues.
+    singular : bool
+        True if an eigenvalue is zero to round-off.
+    """
+
+    negative: int
+    singular: bool
+
+
+def beside_zero(negative: Callable[[float], int]) -> Inertia:
+    """The :class:`Inertia` from ``negative(shift)``, a count for a relative shift of the diagonal.
+
+    An eigenvalue that changes sign between two shifts of round-off is zero.
+    """
+    below, above = negative(-SINGULAR), negative(SINGULAR)
+    return Inertia(above, below != above)
 
 
 class Band(NamedTuple):
@@ -41,25 +79,245 @@ class Band(NamedTuple):
     top: int
 
 
-class CoupledBand(Band):
+class BandMatrix(Band):
+    """A square :class:`Band` that is assembled by element, multiplied, factorised and solved with.
+
+    :meth:`factorize` leaves the entries: Cholesky factors, or pivoted LU of LAPACK for unsymmetric
+    and indefinite matrices. :func:`factorize` of kernels replaces them, without pivots unless the
+    storage is that of ``gbtrf``; as ``factors`` they serve the matrix too.
+    """
+
+    factors: Any = None  # an array of Cholesky's, or a Band
+
+    @classmethod
+    def zeros(cls, n: int, width: int, symmetric: bool = True) -> BandMatrix:
+        """A zero matrix (n, n) with ``width`` subdiagonals; the lower half only if symmetric."""
+        top = 0 if symmetric else 2 * width  # space for the fill-in of gbtrf
+        ld = top + width + 1 if top else width + 1 + SPARE
+        return cls(np.zeros(n * ld), np.zeros(n, np.int64), ld, width, top)
+
+    @property
+    def n(self) -> int:
+        return self.flat.size // self.ld
+
+    @property
+    def symmetric(self) -> bool:
+        return self.top == 0
+
+    # assembly
+
+    def clear(self) -> None:
+        """Set every entry to zero."""
+        self.flat.fill(0.0)
+        self.factors = None
+
+    def add_elements(self, K: Array, start: int, nd: int, left: Array) -> None:
+        """Add matrices K (ne, 2 nd, 2 nd) that couple node k and k + 1 of a chain.
+
+        ``start`` is the first row of node 0, ``nd`` the number of DOFs of a node, ``left`` (ne,)
+        the increasing left nodes. K is overwritten if the matrix is symmetric.
+        """
+        m, item, ld = 2 * nd, self.flat.itemsize, self.ld
+        if self.symmetric:  # the upper half would overlap other entries
+            K *= np.tri(m)
+        # diagonal blocks (m, m) at rows start, start + nd, ...
+        view = np.ndarray((int(left[-1]) + 1, m, m), float, self.flat,
+                          (start * ld + self.top) * item,
+                          (nd * ld * item, item, (ld - 1) * item))
+        if left[-1] - left[0] == len(left) - 1:
+            first = int(left[0])
+            view[first::2] += K[0::2]
+            view[first + 1::2] += K[1::2]
+        else:
+            view[left[0::2]] += K[0::2]
+            view[left[1::2]] += K[1::2]
+
+    def position(self, i: ArrayLike, j: ArrayLike) -> Array:
+        """Positions of entries (k,) in the flat storage."""
+        return np.asarray(j) * self.ld + self.top + np.asarray(i) - np.asarray(j)
+
+    def add(self, i: ArrayLike, j: ArrayLike, values: ArrayLike) -> None:
+        """Add entries; of a symmetric matrix only those in the lower half count."""
+        i, j, values = map(np.atleast_1d, (i, j, values))
+        if self.symmetric:
+            keep = i >= j
+            i, j, values = i[keep], j[keep], values[keep]
+        np.add.at(self.flat, self.position(i, j), values)
+
+    def diagonal(self) -> Array:
+        """A copy of the diagonal."""
+        return self.flat[self.top::self.ld].copy()
+
+    def add_diagonal(self, values: Array) -> None:
+        """Add values (n,) to the diagonal."""
+        self.flat[self.top::self.ld] += values
+        self.factors = None
+
+    def multiply(self, v: Array) -> Array:
+        """The matrix times a vector (n,)."""
+        out = np.empty(len(v))
+        multiply(self, v, out)
+        return out
+
+    def combine(self, a: float, A: BandMatrix, b: float, B: BandMatrix) -> BandMatrix:
+        """Set to ``a A + b B``."""
+        np.multiply(A.flat, a, out=self.flat)
+        self.flat[:] += b * B.flat
+        self.factors = None
+        return self
+
+    def factorize(self) -> BandMatrix:
+        """Factorise; LinAlgError if the matrix is singular."""
+        if self.symmetric:
+            self.factors, info = lapack.dpbtrf(as_lapack(self), lower=1)
+            if info == 0:
+                return self
+        self.factors, general = None, self.general()
+        if not factorize(general):
+            raise np.linalg.LinAlgError("the matrix is singular")
+        self.factors = general
+        return self
+
+    def general(self) -> BandMatrix:
+        """A copy with both halves stored."""
+        out = BandMatrix.zeros(self.n, self.width, symmetric=False)
+        as_lapack(out)[:] = _whole(self) if self.symmetric else as_lapack(self)
+        return out
+
+    def solve(self, b: Array) -> Array:
+        """Solve with the factors for ``b`` (n,) or (n, k)."""
+        if self.factors is None:
+            self.factorize()
+        if isinstance(self.factors, np.ndarray):
+            return lapack.dpbtrs(self.factors, b, lower=1)[0]
+        x = np.array(b.T, dtype=float, ndmin=2)
+        solve_many(self.factors, x, x)
+        return x.T.reshape(b.shape)
+
+    @property
+    def definite(self) -> bool:
+        """True if it has factors with positive pivots."""
+        known = self.factors
+        if known is None or isinstance(known, np.ndarray):
+            return known is not None
+        return self.symmetric and known.top == 0 and bool(
+            np.minimum.reduce(known.flat[::known.ld]) > 0.0)
+
+    def pivot_values(self) -> Array:
+        """Pivots (n,) of the factors of a symmetric matrix."""
+        if isinstance(self.factors, np.ndarray):
+            return self.factors[0] ** 2
+        return self.factors.flat[::self.ld].copy()
+
+    def inertia(self) -> Inertia:
+        """Inertia of a symmetric matrix, by Sylvester's law.
+
+        If Cholesky fails, the matrix is eliminated block by block along the chain; blocks whose
+        elimination lets entries grow are merged with the next. ValueError if it is not symmetric.
+        """
+        if not self.symmetric:
+            raise ValueError("the inertia needs a symmetric matrix")
+        if self.factors is None:
+            self.factorize()
+        diagonal = self.diagonal()
+        if self.definite and np.all(self.pivot_values() > SMALL * diagonal):
+            return Inertia(0, False)
+        return beside_zero(lambda shift: self.shifted(shift).negative())
+
+    def negative(self) -> int:
+        """Number of negative eigenvalues of a symmetric matrix, including round-off."""
+        _, info = lapack.dpbtrf(as_lapack(self), lower=1)
+        if info == 0:
+            return 0
+        size = np.abs(self.diagonal())
+        size[size == 0.0] = np.max(size)  # zero at a critical point
+        scale = 1.0 / np.sqrt(size)
+        negative, n, width = 0, self.n, max(self.width, 1)
+        first, last = 0, min(width, n)
+        P = self._dense(first, last, first, last, scale)
+        while True:
+            values, X = eigh(P)
+            if last == n:
+                return negative + int(np.sum(values < 0.0))
+            after = min(last + width, n)
+            A = self._dense(last, after, last, after, scale)
+            E = self._dense(first, last, last, after, scale)
+            Y = X.T @ E
+            used = values != 0.0
+            update = Y[used].T @ (Y[used] / values[used, None])
+            if np.max(np.abs(update)) <= GROWTH and not np.any(Y[~used]):
+                negative += int(np.sum(values < 0.0))
+                first, last, P = last, after, A - update
+            else:
+                # earlier rows are eliminated: they are in P and do not couple to later ones
+                P = np.block([[P, E], [E.T, A]])
+                last = after
+
+    def shifted(self, shift: float) -> BandMatrix:
+        """The matrix plus ``shift`` times the absolute diagonal."""
+        out = self._replace(flat=self.flat.copy())
+        out.flat[self.top::self.ld] += shift * np.abs(self.diagonal())
+        return out
+
+    def _dense(self, i0, i1, j0, j1, scale):
+        """Rows i0 to i1 and columns j0 to j1, scaled on both sides."""
+        row, column = np.arange(i0, i1)[:, None], np.arange(j0, j1)
+        inside = np.abs(row - column) <= self.width
+        if self.symmetric:
+            row, column = np.maximum(row, column), np.minimum(row, column)
+        out = np.where(inside, self.flat[np.where(inside, self.position(row, column), 0)], 0.0)
+        return scale[i0:i1, None] * out * scale[j0:j1]
+
+    def determinant_sign(self) -> int:
+        """Sign of the determinant, 1 or -1."""
+        if self.factors is None:
+            self.factorize()
+        lu = self.factors
+        if isinstance(lu, np.ndarray) or lu.top == 0:
+            return -1 if int(np.sum(self.pivot_values() < 0.0)) % 2 else 1
+        exchanges = int(np.sum(lu.pivots != np.arange(self.n)))
+        return -1 if (exchanges + int(np.sum(lu.flat[lu.top::lu.ld] < 0.0))) % 2 else 1
+
+    def symmetric_part(self) -> BandMatrix:
+        """(A + A^T) / 2 as a symmetric band matrix."""
+        out, (i, j, values) = BandMatrix.zeros(self.n, self.width), _entries(self)
+        out.add(i, j, 0.5 * values)
+        out.add(j, i, 0.5 * values)
+        return out
+
+    def skew_size(self, sizes: Array) -> tuple[float, float]:
+        """Largest |entries| of A - A^T and of A, in units of the DOF sizes (n,)."""
+        i, j, values = _entries(self)
+        A = sparse.csc_array((values * sizes[i] * sizes[j], (i, j)), shape=(self.n, self.n))
+        return float(abs(A - A.T).max()), float(abs(A).max())
+
+    def toarray(self) -> Array:
+        """A dense array, shape (n, n)."""
+        return self._dense(0, self.n, 0, self.n, np.ones(self.n))
+
+    def tocsc(self) -> sparse.csc_matrix:
+        """A sparse matrix in CSC format."""
+        i, j, values = _entries(self)
+        return sparse.coo_matrix((values, (i, j)), shape=(self.n, self.n)).tocsc()
+
+
+class CoupledBand(BandMatrix):
     """A band matrix with entries anywhere, in NumPy alone: sparse factors while there are any.
 
     ``entries()`` returns rows, columns and values (k,) each; of a symmetric matrix of both halves.
     """
 
     entries: Callable[[], tuple[Array, Array, Array]]
-    factors: Any = None
+    lu: Any = None
 
     def factorize_all(self) -> bool:
-        """Set ``factors``, None if there are no entries; False if it has none."""
-        self.factors, (i, j, v) = None, self.entries()
+        """Set ``lu``, None if there are no entries; False if it has none."""
+        self.lu, (i, j, v) = None, self.entries()
         if not len(v):
             return True
-        a, b, w = _entries(self)
-        n = len(self.flat) // self.ld
-        A = sparse.csc_array((np.append(w, v), (np.append(a, i), np.append(b, j))), shape=(n, n))
         try:
-            self.factors = splu(A, "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
+            self.lu = splu(self.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.n, self.n)),
+                           "MMD_AT_PLUS_A", 0.01, options={"SymmetricMode": True})
         except RuntimeError:
             return False
         return True
@@ -67,15 +325,22 @@ class CoupledBand(Band):
 
 def _entries(A):
     """Rows, columns and values of a band matrix."""
-    rows = A.flat.reshape(-1, A.ld)
+    rows, w = A.flat.reshape(-1, A.ld), A.width
     if A.top > 0:
+        rows = rows[:, A.top - w:]
         j, k = np.nonzero(rows)
-        return j + k - A.top, j, rows[j, k]
-    j, k = np.nonzero(rows[:, :A.width + 1])
+        return j + k - w, j, rows[j, k]
+    j, k = np.nonzero(rows[:, :w + 1])
     upper = rows if A.top == 0 else rows[:, A.ld // 2:]
     i, below = j + k, k > 0
     return (np.append(i, j[below]), np.append(j, i[below]),
             np.append(rows[j, k], upper[j[below], k[below]]))
+
+
+def halves(n: int, bandwidth: int) -> Band:
+    """A zero unsymmetric :class:`Band` of n rows, stored in two halves."""
+    ld = 2 * max(bandwidth + 1 + SPARE, (3 * bandwidth + 2) // 2)  # space for gbtrf too
+    return Band(np.zeros(n * ld), np.zeros(n, np.int64), ld, bandwidth, HALVES)
 
 
 def as_lapack(A: Band) -> Array:
@@ -90,12 +355,12 @@ def _pivoted(A):
 
 
 def _whole(A):
-    """A matrix of two halves in the storage of ``gbtrf``."""
+    """A symmetric matrix, or one in two halves, in the storage of ``gbtrf``."""
     n, w = len(A.flat) // A.ld, A.width
     columns, out = A.flat.reshape(n, A.ld), np.zeros((3 * w + 1, n))
     out[2 * w:] = columns[:, :w + 1].T
     for k in range(1, min(w + 1, n)):
-        out[2 * w - k, k:] = columns[:n - k, A.ld // 2 + k]
+        out[2 * w - k, k:] = columns[:n - k, (A.ld // 2 if A.top < 0 else 0) + k]
     return out
 
 
@@ -103,7 +368,7 @@ def _whole(A):
 def multiply(A, x, y):
     """y = A x."""
     n, k = len(x), A.width
-    ab = as_lapack(A)
+    ab = A.flat.reshape(-1, A.ld).T  # whole columns, of which BLAS needs no copy
     if A.top == 0:
         y[:] = blas.dsbmv(k, 1.0, ab, x, lower=1)
     elif n > 2 * k:
@@ -131,7 +396,7 @@ def factorize(A):
     if isinstance(A, CoupledBand):
         if not A.factorize_all():
             return False
-        if A.factors is not None:
+        if A.lu is not None:
             return True
     if A.top != 0:
         ab, whole = (_pivoted(A), _whole(A)) if A.top < 0 else 2 * (as_lapack(A),)
@@ -264,8 +529,8 @@ def solve_definite(A, L, fixed, b, x):
 
 def solve_many(A: Band, B: Array, X: Array) -> None:
     """X[k] = A^-1 B[k] for all k, with factors of A; B and X are (m, N)."""
-    if isinstance(A, CoupledBand) and A.factors is not None:
-        X[:] = A.factors.solve(B.T.copy()).T
+    if isinstance(A, CoupledBand) and A.lu is not None:
+        X[:] = A.lu.solve(B.T.copy()).T
         return
     if A.top > 0 or A.pivots[-1:].any():
         ab = _pivoted(A) if A.top < 0 else as_lapack(A)

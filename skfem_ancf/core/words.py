@@ -48,7 +48,8 @@ def constant(x: T) -> T:
 @cache
 def hints(kind: Any) -> tuple[Any, ...]:
     """Types of the fields of a named tuple."""
-    return tuple(get_type_hints(kind, include_extras=True).values())
+    found = get_type_hints(kind, include_extras=True)
+    return tuple(found[name] for name in kind._fields)
 
 
 def _collect(x, found):

@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 
 from ..actions.tables import constraint, joint_directions
-from ..core.band import CoupledBand
+from ..core.band import CoupledBand, halves
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
-from ..core.linalg import halves
 from ..core.types import Array
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import Motion, Scheme, in_steps, interpolate
-from .convergence import FAILURES, new_state
 from .time_functions import SAMPLES, TimeFunctions, TimeValues, rates
 from .energy_momentum import EnergyMomentum
-from .records import (Dampers, JointMotion, JointMotions, LowRankRows, Matrices, Rule, StepData,
-                      acceleration_of_joints, drive_rate, mass_factor, new_work, solve_rows)
+from .records import (FAILURES, Dampers, JointMotion, JointMotions, LowRankRows, Matrices, Rule,
+                      StepData, acceleration_of_joints, drive_rate, mass_factor, new_state,
+                      new_work, solve_rows)
 from .steps import steps
 from .tangent import factors
 
@@ -112,13 +111,13 @@ class Integrator:
             alpha_m, alpha_f, beta, _ = scheme.parameters
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
             system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
-        M, A = system.mass.band, system.new_band()
+        M, A = system.mass, system.new_band()
         self._nodes: tuple[Condensed, CondensedMass] | None = None
         if in_steps(scheme) and system.mass_solver.by_nodes:
             self._nodes = Condensed(system, A), CondensedMass(system)
         unsymmetric = scheme.conserving and self._nodes is None
         U = halves(system.N if unsymmetric else 0, system.bandwidth)
-        self._matrices = Matrices(M, system.mass_solver.factors.band, _coupled(A.band, system),
+        self._matrices = Matrices(M, system.mass_solver.factors, _coupled(A, system),
                                   _coupled(U, system), *_damping(system))
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self._rule = Rule._make([
@@ -476,7 +475,7 @@ def _coupled(A, system):
 
 def _damping(system):
     """The low-rank rows beside the band, and the Dampers of a system."""
-    modes, M = system.modal_damping.rows, system.mass.band
+    modes, M = system.modal_damping.rows, system.mass
     rows = np.concatenate([modes, system.forces.far_rows()])
     k = len(rows)
     D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))

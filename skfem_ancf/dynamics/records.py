@@ -11,9 +11,9 @@ from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import add_viscous_force, body_tangent
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..core.callbacks import custom_joints
-from ..core.source import F1, F2, F3, MADE, apart, indices, source
+from ..core.source import F1, F2, F3, I1, MADE, apart, indices, source
+from ..core.words import hints
 from ..equations.tables import Equations
-from .convergence import StepState
 
 
 # damping in kernels: of materials, proportional to the mass, and of modes
@@ -208,7 +208,7 @@ class Rule(NamedTuple):
     beta: float
     gamma: float
     tol: float  # of the iteration, relative, in the energy norm
-    floor: float  # round-off of the strains in that norm
+    noise: float  # round-off of the strains in that norm
     inertia: float  # mass times squared positions, for the round-off of joints
     solver: int  # handle of the linear solver for eliminated joints, or 0
     mass_solver: int  # the same with the mass matrix
@@ -296,6 +296,39 @@ class Work(NamedTuple):
     J: F3  # Jacobian where joints act, at the end, and solutions by A and M, (4, m, N)
     S: F2  # J1 A^-1 J^T, (m, m)
     stresses: F2  # zero; start; work; independent; iterate; the last two of strain rates, (7, k)
+
+
+#: Largest number of iterations of a step, and with pressure corrections; converging ones need up to
+#: 200.
+ITERATIONS, AUGMENTED = 30, 300
+#: Messages by the number in ``StepState.failure``, see :mod:`skfem_ancf.equations.convergence`.
+FAILURES = ("", "the iteration matrix is singular", "the residual is not finite",
+            "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
+            "the joints are dependent",
+            f"the pressures of method='augmented' do not converge in {AUGMENTED} iterations (use "
+            "a larger tolerance= of the obstacle, or method='penalty')")
+
+
+class StepState(NamedTuple):
+    """The state of a run of steps: arrays of one number, which the steps change."""
+
+    factors: I1  # factorised matrix: 0, SYMMETRIC or UNSYMMETRIC
+    iterations: I1
+    factorizations: I1
+    contraction: F1  # of the last corrections, or expected of new factors
+    last_dt: F1
+    energy: F1  # the largest so far
+    failure: I1  # number in FAILURES
+    fresh: I1  # number of factorisations in this step
+    correction: F1  # size; before the first, minus the factorisations of the last step
+    last_correction: F1  # the one before
+    dissipated: F1  # work of damping
+    mixed_steps: I1  # remaining steps of the mixed iteration
+
+
+def new_state() -> StepState:
+    """The StepState before the first step."""
+    return StepState._make(np.zeros(1, int if hint is I1 else float) for hint in hints(StepState))
 
 
 #: Arguments of the functions of a step: equations, matrices, rule, step, work and state.

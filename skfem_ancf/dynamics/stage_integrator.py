@@ -40,7 +40,7 @@ class StageIntegrator(Integrator):
     @cached_property
     def _work(self):
         s, tables = self.system, self.system.backend.tables
-        M = s.mass.band
+        M = s.mass
         return new_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
                                tables.stresses.size, gradients_size(tables.plain.body),
                                M._replace(flat=np.zeros(M.flat.size)))
@@ -89,7 +89,7 @@ class StageIntegrator(Integrator):
 
     def damped(self, du: Array, time: float) -> Array:
         """Average a damped increment over a time span: (M + D time / 2)^-1 M du."""
-        s, M = self.system, self.system.mass.band
+        s, M = self.system, self.system.mass
         A = M._replace(flat=M.flat + 0.5 * time * self._work.D.flat, pivots=M.pivots.copy())
         fix(A, s.constraints.fixed)
         if not factorize(A):

@@ -18,10 +18,10 @@ from ..actions.forces.kernels import (add_elastic_force, set_contact_rate, settl
 from ..core.source import indices, source
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, carry_eigenstrains,
                               constraint, external_force, joint_directions)
-from .convergence import (DEPENDENT, DONE, FAILED, GO_ON, ITERATIONS, NOT_CONVERGED, RESTART,
-                          SINGULAR, judged, round_off)
-from .records import (JointMotion, acceleration_of_joints, damping_beside, damping_force,
-                      drive_rate, row_of)
+from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
+                                     SINGULAR, judged, noise_of_step)
+from .records import (ITERATIONS, JointMotion, acceleration_of_joints, damping_beside,
+                      damping_force, drive_rate, row_of)
 from .stage_tangent import factorize_stages, flat_points, join, solve_for
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
@@ -87,8 +87,8 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k], method.values[1, k]
         largest = max(largest, (a * a + b * b) / (s.h * s.h))
-    rough = round_off(rule, 1.0, largest, abs(np.dot(u0, scratch)))
-    wanted = rule.tol * np.sqrt(state.energy[0]) + rough
+    reference = np.sqrt(state.energy[0])
+    noise = noise_of_step(rule, 1.0, largest, abs(np.dot(u0, scratch)))
     state.fresh[0], state.correction[0] = 0, -1.0
     if state.mixed_steps[0] > 0:
         state.factors[0] = 0  # the beam has rotated since
@@ -109,7 +109,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if not _correct(e.free, method, s, w, state):
             state.failure[0] = DEPENDENT
             return False
-        status = judged(state, wanted, rough, REUSED, MIXED, False)
+        status = judged(state, rule.tol, reference, noise, REUSED, MIXED, False)
         if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and _is_lost(state):
             state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
             body_gradients(e.body, w.origin, w.B)

@@ -23,13 +23,20 @@ from ..beam.strain_energy import accept_body, body_linearised, body_stress, quad
 from ..core.band import clear, copy, dot, solve_joined, subtract_rows, total
 from ..core.callbacks import call_solver
 from ..core.source import F1, apart, indices, shaped, source
-from .convergence import (AUGMENTED, DEPENDENT, DONE, EXACTLY, FAILED, FAR, GO_ON, ITERATIONS,
-                          LASTING, MIXED, NOT_CONVERGED, RESTART, REUSED, ROUGH, ROUGHLY, SLOW,
-                          SYMMETRIC, UNSETTLED, UNSYMMETRIC, judged, round_off)
-from .records import ALL, acceleration_of_joints, damping_force, drive_rate, solve_rows, step_of
+from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, LASTING, MIXED, NOT_CONVERGED,
+                                     RESTART, REUSED, ROUGH, SLOW, SYMMETRIC, UNSETTLED,
+                                     UNSYMMETRIC, judged, noise_of_step)
+from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, damping_force, drive_rate,
+                      solve_rows, step_of)
 from .tangent import (add_damping_force, add_elastic, add_impulses, directions, factorize_tangent,
                       factors, free_velocity, internal_force, kinetic_energy, residual, tangent,
                       to_damping_velocity, to_middle)
+
+
+#: Relative correction beyond which factors of the predicted end of a step are poor.
+FAR = 0.03
+#: Accuracy of the impulses of eliminated joints.
+ROUGHLY, EXACTLY = range(2)
 
 
 # velocities, accelerations and multipliers at the end of a step
@@ -211,7 +218,6 @@ def _iterate(e, matrices, rule, s, w, state):
     contacts, stale = e.forces.contacts, not s.kept
     limits = np.empty(2)
     _predict(e, matrices, rule, s, w, state, limits)
-    rough, wanted = limits[0], limits[1]
     status, left, most = GO_ON, ITERATIONS, AUGMENTED
     _start(e, matrices, rule, s, w, state)
     if e.lasting > 0:
@@ -241,7 +247,7 @@ def _iterate(e, matrices, rule, s, w, state):
         if status == GO_ON:
             status = _correct(e, matrices, rule, s, w, state, anew)
         if status == GO_ON:
-            status = _judged(e, matrices, rule, s, w, state, wanted, rough)
+            status = _judged(e, matrices, rule, s, w, state, limits[0], limits[1])
         if status == DONE and contacts.lasting >= PRESSURES:
             augment_contact(e.forces, s.t, w.x.u, taken)
             if taken[0] > 0.0:
@@ -275,7 +281,7 @@ def _end(e, matrices, rule, s, w, state):
 def _predict(e, matrices, rule, s, w, state, limits):
     """Set all that does not depend on u_1, and the initial guess with the acceleration at 0.
 
-    ``limits`` get the round-off of a correction, and its tolerance.
+    ``limits`` get the reference of the tolerance, and the round-off of a correction.
     """
     h, u, guess, straight = s.dt, w.x.u, w.x.guess, w.x.straight
     base, speed, rest, constrained = w.x.base, w.x.speed, w.x.rest, w.x.constrained
@@ -297,9 +303,9 @@ def _predict(e, matrices, rule, s, w, state, limits):
     state.fresh[0], state.correction[0] = 0, -max(1.0, state.fresh[0])
     free_velocity(e.free, rule, s, w)
     energy = max(state.energy[0], kinetic_energy(matrices.M, w.x.v, w.x.scratch))
-    noise = 2.0 * abs(kinetic_energy(matrices.M, u, w.x.scratch))
-    rough = round_off(rule, s.stiffness_factor, s.mass_factor, noise)
-    limits[0], limits[1] = rough, rule.tol * np.sqrt(energy) + rough
+    inertia = 2.0 * abs(kinetic_energy(matrices.M, u, w.x.scratch))
+    limits[0] = np.sqrt(energy)
+    limits[1] = noise_of_step(rule, s.stiffness_factor, s.mass_factor, inertia)
 
 
 @apart("motion", *ALL)
@@ -357,7 +363,7 @@ def _correct(e, matrices, rule, s, w, state, anew):
 
 
 @apart("motion", *ALL, float, float, returns=int)
-def _judged(e, matrices, rule, s, w, state, wanted, rough):
+def _judged(e, matrices, rule, s, w, state, reference, noise):
     """Update the independent stresses and decide what to do after the correction.
 
     If old factors rotate with respect to a stiff, slender beam, they take axial stretch for
@@ -374,14 +380,15 @@ def _judged(e, matrices, rule, s, w, state, wanted, rough):
                 scratch[i] = s.damping_factor * du[i]
             body_linearised(e.viscous, w.x.origin, scratch, w.stresses[6], w.stresses[5])
         size, before = state.correction[0], SLOW * state.last_correction[0]
-        slow = ROUGH * rough < size and 0.0 < before < size
+        slow = ROUGH * noise < size and 0.0 < before < size
         if slow and state.fresh[0] > 0 and state.factors[0] == SYMMETRIC:
             state.mixed_steps[0] = 2 * LASTING
     # only the displacement of the factors is wrong, and the last step was easy: require more
     easy = state.last_correction[0] >= -1.0 and state.contraction[0] <= SLOW
     later = (state.factors[0] == UNSYMMETRIC and easy and quadratic(e.body)
              and _far(matrices.M, s, w))
-    return judged(state, wanted, rough, REUSED, MIXED if state.fresh[0] > 0 else REUSED, later)
+    return judged(state, rule.tol, reference, noise, REUSED,
+                  MIXED if state.fresh[0] > 0 else REUSED, later)
 
 
 @source

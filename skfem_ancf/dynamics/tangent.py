@@ -12,7 +12,7 @@ from ..core.band import (add_halves, add_multiple, clear, copy, dot, factorize, 
                          subtract_rows)
 from ..core.callbacks import call_solver, custom_joints
 from ..core.source import apart, indices, source
-from .convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
+from ..equations.convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
 from .records import ALL, add_damping, damping_beside, factorize_rows
 
 

@@ -206,7 +206,7 @@ class Backend:
 
     def keep_factors(self) -> None:
         """Let the tangent have the factors of the last compiled iteration."""
-        self.tables.system.K.take_factors(self._flat[0].factors)
+        self.tables.system.K.factors = self._flat[0].factors
 
     def _give_up(self, kernel, error):
         if isinstance(error, code_cache.NotCompiled):

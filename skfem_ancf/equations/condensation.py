@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..beam.beam import Beam
-from ..core.linalg import NO_FACTORS, SMALL, BandMatrix, Inertia
+from ..core.band import NO_FACTORS, SMALL, BandMatrix, Inertia
 from ..core.types import Array
 from .signature import diagonal_factors
 
@@ -530,10 +530,10 @@ def _between(S, A, T):
 
 def _blocks(K, group):
     """Diagonal blocks (M, elements + 1, nd, nd) and subdiagonal blocks of members."""
-    nd, n, ld = group.nd, group.elements, K.band.ld
+    nd, n, ld = group.nd, group.elements, K.ld
     a, b = np.arange(nd)[:, None], np.arange(nd)
     low, high = np.minimum(a, b), np.maximum(a, b)
     # columns of the band by node
-    nodes = K.band.flat.reshape(-1, ld)[group.places].reshape(-1, n + 1, nd * ld)
+    nodes = K.flat.reshape(-1, ld)[group.places].reshape(-1, n + 1, nd * ld)
     D, C = nodes.take(low * ld + high - low, axis=2), nodes[:, :n].take(b * ld + nd + a - b, axis=2)
     return D, C

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..actions.joints.base import Joint, IndependentPart, UnitDirector
+from ..actions.bound import BoundConstraint
+from ..actions.joints.base import IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam.beam import Beam
 from ..beam.rigid import RigidBody
@@ -65,7 +66,7 @@ class Constraints:
     """
 
     def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
-                 fixed: Array, values: Array, joints: Sequence[Joint],
+                 fixed: Array, values: Array, joints: Sequence[BoundConstraint],
                  stiffness: Callable[[], Any] | None) -> None:
         self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
         self.N = slices[-1].stop
@@ -73,7 +74,7 @@ class Constraints:
         self._eliminate(fixed, values, joints)
         #: redundant equations, and those of each joint
         self._left_out = np.zeros(0, dtype=int)
-        self._unasked: list[tuple[Joint, Array, Array]] = []
+        self._unasked: list[tuple[BoundConstraint, Array, Array]] = []
         self._leave_out()
 
     def _eliminate(self, fixed, values, joints):
@@ -360,9 +361,9 @@ class Constraints:
                    np.zeros(self.N))
 
     @cached_property
-    def _limited(self) -> list[Joint]:
+    def _limited(self) -> list[BoundConstraint]:
         """Joints with a limited range."""
-        return [joint for joint in self.joints if type(joint).lost is not Joint.lost]
+        return [joint for joint in self.joints if type(joint).lost is not BoundConstraint.lost]
 
     def lost(self, u: Array) -> str:
         """Why a joint cannot act in a converged state, or ""."""
@@ -386,7 +387,7 @@ class Constraints:
         ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
         return np.split(multipliers, ends)
 
-    def joint_force(self, joint: Joint, multipliers: Array, reaction: Array, u: Array,
+    def joint_force(self, joint: BoundConstraint, multipliers: Array, reaction: Array, u: Array,
                     t: float) -> Array:
         """Force of a joint on its first beam, one number for each of ``joint.equations``.
 
@@ -410,7 +411,7 @@ class Constraints:
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
-    def driven(self, joint: Joint, change: Array) -> tuple[Array, Array]:
+    def driven(self, joint: BoundConstraint, change: Array) -> tuple[Array, Array]:
         """Changes of J u (m,) and of fixed displacements (N,) for a change of Phi of a joint."""
         rows, fixed, at = np.zeros(self.m), np.zeros(self.N), 0
         for known in self.joints:

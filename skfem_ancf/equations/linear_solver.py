@@ -16,10 +16,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from ..core.band import fix
+from ..core.band import NO_FACTORS, SMALL, BandMatrix, Inertia, fix
 from ..core.immutable import cached_property
 from ..core.callbacks import handle_of
-from ..core.linalg import NO_FACTORS, SMALL, BandMatrix, Inertia
 from ..core.types import Array
 from .condensation import Condensed
 from .signature import DEPENDENT, Block, blocks, determinant_sign, diagonal_factors, inertia_of
@@ -97,7 +96,7 @@ class LinearSolver:
     @cached_property
     def _supports(self):
         """Places in the band of the entries of fixed DOFs that are 0, and that are 1."""
-        band = self._system.K.band
+        band = self._system.K
         marked = band._replace(flat=np.full(band.flat.size, np.nan))
         fix(marked, self._system.constraints.fixed)
         return (marked.flat == 0.0).nonzero()[0], (marked.flat == 1.0).nonzero()[0]
@@ -111,7 +110,7 @@ class LinearSolver:
             If the matrix is singular.
         """
         s, constraints = self._system, self._system.constraints
-        (zeros, ones), entries = self._supports, s.K.band.flat
+        (zeros, ones), entries = self._supports, s.K.flat
         entries[zeros], entries[ones] = 0.0, 1.0
         if not self.coupled:
             s.K.factorize()
@@ -124,7 +123,7 @@ class LinearSolver:
         J = constraints.jacobian_entries(u, t)
         more = tuple(np.append(a, b) for a, b in zip(
             constraints.curvature_entries(u, t, multipliers), self._far_entries()))
-        inside = np.abs(more[0] - more[1]) <= s.K.bandwidth
+        inside = np.abs(more[0] - more[1]) <= s.K.width
         s.K.add(*(x[inside] for x in more))
         more = tuple(x[~inside] for x in more)
         self._last.joined = None
@@ -252,17 +251,17 @@ class Schur:
     """
 
     def __init__(self, K: BandMatrix, J: Any, constraints: Any) -> None:
-        self._K, self._J, before = K, constraints.to_dense(*J), K.band.flat.copy()
+        self._K, self._J, before = K, constraints.to_dense(*J), K.flat.copy()
         self._weights, size = np.zeros(constraints.m), np.abs(K.diagonal())
         for k, row in enumerate(self._J):
             at, = np.nonzero(row)
-            if len(at) and np.ptp(at) <= K.bandwidth:
+            if len(at) and np.ptp(at) <= K.width:
                 self._weights[k] = w = np.max(size[at]) / np.max(np.abs(row)) ** 2
                 K.add(np.repeat(at, len(at)), np.tile(at, len(at)),
                       w * np.outer(row[at], row[at]).ravel())
         definite = K.factorize().definite
-        if not definite or np.any(K.pivots() < SURE * K.diagonal()):
-            K.band.flat[:] = before
+        if not definite or np.any(K.pivot_values() < SURE * K.diagonal()):
+            K.flat[:] = before
             raise np.linalg.LinAlgError("the matrix is not positive definite")
         self._Y = K.solve(self._J.T)
         self._S = self._J @ self._Y
@@ -325,15 +324,15 @@ class Pattern:
 
     def of_band(self, K: BandMatrix) -> tuple[Any, Any, Any]:
         """Rows, columns and values of a band matrix, with zeros that were nonzero before."""
-        flat = K.band.flat
+        flat = K.flat
         used = flat != 0.0
         if len(self._band) != len(used):
             self._band = used
         elif np.any(used > self._band):
             self._band = self._band | used
         at, = np.nonzero(self._band)
-        j = at // K.band.ld
-        i = j + at % K.band.ld - K.band.top
+        j = at // K.ld
+        i = j + at % K.ld - K.top
         below, = np.nonzero(i > j) if K.symmetric else (np.zeros(0, int),)
         return np.append(i, j[below]), np.append(j, i[below]), np.append(flat[at], flat[at[below]])
 

@@ -10,9 +10,8 @@ from weakref import proxy
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from ..core.band import factorize, fix, solve_dependent
+from ..core.band import Band, BandMatrix, dense, factorize, fix, solve_dependent
 from ..core.errors import InputError, shown
-from ..core.linalg import BandMatrix, dense
 from ..core.types import Array
 from .condensation import CondensedMass
 
@@ -31,15 +30,13 @@ class MassSolver:
         """Factors of the mass matrix with its supports fixed."""
         s = self._system
         M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
-        fix(M.band, s.constraints.fixed)
-        if not factorize(M.band):
+        fix(M, s.constraints.fixed)
+        if not factorize(M):
             if s.forces.masses:
                 raise InputError("the mass matrix is singular to round-off: a mass or inertia of "
                                  f"{shown(s.forces.masses)} is too large compared with the beams")
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
-        M.take_factors(M.band)
-        if not self.by_nodes and M.definite:
-            M.to_cholesky()  # for LAPACK; kernels use the band
+        M.factors = Band(*M)
         return M
 
     @cached_property

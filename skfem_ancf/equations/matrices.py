@@ -10,7 +10,7 @@ from scipy import sparse
 from ..beam.kinematics import element_dofs, entries_of
 from ..beam.strain_energy import body_tangent
 from ..core.errors import InputError
-from ..core.linalg import BandMatrix
+from ..core.band import BandMatrix
 from ..core.types import Array
 from .strain_tangent import load_stiffness
 from .system import System
@@ -115,8 +115,8 @@ def matrices_of(system: Any, state: Any) -> SceneMatrices:
         i, j = entries_of(s.start + element_dofs(beam))
         K = K + _square(system, i, j, system.histories.kernel(beam).tangents(u[s]))
     if system.viscous:
-        band, none = BandMatrix(system.N, system.bandwidth), tables.stresses
-        body_tangent(tables.plain.viscous, u, 0.0 * u, none, True, tables.stresses, band.band)
+        band, none = BandMatrix.zeros(system.N, system.bandwidth), tables.stresses
+        body_tangent(tables.plain.viscous, u, 0.0 * u, none, True, tables.stresses, band)
         D = D + band.tocsc()
     if system.forces.elements:
         forces = tables.plain.forces

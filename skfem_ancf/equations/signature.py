@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from ..core.linalg import SMALL, Inertia, beside_zero, dense
+from ..core.band import SMALL, Inertia, beside_zero, dense
 from ..core.types import Array
 
 #: Relative remainder of a dependent row.
@@ -125,7 +125,7 @@ def _members(group, number):
 
 
 def inertia_of(A: Array | sparse.csr_array) -> Inertia:
-    """The :class:`~skfem_ancf.core.linalg.Inertia` of a symmetric matrix.
+    """The :class:`~skfem_ancf.core.band.Inertia` of a symmetric matrix.
 
     For a sparse matrix it follows from the pivots of ``L D L^T``, by Sylvester's law.
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-from ..core.band import fix
-from ..core.linalg import NO_FACTORS, Inertia
+from ..core.band import NO_FACTORS, Inertia, fix
 from ..core.types import Array
 
 logger = logging.getLogger(__name__)
@@ -161,7 +160,7 @@ def has_potential(system: Any, u: Array, load: float) -> bool:
     if system.symmetric:
         return True
     system.assemble(u, load)
-    fix(system.K.band, system.constraints.fixed)
+    fix(system.K, system.constraints.fixed)
     return _is_symmetric(system)
 
 
@@ -185,7 +184,7 @@ def is_stabilised(system: Any, u: Array, multipliers: Array) -> bool:
     """
     system = system.sticking()
     force, _ = system.assemble(u)
-    fix(system.K.band, system.constraints.fixed)
+    fix(system.K, system.constraints.fixed)
     loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
     if is_nothing(system, loads):
         return False

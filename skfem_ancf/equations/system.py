@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import wraps
 from itertools import accumulate, count, pairwise
 from math import sqrt
@@ -13,10 +12,10 @@ from weakref import proxy
 import numpy as np
 from scipy import sparse
 
-from ..actions.forces.base import ForceElement
+from ..actions.bound import BoundConstraint, BoundForce
 from ..actions.forces.kernels import add_resisting_force
 from ..actions.forces.system import DomainForce, Forces
-from ..actions.joints.base import Joint, UnitDirector
+from ..actions.joints.base import UnitDirector
 from ..actions.joints.nodes import chain_places
 from ..actions.loads import EndMoment, Load
 from ..actions.tables import MATERIALS, carry_eigenstrains
@@ -27,7 +26,7 @@ from ..beam.points import Points
 from ..beam.rigid import RigidBody
 from ..core.immutable import cached_property
 from ..core.errors import InputError
-from ..core.linalg import BandMatrix
+from ..core.band import BandMatrix
 from ..core.types import Array
 from ..materials.damping import UNDAMPED, Damping
 from ..mesh.mesh_beam import reach
@@ -170,12 +169,12 @@ class System:
     units : tuple of str or None
         Units of force and length, for plots and files.
     clock : float or None
-        The time of functions of time in statics, see :meth:`stopped_at`; None for full load.
+        The time of functions of time in statics, see :meth:`at`; None for full load.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
-                 joints: Sequence[Joint] = (), damping: Damping | None = None,
-                 elements: Sequence[ForceElement] = (), bodies: Sequence[RigidBody] = (),
+                 joints: Sequence[BoundConstraint] = (), damping: Damping | None = None,
+                 elements: Sequence[BoundForce] = (), bodies: Sequence[RigidBody] = (),
                  rest_modes: Callable[[System, int], tuple[Array, Array]] | None = None,
                  domains: Sequence[Domain] = ()) -> None:
         self._given: tuple[Any, ...] = (
@@ -297,14 +296,13 @@ class System:
 
     # loads
 
-    @contextmanager
-    def stopped_at(self, t: float) -> Iterator[None]:
-        """Evaluate functions of time at t in statics."""
-        before, self.clock = self.clock, t
-        try:
-            yield
-        finally:
-            self.clock = before
+    def at(self, t: float) -> System:
+        """The equations in which functions of time are those at t in statics; all else is shared.
+        """
+        other = object.__new__(System)
+        vars(other).update(vars(self), clock=t, backend=self.backend, solver=self.solver,
+                           _whole=self._whole or self)
+        return other
 
     def external_force(self, u: Array, t: float | None = None) -> Array:
         """The force of all loads at full size, shape (N,)."""
@@ -451,7 +449,7 @@ class System:
 
     def new_band(self) -> BandMatrix:
         """A zero band matrix."""
-        return BandMatrix(self.N, self.bandwidth, self.symmetric)
+        return BandMatrix.zeros(self.N, self.bandwidth, self.symmetric)
 
     @shared
     def mass(self) -> BandMatrix:

@@ -7,7 +7,7 @@ from weakref import proxy, ref
 
 import numpy as np
 
-from ..core.band import Band
+from ..core.band import Band, dense
 from ..core.immutable import cached_property
 from ..beam.strain_energy import (BEGIN, KIND, Body, FlatBody, body_of, copies_of,
                                   eigenstrain_body_of, stress_size, viscous_body_of)
@@ -19,7 +19,6 @@ from ..beam.kernels.tables import CABLE, linearised
 from ..core.callbacks import handle_of
 from ..core.source import F1, I1
 from ..core.words import constant
-from ..core.linalg import dense
 from ..actions.loads import Load
 from ..actions.tables import JointTables, LoadTables
 from ..core.types import Array
@@ -142,7 +141,7 @@ class Tables:
         if histories.of_beams.history.size:
             body = body.after(histories.of_beams)
         self.plain = Equations(body, self._load_tables(), joints,
-                               system.constraints.fixed, system.constraints.mask, system.K.band,
+                               system.constraints.fixed, system.constraints.mask, system.K,
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body, system.constraints.coordinate_sizes,
                                histories.values, histories.span, histories.lasting,

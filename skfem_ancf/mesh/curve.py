@@ -135,11 +135,8 @@ class Curve:
         return np.hypot(*d) @ w * (b - a)
 
     def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Geometry of the elements between nodes at parameters ``s`` (n,).
-
-        Returns positions, unit tangents, lengths, turning, and the curvature of each sixteenth of
-        the elements, (16 n - 16,). Raises MeshError where the derivative is zero, does not fit r,
-        or has a jump in direction at a node.
+        """Positions, unit tangents, lengths, turning, and curvature (16 n - 16,) of sixteenths of
+        the elements between nodes at parameters ``s`` (n,).
         """
         a, step = s[:-1], np.diff(s)
         beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
@@ -244,9 +241,8 @@ def _gauss_points(a, step):
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
-    """Raise MeshError where the radius of curvature is below h/2.
-
-    ``bent`` is the curvature of sixteenths of the elements, ``s`` are the parameters of the nodes.
+    """Raise MeshError where sixteenths of elements between nodes s have radii of curvature below
+    h/2.
     """
     height = np.broadcast_to(height, len(s) - 1).repeat(16)
     k = int(np.argmax(bent * height))

@@ -29,11 +29,8 @@ UNITS = "m", "mm", "cm", "dm", "km", "in", "ft", "yd"
 
 
 def mesh_of_dxf(path: Path, unit: str | None = None) -> Any:
-    """The lines and points of the model space, as cell sets named after their layers.
-
-    Coordinates are converted to ``unit`` from that of the drawing; None takes them as drawn.
-    Polylines are split into lines. Text, dimensions and hatches are ignored; MeshError for curves
-    or blocks, FileError if the file cannot be read.
+    """The lines and points of a drawing as a meshio mesh, cell sets named after their layers; None
+    takes coordinates as drawn.
     """
     import meshio
 
@@ -93,12 +90,8 @@ LINE = re.compile("line([0-9]*)")
 
 def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
                     tol: float | None = None, unit: str | None = None) -> FrameGraph:
-    """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF.
-
-    Cells "line" are straight, "line3", "line4", ... are polynomials through their points, "vertex"
-    cells name nodes. ``groups`` are names of the sets of lines that become beams; by default those
-    in ``named``, to which other arguments refer, and those that share no line with another set.
-    ``tol`` is as for :class:`FrameGraph`. The coordinates of a drawing are converted to ``unit``.
+    """The graph of the line cells of a ``meshio.Mesh``, or of a file of meshio or DXF: see
+    :meth:`skfem_ancf.Frame.from_meshio`. ``named`` are sets to which other arguments refer.
     """
     mesh = _mesh_of(mesh, unit)
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
@@ -168,10 +161,7 @@ def _mesh_of(mesh, unit):
 
 
 def _require_sets_of_abaqus(path):
-    """Raise MeshError for element sets of an Abaqus file that meshio 5 misreads.
-
-    It matches names at ``*ELEMENT`` to blocks as if each block had a name.
-    """
+    """Raise MeshError for element sets of an Abaqus file that meshio 5 misreads."""
     blocks, sets, keyword = [], [], ""
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         if line.startswith("*"):
@@ -254,10 +244,7 @@ def _entries(name, part, n):
 
 
 def _numbered(mesh, wanted):
-    """Cell sets stored as numbers: Gmsh physical groups, or names in meshio cell data.
-
-    For formats without names meshio writes data called "a-b", with 0 for set a and 1 for set b.
-    """
+    """Cell sets stored as numbers: Gmsh physical groups, or names in meshio cell data."""
     sets = {}
     names = {int(number): name for name, (number, _) in mesh.field_data.items()}
     for key, parts in mesh.cell_data.items():

@@ -17,7 +17,6 @@ from ..core.errors import (InputError, MeshError, ModelWarning, NameUnknown, ask
 from ..core.types import Array
 from .curve import Curve
 from .mesh_beam import MeshBeam
-from .numbering import default_tags
 from .places import is_point, points_of_rows, satisfying
 from .mapping import heights_of
 
@@ -46,9 +45,7 @@ class MeshLines(MeshBeam):
 
 
 class Heights:
-    """Height of chains as a function of parameters, from 2 k to 2 k + 1 on chain k.
-
-    ``given`` has for each chain, or once for all, a number or a function of parameters in [0, 1].
+    """Height of chains: for each, or once for all, a number or a function of parameters in [0, 1].
     """
 
     def __init__(self, given: Sequence[float | Callable[[Array], Any]]) -> None:
@@ -75,8 +72,6 @@ def _values(height, s):
 def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
                       ) -> tuple[float, Array | None, Any]:
     """As :func:`~.mapping.heights_of`, for a number, a function, or a list with one for each chain.
-
-    Functions take parameters (n,) in [0, 1]; messages identify chains by their ``numbers``.
     """
     chain = chain_of(s)
     local = s - 2.0 * chain
@@ -97,10 +92,8 @@ def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
 
 
 class Axes:
-    """The axes of chains, a Curve for parameters from 2 k to 2 k + 1 on chain k.
-
-    ``arcs`` has the curves of chains by number. The others are straight, with starts ``start`` and
-    end-to-end vectors ``chord``, (2, k).
+    """The axes of chains: the curves ``arcs`` by number; others straight from ``start`` along
+    ``chord``.
     """
 
     def __init__(self, arcs: Mapping[int, Curve], start: Array, chord: Array) -> None:
@@ -155,33 +148,10 @@ PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a
 class FrameGraph:
     """The graph of a frame: points, lines between them, and names for both.
 
-    Parameters
-    ----------
-    points, lines
-        Points (x, y) and pairs of point numbers: lists, or arrays of shapes (n, 2) and (m, 2).
-    groups, nodes
-        Numbers of lines and of points by name.
-    curves
-        For the number of a line a function of parameters s (k,) in [0, 1] that returns points
-        (2, k) of its axis.
-    tol
-        Points closer than this are merged into one node; by default 1e-5 of the extent of the
-        graph, at most 1e-3 of its longest line.
-    beams
-        Names of the groups that are beams, without common lines; all of them by default.
-    lost
-        By name, points of a mesh that are not in the graph.
-
-    Attributes
-    ----------
-    points, lines
-        Shapes (2, n) and (2, m). Merged points have the same position; lines refer to the first.
-    given
-        Lines as given, shape (2, m).
-    distinct
-        Numbers of the lines between distinct nodes, shape (k,).
-    same
-        Node of each point, the first of the merged points, shape (n,).
+    Arguments are those of :meth:`skfem_ancf.Frame.from_lines`; ``beams`` names the groups that are
+    beams, ``lost`` points of a mesh that are not in the graph. ``points`` (2, n) that are merged
+    have the same position, and ``lines`` (2, m) refer to the first of them, ``same`` (n,);
+    ``given`` are lines as given, ``distinct`` those between distinct nodes.
     """
 
     def __init__(self, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
@@ -311,11 +281,8 @@ class FrameGraph:
         return float(np.max(np.ptp(self.points, axis=1)))
 
     def nodes_at(self, place: Any) -> Array:
-        """Numbers of the nodes at a place, shape (k,), k >= 1.
-
-        A place is the name of nodes, or of lines for their ends, the number of a node, a point
-        (x, y) as a tuple, a function of points x (2, n) that returns n truth values, an array of
-        numbers, an array of points (k, 2), or a list of these.
+        """Numbers of the nodes at one of :data:`PLACES`, an array of numbers or of points, shape
+        (k,), k >= 1.
         """
         found = self.same[self.points_at(place)]
         return found if len(found) == 1 else np.unique(found)
@@ -367,10 +334,8 @@ class FrameGraph:
                                          self.lines.shape[1] - 1)])
 
     def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
-        """A mesh with one chain of elements for each of the lines (k,), in their order.
-
-        ``elements`` (m,) is the number of elements of every line; ``height`` is that of
-        :func:`~.frame_graph.heights_of_chains`.
+        """A mesh with one chain for each of the lines (k,); ``elements`` (m,) are the numbers for
+        every line.
         """
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])
@@ -385,27 +350,24 @@ class FrameGraph:
         arcs: dict[int, Curve] = {}
         for k in map(int, np.flatnonzero(np.isin(lines, list(self.curves)))):
             nodes = np.arange(first[k], first[k + 1])
-            arc = self._arc(int(lines[k]), int(n[k]),
-                            height[k] if isinstance(height, list) else height)
+            number, x = int(lines[k]), np.array([a[:, k], b[:, k]]).T
+            curve = self.curves[number]
+            found = ask_field(f"the curve of line {number} of s",
+                              lambda s, curve=curve: curve(s[0]),  # type: ignore[misc]
+                              np.array([[0.0, 1.0]] * 2))
+            if np.max(np.abs(found - x)) > 1e3 * NEAR * self.size:
+                raise MeshError(f"the curve of line {number} runs from {_at(found[:, 0])} to "
+                                f"{_at(found[:, 1])}, its points are at {_at(x[:, 0])} and "
+                                f"{_at(x[:, 1])}: a curve is a function of s from 0 to 1")
+            arc = MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, int(n[k]) + 1),
+                                      height[k] if isinstance(height, list) else height)
             p[:, nodes], tangent[:, nodes], turning[:, nodes] = arc.p, arc.p_X, arc.p_XY
             lengths[np.searchsorted(left, nodes[:-1])] = arc.lengths
             arcs[k] = cast("Curve", arc.curve)
         s, t = 2 * line + s, np.array([left, left + 1])
-        largest, heights, taper = heights_of_chains(height, s, t, lines)
-        return MeshLines(np.ascontiguousarray(p), t, default_tags(p, t), height=largest,
-                         heights=heights, taper=taper, p_X=tangent, lengths=lengths, s=s,
-                         p_Y=np.array([0.0 - tangent[1], tangent[0]]), p_XY=turning,
-                         curve=cast("Curve", Axes(arcs, a, d)) if arcs else None)
-
-    def _arc(self, k, n, height):
-        curve, ends = self.curves[k], self.points[:, self.lines[:, k]]
-        found = ask_field(f"the curve of line {k} of s", lambda x: curve(x[0]),
-                          np.array([[0.0, 1.0]] * 2))
-        if np.max(np.abs(found - ends)) > 1e3 * NEAR * self.size:
-            raise MeshError(f"the curve of line {k} runs from {_at(found[:, 0])} to "
-                            f"{_at(found[:, 1])}, its points are at {_at(ends[:, 0])} and "
-                            f"{_at(ends[:, 1])}: a curve is a function of s from 0 to 1")
-        return MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, n + 1), height)
+        return MeshLines._from_nodes(
+            np.ascontiguousarray(p), t, tangent, lengths, heights_of_chains(height, s, t, lines), s,
+            cast("Curve", Axes(arcs, a, d)) if arcs else None, turning)
 
 
 def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:

@@ -35,11 +35,7 @@ def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
 
 
 def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
-    """Largest height, heights (4, ne) in the elements, and the function; None for a number.
-
-    ``s`` are the parameters of the nodes, ``t`` the nodes of the elements. Raises MeshError if a
-    cubic does not fit the function in an element.
-    """
+    """Largest height, heights (4, ne) in the elements, and the function; None for a number."""
     if not callable(height):
         return require_positive("height", height), None, None
     require_function("height", height, "of parameters (n,) that returns heights (n,)")
@@ -150,11 +146,6 @@ class MappingBeam(Mapping):
     Methods take reference points ``X`` = (xi, eta), shape (2, npoints) for all elements or
     (2, nelements, npoints), and elements ``tind`` (nelements,), None for all. They return arrays
     (..., nelements, npoints).
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
     """
 
     def __init__(self, mesh: Any) -> None:
@@ -181,19 +172,11 @@ class MappingBeam(Mapping):
         axis[:, [0, k]] -= start[:, None]  # relative to the first node: less round-off
         return start, axis, m.height * directors
 
-    def _coefficients(self, tind):
-        _, axis, director = self._all_coefficients
-        return (axis, director) if tind is None else (axis[:, :, tind], director[:, :, tind])
-
-    def _axis(self, xi, derivative=0):
-        return hermite_basis(self._orders[0], xi, derivative)
-
-    def _director(self, xi, derivative=0):
-        return hermite_basis(self._orders[1], xi, derivative)
-
-    @staticmethod
-    def _sum(coefficients, functions):
-        """Combine (2, n, ne) coefficients with functions (n, np) or (n, ne, np)."""
+    def _vectors(self, kind, xi, tind, derivative=0, times=1.0):
+        """The axis (kind 0) or the director (1), or a derivative by xi, times a factor."""
+        coefficients = self._all_coefficients[1 + kind]
+        coefficients = coefficients if tind is None else coefficients[:, :, tind]
+        functions = times * hermite_basis(self._orders[kind], xi, derivative)
         if functions.ndim == 2:
             return coefficients.transpose(0, 2, 1) @ functions
         return np.einsum("ine,nep->iep", coefficients, functions)
@@ -236,16 +219,16 @@ class MappingBeam(Mapping):
 
     def F(self, X: Array, tind: Array | None = None) -> Array:
         """Points of the body, (2, nelements, npoints)."""
-        axis, director = self._coefficients(tind)
-        across = self._sum(director, (X[1] - 0.5) * self._director(X[0]))
+        axis = self._vectors(0, X[0], tind)
+        across = self._vectors(1, X[0], tind, times=X[1] - 0.5)
         start = self._all_coefficients[0][:, slice(None) if tind is None else tind, None]
-        return start + (self._sum(axis, self._axis(X[0])) + self._relative(X[0], tind)[0] * across)
+        return start + (axis + self._relative(X[0], tind)[0] * across)
 
     def _derivatives(self, X, tind):
         """Derivatives of :meth:`F` by xi and eta, and of the axis by xi, (2, ne, np) each."""
-        (axis, director), (xi, eta) = self._coefficients(tind), X
-        along, across = self._sum(axis, self._axis(xi, 1)), self._sum(director, self._director(xi))
-        turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
+        xi, eta = X
+        along, across = self._vectors(0, xi, tind, 1), self._vectors(1, xi, tind)
+        turning = self._vectors(1, xi, tind, 1, eta - 0.5)
         g, rate = self._relative(xi, tind)
         return along + g * turning + (eta - 0.5) * rate * across, g * across, along
 
@@ -267,10 +250,8 @@ class MappingBeam(Mapping):
         return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / cross(J[:, 0], J[:, 1])
 
     def full_volume(self, X: Array, tind: Array | None = None) -> Array:
-        """Determinant of :meth:`DF` with section directors of unit length, (nelements, npoints).
-
-        Directors interpolated between nodes are shorter; mass uses the given height.
-        """
+        """Determinant of :meth:`DF` with section directors of unit length, (nelements, npoints)."""
+        # directors interpolated between nodes are shorter; mass uses the given height
         if self.mesh.is_straight:
             return self.detDF(X, tind)
         along, across, axis = self._derivatives(X, tind)
@@ -280,12 +261,11 @@ class MappingBeam(Mapping):
 
     def turning(self, X: Array, tind: Array | None = None) -> Array:
         """Derivative by xi of the unit-height section director, (2, nelements, npoints)."""
-        _, director = self._coefficients(tind)
-        return self._sum(director, self._director(X[0], 1)) / self.mesh.height
+        return self._vectors(1, X[0], tind, 1) / self.mesh.height
 
     def frame(self, X: Array, tind: Array | None = None) -> Array:
         """Unit tangent ``frame[:, 0]`` and normal of the axis, (2, 2, nelements, npoints)."""
-        d = self._sum(self._coefficients(tind)[0], self._axis(X[0], 1))
+        d = self._vectors(0, X[0], tind, 1)
         x, y = d / np.hypot(*d)
         return np.array([[x, -y], [y, x]])
 
@@ -296,8 +276,7 @@ class MappingBeam(Mapping):
 
     def curvature(self, X: Array, tind: Array) -> Array:
         """Curvature of the axis, (nelements, npoints)."""
-        axis, _ = self._coefficients(tind)
-        d, dd = (self._sum(axis, self._axis(X[0], k)) for k in (1, 2))
+        d, dd = (self._vectors(0, X[0], tind, k) for k in (1, 2))
         return cross(d, dd) / np.hypot(*d) ** 3
 
     # the inverse
@@ -311,9 +290,8 @@ class MappingBeam(Mapping):
         return Inverse(start, axis, director, self.mesh.height, self.heights)
 
     def invF(self, x: Array, tind: Array | None = None) -> Array:
-        """Reference points of points x, both (2, nelements, npoints), also outside the cell.
-
-        NaN where there is none.
+        """Reference points of points x, also outside the cell, (2, nelements, npoints) both; or
+        NaN.
         """
         return self.inverse(x, slice(None) if tind is None else tind)
 

@@ -24,7 +24,7 @@ from ..core.immutable import Immutable, cached_property, is_builtin, packed
 from ..core.types import Array, StrPath
 from .curve import Curve, axis_of, check_curvature, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
-from .numbering import ElementBeamP1, NumberedMesh, default_tags, halved
+from .numbering import NODAL, ElementBeamP1, NumberedMesh, default_tags, halved
 from .places import Finder, as_point, is_point, points_of_rows
 
 EPS = float(np.finfo(float).eps)
@@ -563,13 +563,11 @@ class MeshBeam(NumberedMesh):
         nodes = np.unique(self.t[:, elements])
         renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
         renumber[nodes] = np.arange(len(nodes))
-        m = type(self)(self.p[:, nodes], renumber[self.t[:, elements]], height=self.height,
-                     p_X=self.p_X[:, nodes], p_Y=self.p_Y[:, nodes],
-                     lengths=self.lengths[elements], curve=self.curve, sections=self.sections,
-                     heights=None if self.heights is None else self.heights[:, elements],
-                     taper=self.taper,
-                     p_XY=None if self.p_XY is None else self.p_XY[:, nodes],
-                     s=None if self.s is None else self.s[nodes])
+        kept = {**dict.fromkeys(NODAL, nodes), "lengths": elements, "heights": elements}
+        changes: dict[str, Any] = {name: getattr(self, name)[..., some] for name, some
+                                   in kept.items() if getattr(self, name) is not None}
+        changes.update(t=renumber[self.t[:, elements]], _boundaries=None, _subdomains=None)
+        m = replace(self, **changes)
         if self._subdomains is not None and not skip_subdomains:
             m._subdomains = {name: np.nonzero(np.isin(elements, e))[0].astype(np.int32)
                              for name, e in self._subdomains.items()}
@@ -765,16 +763,9 @@ class MeshBeam(NumberedMesh):
 
 
 def reach(meshes: Sequence[MeshBeam]) -> float:
-    """The size of a scene, to which tolerances of positions are relative.
-
-    It is the diagonal of the bounding box of all nodes, but at least the longest line (a curled
-    line may be straightened) and at most the total length of all lines.
-
-    Examples
-    --------
-    >>> from skfem_ancf.mesh.mesh_beam import reach
-    >>> reach([MeshBeam.init_line([0, 3], 0.1), MeshBeam.init_line([0, 4], 0.1, (3, 0), np.pi / 2)])
-    5.0
+    """The size of a scene, to which tolerances of positions are relative: the diagonal of the
+    bounding box of all nodes, but at least the longest line (a curled line may be straightened) and
+    at most the total length of all lines.
     """
     total = float(sum(mesh.lengths.sum() for mesh in meshes))
     if len(meshes) == 1 and meshes[0].is_chain:

@@ -63,6 +63,10 @@ class ElementBeamP1(ElementH1):
         return 1.0 - i + slope * X[0], np.array([slope + 0.0 * X[0], 0.0 * X[0]])
 
 
+#: Attributes of a mesh with values at the nodes.
+NODAL = "doflocs", "p_X", "p_Y", "p_XY", "s"
+
+
 def default_tags(p: Array, t: Array) -> dict[str, Array]:
     """Facets of the ends and the surfaces of a mesh by name."""
     n, ne = p.shape[1], t.shape[1]
@@ -72,10 +76,18 @@ def default_tags(p: Array, t: Array) -> dict[str, Array]:
             "top": facets[n + ne:]}
 
 
-class NumberedMesh(Immutable, NearMisses, Mesh2D):
-    """The numbering of facets and elements that scikit-fem needs, for meshes of beams.
+def _refused(what: str) -> Callable[..., NoReturn]:
+    def refuse(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
+        raise MeshError(
+            f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
+            "beams into one Scene and join them, or build the mesh with init_line or init_curve")
 
-    Facets are the sections at the nodes, then the bottoms and the tops of the elements.
+    return refuse
+
+
+class NumberedMesh(Immutable, NearMisses, Mesh2D):
+    """What scikit-fem needs of meshes of beams: facets are sections at nodes, then bottoms, then
+    tops.
     """
 
     def _freeze(self):
@@ -169,26 +181,8 @@ class NumberedMesh(Immutable, NearMisses, Mesh2D):
         return OrientedBoundary(facets, 1 * (np.asarray(normal) @ normals < 0))
 
     # methods of scikit-fem's meshes without a meaning for a chain of elements
-
-    def _refuse(self, what: str) -> NoReturn:
-        raise MeshError(
-            f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
-            "beams into one Scene and join them, or build the mesh with init_line or init_curve")
-
-    def mirrored(self, normal: Any, point: Any = None) -> NoReturn:
-        self._refuse("mirrored")
-
-    def morphed(self, *args: Any) -> NoReturn:
-        self._refuse("morphed")
-
-    def smoothed(self, fixed_nodes: Any = None) -> NoReturn:
-        self._refuse("smoothed")
-
-    def __add__(self, other):
-        self._refuse("joined with +")
-
-    def __matmul__(self, other):
-        self._refuse("joined with @")
+    mirrored, morphed, smoothed = map(_refused, ("mirrored", "morphed", "smoothed"))
+    __add__, __matmul__ = map(_refused, ("joined with +", "joined with @"))
 
 
 def halved(mesh: Any, ix: Array) -> Any:
@@ -198,10 +192,7 @@ def halved(mesh: Any, ix: Array) -> Any:
     new = _midpoints(mesh, ix)
     where = mesh.t[1, ix]
     fields: dict[str, Any] = {name: np.insert(getattr(mesh, name), where, new[name], axis=-1)
-                              for name in ("doflocs", "p_X", "p_Y", "p_XY")
-                              if getattr(mesh, name) is not None}
-    if mesh.s is not None:
-        fields["s"] = np.insert(mesh.s, where, new["s"])
+                              for name in NODAL if getattr(mesh, name) is not None}
     # children of element e: first[e], and first[e] + 1 if it was marked
     first = np.arange(mesh.nelements) + np.concatenate([[0], np.cumsum(marked)[:-1]])
     parent = np.repeat(np.arange(mesh.nelements), 1 + marked)
@@ -229,11 +220,10 @@ def halved(mesh: Any, ix: Array) -> Any:
 
 
 def by_element(mesh: Any, at: Array) -> Any:
-    """A curved mesh of disconnected elements with one-sided rates of turning at nodes ``at`` (k,).
-
-    Cubic and higher directors share one nodal derivative, which fits neither side of a jump of the
-    curvature.
+    """A curved mesh of disconnected elements, with one-sided rates of turning at nodes ``at`` (k,).
     """
+    # cubic and higher directors share one nodal derivative, which fits neither side of a jump of
+    # the curvature
     mesh, n, node = mesh.with_sections("cubic"), mesh.nelements, mesh.t.T.ravel()
     fields: dict[str, Any] = {name: getattr(mesh, name)[:, node]
                               for name in ("doflocs", "p_X", "p_Y", "p_XY")}

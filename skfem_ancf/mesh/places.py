@@ -37,10 +37,8 @@ def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
 
 
 class Inverse:
-    """The map from the body to the reference cell.
-
-    ``axis`` relative to ``start`` and ``director``, times the largest height, are Hermite
-    coefficients; ``heights`` are coefficients (4, ne) of the relative height, None if constant.
+    """The map from the body to the reference cell, from the Hermite coefficients of axis (relative
+    to ``start``) and director (times the largest height), and powers of the relative height.
     """
 
     def __init__(self, start: Array, axis: Array, director: Array, height: float,
@@ -63,9 +61,8 @@ class Inverse:
         return self.largest * polyval(xi, self.heights[:, e, None], tensor=False)
 
     def __call__(self, x: Array, e: Any) -> Array:
-        """Reference points of points of elements e, both (2, n, npoints); NaN where there is none.
-
-        Newton's method, from the middle of the elements.
+        """Reference points of points of elements e, both (2, n, npoints), by Newton's method; or
+        NaN.
         """
         axis, director, crossed = (
             c[..., e, None] for c in (self.axis, self.director, self.crossed))
@@ -133,11 +130,9 @@ class Finder:
         return out
 
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
-        """Elements (n,), reference points (2, n) and distances outside of them for points (2, n).
-
-        Distances are relative to the element: zero in the body, infinite far away. Of several
-        chains that contain a point the one with the nearest axis is taken; the fourth result is
-        true where there are several. ``chain`` restricts the search to the chain of this number.
+        """Elements (n,), reference points (2, n), relative distances outside of them (zero, or
+        infinite far away) for points (2, n) of a ``chain`` or of all, and whether chains are
+        equally near.
         """
         noise = 1e-9 + 8 * EPS * (
             self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
@@ -151,7 +146,27 @@ class Finder:
                 return *self._find(x, noise), tied
             e, X, outside = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape), np.full(
                 x.shape[1], np.inf)
-            self._nearest_axis(x, noise, e, X, outside, tied)
+            points, elements = [], []  # pairs of points and elements that may contain them
+            for some, tree, radius in self._circles:
+                near = tree.query_ball_point(x.T, radius, return_sorted=False)
+                many = np.fromiter(map(len, near), dtype=int, count=len(near))
+                points.append(np.repeat(np.arange(x.shape[1]), many))
+                elements.append(some[np.concatenate([*near, []]).astype(int)])
+            k, some = np.concatenate(points), np.concatenate(elements)
+            Y = self.mapping.inverse(x[:, k, None], some)[..., 0]
+            inside = self._outside(Y, noise) == 0.0
+            k, some, Y = k[inside], some[inside], np.clip(Y[:, inside], 0.0, 1.0)
+            # among all elements that contain a point choose that with the nearest axis
+            off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
+            np.minimum.at(least, k, off)
+            near = off <= least[k] + self.equal
+            k, some, Y = k[near], some[near], Y[:, near]
+            order = np.lexsort((some, k))
+            at, first = np.unique(k[order], return_index=True)
+            first = order[first]
+            e[at], X[:, at], outside[at] = some[first], Y[:, first], 0.0
+            chains = self.mesh.chains
+            np.logical_or.at(tied, k, chains[some] != chains[e[k]])
             left = np.flatnonzero(outside)
             if len(left):
                 e[left], X[:, left], outside[left] = self._find(x[:, left], noise)
@@ -184,29 +199,6 @@ class Finder:
                 found.append((float(self.from_axis(e, X)[0]), chain))
         return found
 
-    def _nearest_axis(self, x, noise, e, X, outside, tied):
-        """Among all elements that contain points choose those with the nearest axis, in place."""
-        points, elements = [], []  # pairs of points and elements that may contain them
-        for some, tree, radius in self._circles:
-            near = tree.query_ball_point(x.T, radius, return_sorted=False)
-            many = np.fromiter(map(len, near), dtype=int, count=len(near))
-            points.append(np.repeat(np.arange(x.shape[1]), many))
-            elements.append(some[np.concatenate([*near, []]).astype(int)])
-        k, some = np.concatenate(points), np.concatenate(elements)
-        Y = self.mapping.inverse(x[:, k, None], some)[..., 0]
-        inside = self._outside(Y, noise) == 0.0
-        k, some, Y = k[inside], some[inside], np.clip(Y[:, inside], 0.0, 1.0)
-        off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
-        np.minimum.at(least, k, off)
-        near = off <= least[k] + self.equal
-        k, some, Y = k[near], some[near], Y[:, near]
-        order = np.lexsort((some, k))
-        at, first = np.unique(k[order], return_index=True)
-        first = order[first]
-        e[at], X[:, at], outside[at] = some[first], Y[:, first], 0.0
-        chains = self.mesh.chains
-        np.logical_or.at(tied, k, chains[some] != chains[e[k]])
-
     @cached_property
     def _circles(self):
         """Groups of elements of similar size: a tree of their centres and bounding circles."""
@@ -232,7 +224,21 @@ class Finder:
             outside = self._outside(X, noise)
             outside[outside > 1.0] = np.inf
             return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
-        e, X, outside = self._nearest(x, noise)
+        # the nearest element, or its neighbour where the point is beyond the common node
+        distance, near = self._tree.query(x.T)
+        e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
+        X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
+        steps = 0
+        while len(todo):
+            X[:, todo] = self.mapping.inverse(x[:, todo, None], e[todo])[..., 0]
+            outside[todo] = self._outside(X[:, todo], noise)
+            # a point of the section between two elements is one of the left
+            before, after = self._neighbours[:, e[todo]]
+            other = np.where(X[0, todo] <= noise, before,
+                             np.where(X[0, todo] > 1.0 + noise, after, -1))
+            on, steps = (other >= 0) & (steps < WALK), steps + 1
+            todo = todo[on]
+            e[todo] = other[on]
         left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
         if len(left):
             k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
@@ -283,25 +289,6 @@ class Finder:
         d = np.array([mesh.p_X[:, 0], mesh.p_Y[:, 0]])
         return d, first, d[0] @ (mesh.p[:, :-1] - first)
 
-    def _nearest(self, x, noise):
-        """The nearest element, or its neighbour where the point is beyond the common node."""
-        distance, near = self._tree.query(x.T)
-        e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
-        X, outside = np.empty(x.shape), np.empty(x.shape[1])
-        X[:], outside[:] = 0.5, np.inf
-        steps = 0
-        while len(todo):
-            X[:, todo] = self.mapping.inverse(x[:, todo, None], e[todo])[..., 0]
-            outside[todo] = self._outside(X[:, todo], noise)
-            # a point of the section between two elements is one of the left
-            before, after = self._neighbours[:, e[todo]]
-            other = np.where(X[0, todo] <= noise, before,
-                             np.where(X[0, todo] > 1.0 + noise, after, -1))
-            on, steps = (other >= 0) & (steps < WALK), steps + 1
-            todo = todo[on]
-            e[todo] = other[on]
-        return e, X, outside
-
     def _best(self, x, candidates, noise):
         """The best of the candidates (n, k) for each point."""
         n, k = x.shape[1], candidates.shape[1]
@@ -330,15 +317,8 @@ KINDS = ("the name of a boundary, a material point (x, y), a function of the poi
 
 
 def is_point(place: object) -> bool:
-    """True for two numbers in a tuple, a list or an array of floats.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> is_point((1, 1)), is_point([0.5, 0]), is_point(np.array([0.5, 0.0]))
-    (True, True, True)
-    >>> is_point(np.array([1, 1])), is_point(("left", "right"))  # facets; two boundaries
-    (False, False)
+    """True for two numbers in a tuple, a list or an array of floats; integers of an array are
+    facets.
     """
     if isinstance(place, np.ndarray):
         return place.shape == (2,) and place.dtype.kind == "f"
@@ -376,9 +356,7 @@ def on_other_mesh(place: object) -> bool:
 
 
 def facets_of(mesh: Any, place: Place) -> Array:
-    """Numbers of the facets at a place, shape (n,), n >= 1.
-
-    All methods that take a place use this function:
+    """Numbers of the facets of a mesh at a place, shape (n,), n >= 1; or NameUnknown, MeshError.
 
     * a name is that of a boundary,
     * two numbers in a tuple, a list or an array of floats are a material point (x, y) on the
@@ -389,25 +367,6 @@ def facets_of(mesh: Any, place: Place) -> Array:
     * another tuple, list or set is a union of places; an array (n, 2) contains n points.
 
     A scikit-fem ``OrientedBoundary`` is returned as it is.
-
-    Parameters
-    ----------
-    mesh
-        A :class:`~skfem_ancf.MeshBeam`.
-    place
-        As above.
-
-    Raises
-    ------
-    NameUnknown, MeshError, InputError
-        If a name is not known, there is no facet at the place, or the type is wrong.
-
-    Examples
-    --------
-    >>> from skfem_ancf import MeshBeam
-    >>> mesh = MeshBeam.init_line([0, 1, 2], height=0.1)
-    >>> facets_of(mesh, "right").tolist(), facets_of(mesh, (1, 0)).tolist()
-    ([2], [1])
     """
     if is_masked(place):
         raise InputError(f"a place must not have masked values, got {shown(place)}")
@@ -423,7 +382,16 @@ def facets_of(mesh: Any, place: Place) -> Array:
     if is_point(place):
         return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
     if isinstance(place, np.ndarray):
-        return _numbered(mesh, place)
+        if place.dtype.kind not in "iu" or place.ndim != 1 or not len(place):
+            raise InputError("facets are a one-dimensional array of integers that is not empty, "
+                             f"got {shown(place)}; a place may also be "
+                             f"{KINDS.rsplit(', or', 1)[0]}")
+        bad, n = place[(place < 0) | (place >= mesh.nfacets)], mesh.p.shape[1]
+        if len(bad):
+            raise MeshError(f"the facets are numbered 0 to {mesh.nfacets - 1}, got {bad[0]}: 0 to "
+                            f"{n - 1} are the sections of the nodes, then come the bottom and the "
+                            f"top of the {mesh.nelements} elements")
+        return place
     if callable(place):
         x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
         found = satisfying(place, x)
@@ -488,20 +456,6 @@ def _pair(x: Array) -> str:
 
 def _names(mesh: Any) -> str:
     return ", ".join(repr(name) for name, facets in (mesh.boundaries or {}).items() if len(facets))
-
-
-def _numbered(mesh: Any, facets: Array) -> Array:
-    if facets.dtype.kind not in "iu" or facets.ndim != 1 or not len(facets):
-        raise InputError(f"facets are a one-dimensional array of integers that is not empty, got "
-                         f"{shown(facets)}; a place may also be {KINDS.rsplit(', or', 1)[0]}")
-    bad = facets[(facets < 0) | (facets >= mesh.nfacets)]
-    if len(bad):
-        n = mesh.p.shape[1]
-        raise MeshError(
-            f"the facets are numbered 0 to {mesh.nfacets - 1}, got {bad[0]}: 0 to {n - 1} are the "
-            f"sections of the nodes, then come the bottom and the top of the {mesh.nelements} "
-            "elements")
-    return facets
 
 
 def satisfying(test: Callable[[Array], Any], x: Array, what: str = "a place") -> Array:

@@ -26,6 +26,7 @@ from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_
 from ..core.linear import first_order, step, stress_of
 from ..core.types import Array
 from ..materials import LinearLaw
+from ..mesh.mapping import cross
 from .recovered import Recovery
 
 COMPONENTS = ("xx", "yy", "xy")
@@ -182,9 +183,6 @@ class Values(Mapping):
     def _recovery(self):
         return None if self._find is None else self._find()
 
-    def _recovered(self, rows):
-        return self._recovery.at(self._part.e, self._part.X, rows)
-
     @cached_property
     def strain(self) -> Array:
         return first_order(self._strain if self._recovery is None else
@@ -206,9 +204,8 @@ class Values(Mapping):
 
     @cached_property
     def S(self) -> Array:
-        if self._recovery is not None:
-            return self._recovered(slice(3, 6))
-        return first_order(self._stress)
+        return first_order(self._stress) if self._recovery is None else (
+            self._recovery.at(self._part.e, self._part.X, slice(3, 6)))
 
     @property
     def _stress(self):
@@ -231,13 +228,6 @@ class Values(Mapping):
     def _by_history(self, ask, other):
         """A field (n,) of ``ask(material, history)``; ``other`` where a material has none."""
         return by_history(self.beam, self._part.e, self._part.X, ask, other)
-
-    @property
-    def _stored(self):
-        if not self.cable:
-            return self._by_history(lambda law, history: law.energy(self.elastic, history), np.nan)
-        longer = stretched(self.strain[0])[1] - (self._eigenstrain + 0.0 * self.strain)[0]
-        return self._by_history(lambda law, history: law.axial_energy(longer, history), np.nan)
 
     def output(self, name: str, other: float = 0.0) -> Array:
         """A field (n,) of the history of materials.
@@ -293,7 +283,8 @@ class Values(Mapping):
     def F(self) -> Array:
         if self._recovery is not None and not self._small:
             with np.errstate(invalid="ignore"):
-                angle, strain = self._recovered(slice(6, 7))[0], self.strain
+                angle, = self._recovery.at(self._part.e, self._part.X, slice(6, 7))
+                strain = self.strain
                 lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
                 across = angle + np.arccos(strain[2] / (lam_x * lam_y))
                 return np.array([[lam_x * np.cos(angle), lam_y * np.cos(across)],
@@ -304,8 +295,8 @@ class Values(Mapping):
     def _gradient(self):
         """Deformation gradient of the elements."""
         part = self._part
-        H, frame = kinematics.gradients(self.beam, self._u[part.slice], part.at, part.e)
-        return (H + frame)[..., 0]
+        return np.add(*kinematics.gradients(
+            self.beam, self._u[part.slice], part.at, part.e))[..., 0]
 
     @cached_property
     def frame(self) -> Array:
@@ -318,10 +309,11 @@ class Values(Mapping):
 
     def _volume_of(self, F, elastic):
         with np.errstate(invalid="ignore"):
-            return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.of_materials(
-                lambda law: law.thickness_stretch(elastic)) if not self._remembers else (
-                F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * np.sqrt(1.0 + 2.0 * self._by_history(
-                    lambda law, history: law.out_of_plane(self.strain, history, self.S)[0], 0.0))
+            thicker = np.sqrt(1.0 + 2.0 * self._by_history(
+                lambda law, history: law.out_of_plane(self.strain, history, self.S)[0], 0.0)
+                ) if self._remembers else self.of_materials(
+                    lambda law: law.thickness_stretch(elastic))
+            return cross(F[:, 0], F[:, 1]) * thicker
 
     @cached_property
     def sigma(self) -> Array:
@@ -353,28 +345,27 @@ class Values(Mapping):
     @cached_property
     def energy(self) -> Array:
         """Strain energy per reference volume, (n,); of materials with a history what is stored."""
-        if not self._remembers or np.iscomplexobj(self._u):
-            return self._elastic_energy
-        stored = self._stored
-        return np.where(np.isnan(stored), self._elastic_energy, stored)
-
-    @property
-    def _elastic_energy(self):
-        if self.cable and not self._small:
-            # cable: half of the nominal stress times the elastic stretch - 1
+        if self.cable:
             stretch, longer = stretched(self.strain[0])
             longer = longer - (self._eigenstrain + 0.0 * self.strain)[0]
-            return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
+        if self.cable and not self._small:
+            # half of the nominal stress times the elastic stretch - 1
+            elastic = 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
+        else:
+            grade = self.of_materials(lambda material: np.ones(self.n), True)
 
-        grade = self.of_materials(lambda material: np.ones(self.n), True)
+            def of(material):
+                law = material.law()
+                if self._small or isinstance(law, LinearLaw):
+                    return 0.5 * np.sum(self.elastic * self.S, axis=0)
+                return law.energy(self.elastic) * grade
 
-        def of(material):
-            law = material.law()
-            if self._small or isinstance(law, LinearLaw):
-                return 0.5 * np.sum(self.elastic * self.S, axis=0)
-            return law.energy(self.elastic) * grade
-
-        return self.of_materials(of)
+            elastic = self.of_materials(of)
+        if not self._remembers or np.iscomplexobj(self._u):
+            return elastic
+        stored = self._by_history(lambda law, history: law.axial_energy(longer, history)
+                                  if self.cable else law.energy(self.elastic, history), np.nan)
+        return np.where(np.isnan(stored), elastic, stored)
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
@@ -556,17 +547,8 @@ def find_fields(fields: Any, beams: Sequence[Any] = ()) -> list[Field]:
 
 
 class DomainValues(Values):
-    """Fields at points of a domain; components are in global axes.
-
-    Those of the stress need a domain with a material, see :meth:`skfem_ancf.Domain.solid`.
-
-    Parameters
-    ----------
-    domain
-        The :class:`~skfem_ancf.Domain`.
-    x, u, gradient
-        Reference positions and displacements, (2, n), and the displacement gradient, (2, 2, n); for
-        a linear solution the :func:`~skfem_ancf.core.linear.step` from its base.
+    """Fields at points x of a domain, with displacements u (2, n) and their gradient (2, 2, n), or
+    :func:`~skfem_ancf.core.linear.step` of them; components are in global axes.
     """
 
     cable = False
@@ -612,9 +594,8 @@ class DomainValues(Values):
 
 
 def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
-    """Values of a beam at points of all elements, flattened.
-
-    ``X`` are points (xi, eta) in [0, 1], shape (2, npoints) or (2, nelements, npoints).
+    """Values at points (xi, eta) of all elements, (2, npoints) or (2, nelements, npoints),
+    flattened.
     """
     ne = beam.mesh.nelements
     part = BeamPoints(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),

@@ -31,24 +31,17 @@ MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 
 class Grid(NamedTuple):
-    """One member as points and cells.
-
-    ``x`` and ``u`` are reference positions and displacements, (2, n). ``kind`` is meshio's name of
-    the cells: "quad", "triangle", "VTK_LAGRANGE_QUADRILATERAL" or "polygon"; ``cells`` (nc, k) are
-    point numbers, ``elements`` (nc,) their elements. ``rows`` points across a section are
-    consecutive. ``values`` are those of a beam or domain, None for a rigid body. ``between`` (2, k)
-    are numbers of coincident points of neighbouring elements.
-    """
+    """One member as points and cells."""
 
     name: str
-    x: Array
-    u: Array
-    kind: str
-    cells: Array
-    elements: Array
-    rows: int
-    values: Values | DomainValues | None
-    between: Array = np.zeros((2, 0), dtype=int)
+    x: Array  # reference positions, (2, n)
+    u: Array  # displacements, (2, n)
+    kind: str  # of the cells, by meshio's name
+    cells: Array  # point numbers, (nc, k)
+    elements: Array  # of the cells, (nc,)
+    rows: int  # so many points across a section are consecutive
+    values: Values | DomainValues | None  # None for a rigid body
+    between: Array = np.zeros((2, 0), dtype=int)  # coincident points of neighbouring elements
 
     def points(self, undeformed: bool = False) -> Array:
         """Positions with a zero third component, shape (n, 3)."""
@@ -63,7 +56,11 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
     is one Lagrange cell.
     """
     require_like("state", state, "State", "beams", "u_of")
-    m, n = subdivision(subdivide)
+    try:
+        m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in subdivide)
+    except (TypeError, ValueError, InputError):
+        raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
+                         f"and across an element, got {shown(subdivide)}") from None
     lagrange, recover = require_flag("lagrange", lagrange), require_flag("recover", recover)
     total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
     if total > MAX_POINTS and not lagrange:
@@ -74,46 +71,33 @@ def grids(state: Any, subdivide: Any = (8, 4), lagrange: bool = False,
         values, ne = values_on_grid(state, beam, X, recover), beam.mesh.nelements
         start = X.shape[-1] * np.arange(ne)
         rows = X.shape[-1] // (1 + m) if not lagrange else round(X.shape[-1] ** 0.5)
+        # first points of elements that are joined to the one before, whose last ones are there
+        next_ones = 1 + np.flatnonzero(beam.mesh.t[1, :-1] == beam.mesh.t[0, 1:])
+        first = start[next_ones, None] + np.arange(rows)
         out.append(Grid(f"beam {k}" if beam.name is None else beam.name, values.x, values.u,
                         "VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
                         (start[:, None, None] + local).reshape(-1, local.shape[1]),
                         np.repeat(np.arange(ne), len(local)), rows, values,
-                        _between(beam.mesh, X.shape[-1], rows)))
+                        np.array([first - rows, first]).reshape(2, -1)))
     for k, body in enumerate(getattr(state, "bodies", ())):
         x = body.outline_at(np.zeros(4))
         out.append(Grid(f"body {k}" if body.name is None else body.name, x,
                         body.outline_at(state.u_of(body)) - x, "polygon",
                         np.arange(x.shape[1])[None], np.zeros(1, dtype=int), 1, None))
     for k, domain in enumerate(getattr(getattr(state, "system", None), "domains", ())):
-        x, u, gradient, cells = drawn(domain, state._places_of(domain))
+        values, cells = values_of_domain(state, domain)
         number = domain.basis.mesh.nelements
-        values = DomainValues(domain, x, u, gradient)
-        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, x, values.u,
+        out.append(Grid(f"domain {k}" if domain.name is None else domain.name, values.x, values.u,
                         "triangle" if cells.shape[1] == 3 else "quad", cells,
                         np.repeat(np.arange(number), len(cells) // number), 1,
                         values))
     return out
 
 
-def _between(mesh, n, rows):
-    """Last points of elements and first points of the next ones, (2, k); n points each."""
-    e = np.flatnonzero(mesh.t[1, :-1] == mesh.t[0, 1:])[:, None]
-    first = n * (e + 1) + np.arange(rows)
-    return np.array([first - rows, first]).reshape(2, -1)
-
-
-def subdivision(subdivide: Any) -> tuple[int, int]:
-    """Checked numbers of intervals along and across an element."""
-    try:
-        m, n = subdivide
-    except (TypeError, ValueError):
-        m = n = None
-    try:
-        m, n = (require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in (m, n))
-        return m, n
-    except InputError:
-        raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
-                         f"and across an element, got {shown(subdivide)}") from None
+def values_of_domain(state: Any, domain: Any) -> tuple[DomainValues, Array]:
+    """Values of a domain at points of its cells, and the cells of a grid."""
+    *at, cells = drawn(domain, state._places_of(domain))
+    return DomainValues(domain, *at), cells
 
 
 def in_space(x: Array) -> Array:
@@ -136,11 +120,10 @@ def quads(m: int, n: int) -> Array:
 
 
 def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
-    """Points and quads of an element with m and n intervals along and across.
-
-    Each interval of the section has at least one cell, with points on both sides of jumps. Points
-    are (2, npoints), or (2, nelements, npoints) if the intervals vary along the axis.
+    """Points (2, npoints) and quads of an element with m and n intervals along and across; for
+    intervals that vary along the axis (2, nelements, npoints).
     """
+    # each interval of the section has at least one cell, with points on both sides of jumps
     sizes = np.diff(beam.across.ends())
     if len(sizes) == 1:
         return grid(m, n), quads(m, n)
@@ -157,17 +140,14 @@ def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
 
 
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
-    """Points of an element's Lagrange cell, and their VTK order.
-
-    The order is corners, edges (bottom, right, top, left, in the direction of increasing xi and
-    eta), interior with xi fastest.
-    """
+    """Points of an element's Lagrange cell, and their VTK order."""
     p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
     if p > MAX_LAGRANGE_DEGREE:
         raise InputError(f"VTK evaluates Lagrange cells up to degree {MAX_LAGRANGE_DEGREE}, this "
                          f"element has {p}: use subdivide= instead of lagrange=True")
     k = np.arange((p + 1) ** 2).reshape(p + 1, p + 1)  # [xi, eta]
     inner = slice(1, -1)
+    # corners, edges in the direction of increasing xi and eta, the interior with xi fastest
     order = np.concatenate([
         [k[0, 0], k[-1, 0], k[-1, -1], k[0, -1]],
         k[inner, 0], k[-1, inner], k[inner, -1], k[0, inner], k[inner, inner].T.ravel()])
@@ -195,19 +175,10 @@ class Body(NamedTuple):
 
 def body_of(grid: Grid, fields: Sequence[Field], undeformed: bool = False, lenient: bool = False,
             share: bool = True) -> Body:
-    """The points, cells and arrays of a grid.
+    """The points, cells and arrays of a grid; undefined values are NaN.
 
-    Parameters
-    ----------
-    grid, fields
-        The member and its fields; undefined values are NaN.
-    undeformed
-        Points in the reference configuration.
-    lenient
-        Fields that a material does not define are NaN; by default they raise InputError.
-    share
-        Merge the coincident points of neighbouring elements where the displacement and all fields
-        are continuous; otherwise each element has its own points.
+    ``lenient``: so are fields that a material does not define, instead of an InputError. ``share``:
+    neighbouring elements share points where the displacement and all fields are continuous.
     """
     points, cells = grid.points(undeformed), grid.cells
     data = {field.name: _array(field, grid, lenient) for field in fields}
@@ -260,10 +231,7 @@ def _array(field, grid, lenient):
 
 
 def facts_of(state: Any) -> dict[str, Array]:
-    """Field data of a file: numbers of named members, load factor, time, version.
-
-    VTK reads ``TimeValue`` as the time of the file.
-    """
+    """Field data of a file: numbers of named members, load factor, time, version."""
     from .. import __version__
 
     members = getattr(getattr(state, "system", None), "members", state.beams)
@@ -272,6 +240,6 @@ def facts_of(state: Any) -> dict[str, Array]:
     if getattr(state, "load", None) is not None:
         found["load_factor"] = np.array([state.load], dtype=float)
     if getattr(state, "t", None) is not None:
-        found["TimeValue"] = np.array([state.t], dtype=float)
+        found["TimeValue"] = np.array([state.t], dtype=float)  # VTK reads it as the time
     version = [int(number) for number in re.findall("[0-9]+", __version__)[:3]]
     return found | {"skfem_ancf_version": np.array(version)}

@@ -42,8 +42,8 @@ from ..materials import LinearLaw
 from ..mesh.mapping import cross
 from ..mesh.numbering import by_element
 from ..sections.across import SIDE, off_ends
-from .section_forces import (AcrossPoints, ArcLength, Intervals, NotFound, NotRecovered,
-                             SectionForces, Sections, Together)
+from .section_forces import (ArcLength, Intervals, NotFound, NotRecovered, SectionForces, Sections,
+                             Together)
 
 #: Largest relative change of the strain in the last round, and strain that is round-off.
 UNSETTLED, TINY = 0.01, 1e-12
@@ -137,10 +137,8 @@ def _back(rows: Array, like: Any) -> Array:
 class Segment:
     """The fields between two cuts, at n sections (ends and middles of elements) of m points.
 
-    The sections have arc lengths ``s`` (n,) and turn at the ``rate`` (n,). ``strain`` and
-    ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the axial fibres, ``change`` the
-    last change of the stretch. Of several instants together, the fields have an axis of the
-    instants before n; :meth:`part` is one of them.
+    ``strain`` and ``stress`` are (3, n, m), ``angle`` (n, m) is the direction of the axial fibres.
+    Of several instants together, the fields have an axis of the instants before n.
     """
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
@@ -191,7 +189,7 @@ class Segment:
         moved = np.zeros(len(xi))  # loads may jump at ends inside elements
         moved[0], moved[-1] = SIDE, -SIDE
         xi = xi + moved * ((xi > 0.0) & (xi < 1.0))
-        self.points = at = r.points(e, xi)
+        self.points = at = r.intervals.points(r._heights(e, xi))
         sections = Sections(self.beam, e, xi, at.eta, self.forces.lifted, r.geometry)
         axis = Sections(self.beam, e, xi, mapping=r.geometry)
         X, speed = off_ends(sections.X), np.hypot(*axis.J[:, 0, :, 0])
@@ -251,9 +249,8 @@ class Segment:
         return (values * self.points.axis).sum(axis=-1)
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
-        """Integral from the axis of the axial derivative at constant distance from it.
-
-        Values (..., n, m) and ``d_ds`` belong to points at constant relative positions.
+        """Integral from the axis of the axial derivative at constant distance from it, for values
+        (..., n, m) at constant relative positions.
         """
         lean = self.lean * values
         return self.from_axis(d_ds + self.swell * values) - lean + self.at_axis(lean)[..., None]
@@ -273,9 +270,8 @@ class Segment:
         return np.array([size * longer, size * eps[1], eps[2]]), P / self.stretch
 
     def _section(self):
-        """Set the strain, r_X, r_Y and the stress P on sections, along t and n; (2, n, m) each.
-
-        The strain follows from S_yy, S_xy and the stretch, or S_xx if the stress is given.
+        """Set strain, r_X, r_Y and the stress P on sections, along t and n, from S_yy, S_xy and
+        stretch.
         """
         r = self.recovery
         if self.stress_given:
@@ -447,9 +443,8 @@ def _turned(f, angle):
 def strain_of_stress(law: Law, stress: Array, strain: Array,
                      unknown: tuple[int, ...] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
-    """The strain with a given stress under a law, by Newton's method; both (3, ...).
-
-    Only the consecutive components ``unknown`` of ``strain`` are solved for.
+    """The strain (3, ...) with a given stress under a law, by Newton's method for the ``unknown``
+    components.
     """
     if isinstance(law, LinearLaw):
         gap, some = stress - law.stress(strain), slice(unknown[0], unknown[-1] + 1)
@@ -483,10 +478,8 @@ def _axial(law, strain):
 
 
 class Recovery:
-    """The recovered fields of one beam, a :class:`~.segments.Segment` between consecutive cuts.
-
-    ``why`` is the reason for section forces without fields, or "", and ``failed`` is True if an
-    iteration failed.
+    """The recovered fields of one beam, a :class:`Segment` between cuts; ``why`` they are not
+    there.
     """
 
     def __init__(self, forces: Any, u: Any) -> None:
@@ -539,10 +532,7 @@ class Recovery:
 
     @classmethod
     def together(cls, forces: Sequence[SectionForces], u: Sequence[Array]) -> list[Recovery]:
-        """The recovered fields of several instants.
-
-        They are solved together if they have the same cuts, and no history of materials.
-        """
+        """The recovered fields of several instants, together if cuts are the same."""
         if len(forces) > 1 and all(one.beam is forces[0].beam and np.array_equal(
                 one.cuts, forces[0].cuts) for one in forces):
             every = cls(Together(forces), u)
@@ -555,10 +545,6 @@ class Recovery:
 
     def _heights(self, e, xi):
         return (self.beam.mesh.mapping().height(xi[:, None], e)[0] + 0.0 * xi[:, None])[:, 0]
-
-    def points(self, e: Array, xi: Array) -> AcrossPoints:
-        """The :class:`.AcrossPoints` across sections at xi of elements e, shapes (n,)."""
-        return self.intervals.points(self._heights(e, xi))
 
     def modulus(self, strain: Array) -> Array:
         """dS_xx / deps_xx at constant S_yy and S_xy, at strains (3, n, m)."""
@@ -601,9 +587,8 @@ class Recovery:
         return x, stress
 
     def segment_of(self, e: Array, xi: Array, after: Any = False) -> Array:
-        """Segment numbers of sections, (n,); a node at a cut belongs to the segment of its element.
-
-        ``after`` is True for sections on the right of a cut inside an element.
+        """Segment numbers of sections, (n,); those at a cut inside an element are before it, or
+        ``after``.
         """
         cuts = self.forces.cuts
         at_node = np.minimum(xi, 1.0 - xi) < SNAP

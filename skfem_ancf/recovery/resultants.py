@@ -165,15 +165,19 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
         (e, xi), after = at, np.zeros(len(at[0]), dtype=bool)
     if recovery is not None:
         values = _recovered(recovery, u, e, xi, after)
-        if not (beam.has_sections or remembers(beam)):
-            values.update(_strains_of_cable(beam, eigen, e, xi, values["N"], values["M"]))
+        if not (beam.has_sections or remembers(beam)):  # strains from the section forces
+            EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
+            N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
+            N, M, det = values["N"] + N0, values["M"] + M0, EA * EI - ES * ES
+            values |= dict(stretch=1.0 + (EI * N + ES * M) / det,
+                           curvature=(EA * M + ES * N) / det)
     elif beam.has_sections:
         # integrate the stress of the elements across the section
         X, area = _across(beam, e, xi)
         S = on_grid(stress_at, beam, u, X, e) - sum(
             load.stress_at(u, X, e, factor) for factor, load in eigen)
-        H, frame = kinematics.gradients(beam, u, X, e)
-        P = (H + frame)[:, 0] * S[0] + (H + frame)[:, 1] * S[2]
+        F = np.add(*kinematics.gradients(beam, u, X, e))
+        P = F[:, 0] * S[0] + F[:, 1] * S[2]
 
         def position(points):
             return beam.mesh.mapping().F(points, e) + kinematics.displacements(beam, u, points, e)
@@ -235,26 +239,21 @@ def _recovered(recovery, u, e, xi, after):
     out = np.empty((4, len(e)), R.dtype)
     s = recovery.arc.at(e, xi)
     for k in np.unique(segment):
-        on = segment == k
-        out[:, on] = _axis(recovery.segments[k])(s[on]).T
+        one, on = recovery.segments[k], segment == k
+        # angle, stretch and shear of the axis, and change of curvature
+        stretch, lam_y = np.sqrt(1.0 + 2.0 * one.strain[:2])
+        across = one.angle + np.arccos(np.clip(one.strain[2] / (stretch * lam_y), -1.0, 1.0))
+        r_Y = lam_y * np.array([np.cos(across), np.sin(across)])
+        d = one.across(one.from_axis(r_Y) * one.Y)
+        phi = one.at_axis(one.angle)
+        shear = phi + 0.5 * np.pi - unwrapped(angle_of(*d))
+        shear = shear - 2.0 * np.pi * np.round(shear.real / (2.0 * np.pi))
+        # not from the derivative of the angle, which is fitted to the elements
+        start = (one.g[:, 0] - one.g[:, -1]) / (one.Y[..., -1] - one.Y[..., 0])
+        curvature = one.rate - start - one.along.d_ds(shear[:, None])[:, 0]
+        values = np.array([phi, one.at_axis(stretch), shear, curvature])
+        out[:, on] = one.spline(values.T)(s[on]).T
     return _result(R, M, *out)
-
-
-def _axis(segment):
-    """Spline of angle, stretch and shear of the axis, and change of curvature."""
-    eps = segment.strain
-    phi, stretch = segment.at_axis(segment.angle), np.sqrt(1.0 + 2.0 * eps[0])
-    lam_y = np.sqrt(1.0 + 2.0 * eps[1])
-    across = segment.angle + np.arccos(np.clip(eps[2] / (stretch * lam_y), -1.0, 1.0))
-    r_Y = lam_y * np.array([np.cos(across), np.sin(across)])
-    d = segment.across(segment.from_axis(r_Y) * segment.Y)
-    normal = unwrapped(angle_of(*d)) - 0.5 * np.pi
-    shear = phi - normal
-    shear = shear - 2.0 * np.pi * np.round(shear.real / (2.0 * np.pi))
-    # not from the derivative of the angle, which is fitted to the elements
-    start = (segment.g[:, 0] - segment.g[:, -1]) / (segment.Y[..., -1] - segment.Y[..., 0])
-    curvature = segment.rate - start - segment.along.d_ds(shear[:, None])[:, 0]
-    return segment.spline(np.array([phi, segment.at_axis(stretch), shear, curvature]).T)
 
 
 def _across(beam, e, xi):
@@ -277,14 +276,6 @@ def _forces_of_cable(beam, u, eigen, e, xi):
     N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
     return (EA * strain - ES * curvature - N0, EI * curvature - ES * strain - M0,
             (angle_of(*t), 1.0 + strain, 0.0 * xi, curvature))
-
-
-def _strains_of_cable(beam, eigen, e, xi, N, M):
-    """Stretch and change of curvature of a cable from normal force and moment."""
-    EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
-    N0, M0 = _eigen_forces_of_cable(beam, eigen, e, xi)
-    N, M, det = N + N0, M + M0, EA * EI - ES * ES
-    return dict(stretch=1.0 + (EI * N + ES * M) / det, curvature=(EA * M + ES * N) / det)
 
 
 def _eigen_forces_of_cable(beam, eigen, e, xi):

@@ -8,7 +8,7 @@ the element between a node and a section gives the section force and moment.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, partialmethod
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -78,10 +78,9 @@ class ArcLength:
 
 
 class Interval(NamedTuple):
-    """Part of a section from ``low`` to ``high`` (eta), with nodes of a coordinate s in [0, 1].
-
-    Fields are polynomials in s. If ``curved``, ``eta = middle - half cos(pi s)``, which smooths
-    widths with square roots at the ends; otherwise eta is linear in s.
+    """Part of a section, ``low`` to ``high`` (eta), with fields polynomial in s in [0, 1]. If
+    ``curved``, ``eta = middle - half cos(pi s)``, which smooths square roots of the width at the
+    ends.
     """
 
     low: float
@@ -115,28 +114,19 @@ class Interval(NamedTuple):
 
 
 class AcrossPoints(NamedTuple):
-    """Points across sections: arrays (n, m), or (m,) if all sections are equal.
-
-    ``eta`` are the points, ``stretch`` the relative length of their interval; ``drift`` and
-    ``swell`` the derivatives of eta and log(stretch) by the height. ``axis`` and ``till_axis`` are
-    weights for the value on the axis, and for the integral from the bottom to the axis.
-    """
+    """Points across sections: arrays (n, m), or (m,) if all sections are equal."""
 
     eta: Array
-    stretch: Any
-    drift: Any
-    swell: Any
-    axis: Array
-    till_axis: Array
+    stretch: Any  # relative length of their interval
+    drift: Any  # derivative of eta by the height
+    swell: Any  # that of log(stretch)
+    axis: Array  # weights for the value on the axis
+    till_axis: Array  # and for the integral from the bottom to the axis
 
 
 class Intervals:
-    """Points ``eta`` (m,) across a section of layers, with weights of integrals and values.
-
-    In some tapered sections the relative intervals vary along the axis; ``eta`` then belongs to the
-    highest section, and :meth:`points` gives others. ``layers`` are the columns of each layer,
-    ``width`` (m,) its relative width. ``from_bottom`` (m, m) and ``whole`` (m,) are weights of
-    integrals over eta; ``bottom`` and ``top`` of the values at the ends.
+    """Points ``eta`` (m,) across a section of layers, the highest one, with weights of integrals
+    and values; ``layers`` are columns, ``width`` (m,) is relative.
     """
 
     def __init__(self, layers: Sequence[Layer], order: int) -> None:
@@ -436,11 +426,11 @@ class SectionForces:
         return R, cross(q[:, 0].T - r, R) - _moments(q, left)
 
     def at(self, e: Array, xi: Array, begin: Array) -> tuple[Array, Array]:
-        """Force (2, n) and moment (n,) about the axis, of the right part on the left.
-
-        ``begin`` (n,) are the cuts at which the segments begin. The mean of equilibrium from both
-        ends of the element is taken; next to an unknown force inside it, only the end on this side.
+        """Force (2, n) and moment (n,) about the axis, of the right part on the left, for segments
+        that begin at the cuts ``begin`` (n,).
         """
+        # the mean of equilibrium from both ends of the element; next to an unknown force inside it,
+        # only the end on this side
         side = np.full(len(e), 0.5)
         for cut in self._unknown:
             side[e == int(cut)] = np.where(begin[e == int(cut)] >= cut, 1.0, 0.0)
@@ -531,9 +521,7 @@ class SectionForces:
 
 
 class Together:
-    """Section forces of several instants with the same cuts, as one with an axis of instants.
-
-    The axis follows that of components; moments have none.
+    """Section forces of several instants with the same cuts: the axis of instants is that before n.
     """
 
     def __init__(self, instants: Sequence[SectionForces]) -> None:
@@ -556,17 +544,13 @@ class Together:
     def face(self, side: int, e: Array, xi: Array) -> tuple[None, Array]:
         return None, np.stack([one.face(side, e, xi)[1] for one in self.instants], axis=1)
 
-    def body(self, at: Sections) -> Array:
-        return np.stack([one.body(at) for one in self.instants], axis=1)
+    def _stacked(self, of: str, *where: Any) -> Array:
+        return np.stack([getattr(one, of)(*where) for one in self.instants], axis=1)
 
-    def sampled(self, at: Sections, where: int) -> Array:
-        return np.stack([one.sampled(at, where) for one in self.instants], axis=1)
-
-    def eigenstrain(self, X: Array, e: Array) -> Array:
-        return np.stack([one.eigenstrain(X, e) for one in self.instants], axis=1)
-
-    def tangent(self, axis: Sections) -> Array:
-        return np.stack([one.tangent(axis) for one in self.instants], axis=1)
+    body = partialmethod(_stacked, "body")
+    sampled = partialmethod(_stacked, "sampled")
+    eigenstrain = partialmethod(_stacked, "eigenstrain")
+    tangent = partialmethod(_stacked, "tangent")
 
 
 def _traction(beam, traction, X, e):

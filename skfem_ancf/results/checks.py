@@ -18,6 +18,8 @@ from ..beam.kinematics import tangents
 from ..core.errors import ModelWarning, warn
 from ..core.types import Array
 from ..equations.stability import response
+from ..materials.base import LinearLaw
+from ..recovery.grids import values_of_domain
 
 #: Stretch below which St. Venant-Kirchhoff softens in compression: the force of a fibre,
 #: E (l^3 - l) / 2, has its minimum there.
@@ -44,10 +46,10 @@ class Checks:
     Attributes
     ----------
     smallest_det
-        Smallest determinant of the deformation gradient at the integration points.
+        Smallest determinant of the deformation gradient at the integration points of beams, and at
+        the points of domains that pictures show.
     smallest_stretch, largest_stretch
-        Smallest and largest principal stretch at the integration points; for a cable in its
-        outermost fibres.
+        Smallest and largest principal stretch at these points; for a cable in its outermost fibres.
     turning
         Largest rotation of the axis over one element, in radians, from the reference configuration.
     utilisation : Extreme or None
@@ -74,9 +76,10 @@ class Checks:
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
-def _of(beam):
+def _of(member):
     """Whose it is, in words."""
-    return "" if beam.name is None else f" of beam {beam.name!r}"
+    kind = "beam" if isinstance(member, Beam) else "domain"
+    return "" if member.name is None else f" of {kind} {member.name!r}"
 
 
 def check(state: Any) -> Checks:
@@ -89,19 +92,29 @@ def check(state: Any) -> Checks:
                        turning(beam, u, base)))
         if base is None:
             _, least, most, by = values[-1]
-            found += _findings(beam, least, by) + _strained(state, beam, least, most)
+            found += _findings(beam, least, by)
+            if not state._eigenstrains(beam):
+                found += _strained(beam, beam.kernel.linear, least, most)
         elif (by := np.max(np.abs(_turns(beam, u, base) - _turns(beam, base)))) > SMALL:
             found.append(
                 f"the axis{_of(beam)} turns by {by:.3g} rad, and what is linear leaves out what "
                 f"is of the order of the square of that; beyond {SMALL:g} rad use solve_static()")
+    for domain in state.system.domains if state.base is None else ():
+        v = values_of_domain(state, domain)[0]
+        stretches = np.sqrt(np.maximum(1.0 + 2.0 * v.principal[0], 0.0))
+        values.append((np.min(np.linalg.det(np.moveaxis(v.F, 2, 0))), np.min(stretches),
+                       np.max(stretches), 0.0))
+        hooke = any(isinstance(one.law(), LinearLaw) for one, _, _ in materials_of(domain))
+        found += _strained(domain, hooke, *values[-1][1:3])
     found += pushed_points(state.system) + state._not_recovered
     worst = None
-    if any(layer.material.strength is not None for b in state.beams for layer in b.across.layers):
+    if has_strength(state):
         worst = state.extremes(count=1)[0]
         if worst.value > 1.0:
-            found.append(f"the stress at {worst.point.round(6).tolist()} of beam {worst.beam!r} is "
-                         f"{worst.value:.3g} times the strength of the material: it yields or "
-                         "breaks there. Use a larger section, a stronger material or less load")
+            found.append(f"the stress at {worst.point.round(6).tolist()} of {worst.kind} "
+                         f"{worst.beam!r} is {worst.value:.3g} times the strength of the material: "
+                         "it yields or breaks there. Use a larger section, a stronger material or "
+                         "less load")
     if state.base is None:
         found += _yields(state)
     if state.t is None and state.base is None and state.system.forces.contacts.anchored:
@@ -113,6 +126,20 @@ def check(state: Any) -> Checks:
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found), worst)
+
+
+def materials_of(member: Any) -> list[tuple[Any, Any, Any]]:
+    """Materials of a beam or domain, each with its modulus E(x, y) and its density."""
+    if isinstance(member, Beam):
+        return [(layer.material, layer.grade, layer.density) for layer in member.across.layers]
+    solid = getattr(member, "_solid", None)
+    return [] if solid is None else [(solid.material, None, solid.material.density)]
+
+
+def has_strength(state: Any) -> bool:
+    """True if a material of a state has a strength."""
+    return any(material.strength is not None for member in state.system.members
+               for material, _, _ in materials_of(member))
 
 
 def _yields(state):
@@ -249,15 +276,15 @@ def _findings(beam, stretch, turn):
     return out
 
 
-def _strained(state, beam, low, high):
-    """Findings of strains outside of the law; eigenstrains are not the law's."""
-    strain, hooke = max(high - 1.0, 1.0 - low), beam.kernel.linear
-    if strain <= (HOOKE if hooke else UNITS) or state._eigenstrains(beam):
+def _strained(member, hooke, low, high):
+    """Findings of strains outside of the law."""
+    strain = max(high - 1.0, 1.0 - low)
+    if strain <= (HOOKE if hooke else UNITS):
         return []
     law = (f": Hooke's law, as in St. Venant-Kirchhoff, is meant for at most {HOOKE:g}, and metals "
            "yield before (ElasticPlastic); for rubber use NeoHookean" if hooke else "")
-    return [f"the strain{_of(beam)} is {strain:.3g}{law}. Are E and the lengths in the same units, "
-            "as Pa and m, or MPa and mm?"]
+    return [f"the strain{_of(member)} is {strain:.3g}{law}. Are E and the lengths in the same "
+            "units, as Pa and m, or MPa and mm?"]
 
 
 def turning(beam: Beam, u: Array, base: Array | None = None) -> float:

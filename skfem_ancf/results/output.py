@@ -6,19 +6,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..beam.layout import WhichBeam, select_beam
-from ..core.errors import require_flag, require_integer
+from ..beam.beam import Beam
+from ..beam.domain import Domain
+from ..beam.layout import WhichMember, select_member
+from ..core.errors import AncfError, CallbackError, InputError, require_flag, require_integer
 from ..core.types import Array
 from ..io import tables, vtu
 from ..recovery.fields import DRAWN, find_field, no_value, values_on_grid
-from ..recovery.grids import layout
+from ..recovery.grids import layout, values_of_domain
 from ..visuals import diagrams, html, matplotlib, pyvista
 from .report import report
 
 #: Points of all beams together, along an element at least and at most, and across it.
 POINTS, FEW, MANY, ACROSS = 4000, 4, 32, 8
-#: Distance of places in heights of the section.
-APART = 2.0
+#: Distance of places in heights of the section, and in sizes of a domain.
+APART, IN_DOMAIN = 2.0, 0.1
 
 
 class Extreme(NamedTuple):
@@ -31,24 +33,29 @@ class Extreme(NamedTuple):
     point
         The material point, in the reference configuration, shape (2,).
     beam
-        Name of the beam, or its number.
+        Name of the beam or domain, or its number.
+    kind
+        "beam" or "domain".
     """
 
     value: float
     point: Array
     beam: Any
+    kind: str = "beam"
 
     def __str__(self) -> str:
         x, y = self.point
-        return f"{self.value:.4g} at ({x:.4g}, {y:.4g}) of beam {self.beam!r}"
+        return f"{self.value:.4g} at ({x:.4g}, {y:.4g}) of {self.kind} {self.beam!r}"
 
 
 class Output:
     """Extremes, files and pictures of a State."""
 
-    def extremes(self, field: Any = "utilisation", count: int = 10, beam: WhichBeam = None,
+    def extremes(self, field: Any = "utilisation", count: int = 10, beam: WhichMember = None,
                  recover: bool = True) -> list[Extreme]:
         """The places where a field is largest in magnitude, two heights or more from each other.
+
+        Components of a domain are in global axes; places in it are a tenth of its size apart.
 
         Parameters
         ----------
@@ -58,7 +65,7 @@ class Output:
         count
             Largest number of places.
         beam
-            Beam, name or number; all by default.
+            Beam or domain, its name or number; by default all that have the field.
         recover
             Recovered strain and stress if available.
 
@@ -82,24 +89,43 @@ class Output:
         state: Any = self
         recover, count = require_flag("recover", recover), require_integer("count", count, 1)
         wanted = find_field(field, DRAWN)
-        beams = state.beams if beam is None else (select_beam(state.beams, beam),)
-        m = int(np.clip(POINTS // max(1, sum(b.mesh.nelements for b in beams)), FEW, MANY))
+        members = state.system.members
+        beams = [one for one in members if isinstance(one, (Beam, Domain))] if beam is None else [
+            select_member(state.beams, members[len(state.beams):], beam)]
+        total = sum(b.mesh.nelements for b in beams if isinstance(b, Beam))
+        m = int(np.clip(POINTS // max(1, total), FEW, MANY))
         found: list[tuple[Extreme, float]] = []
+        undefined: AncfError = no_value(wanted)
         for b in beams:
-            v = values_on_grid(state, b, layout(b, m, ACROSS)[0], recover)
-            values = wanted.of(v)
+            if isinstance(b, Beam):
+                kind, apart = "beam", APART * b.mesh.height
+                v: Any = values_on_grid(state, b, layout(b, m, ACROSS)[0], recover)
+            elif isinstance(b, Domain):
+                kind, v = "domain", values_of_domain(state, b)[0]
+                apart = IN_DOMAIN * float(np.max(np.ptp(v.x, axis=1)))
+            else:
+                raise InputError(f"extremes are those of beams and domains, got {b!r}, in which no "
+                                 "field varies")
+            try:
+                values = wanted.of(v)
+            except AncfError as error:
+                if kind == "beam" and isinstance(error, CallbackError):
+                    raise
+                undefined = error  # of a law without this stress
+                continue
             values = np.hypot(*values) if wanted.components == 2 else values
-            size, apart = np.abs(values - wanted.neutral), APART * b.mesh.height
+            size = np.abs(values - wanted.neutral)
             size[~np.isfinite(size)] = -1.0
-            name = state.beams.index(b) if b.name is None else b.name
+            name = members.index(b) if b.name is None else b.name
             for _ in range(count):
                 k = int(np.argmax(size))
                 if size[k] < 0.0:
                     break
-                found.append((Extreme(float(values[k]), v.x[:, k].copy(), name), float(size[k])))
+                found.append((Extreme(float(values[k]), v.x[:, k].copy(), name, kind),
+                              float(size[k])))
                 size[np.hypot(*(v.x - v.x[:, [k]])) < apart] = -1.0
         if not found:
-            raise no_value(wanted)
+            raise undefined
         return [one for one, _ in sorted(found, key=lambda pair: -pair[1])[:count]]
 
     def _repr_html_(self) -> str:

@@ -68,7 +68,8 @@ class Path(MaterialPoints):
         Whether each equilibrium is stable, and the number of negative eigenvalues of its tangent;
         None where the loads have no potential.
     error
-        Last correction of each point in the energy norm relative to the work done, shape (n,).
+        Error that the iteration leaves in each point, in the energy norm, relative to the work
+        done, shape (n,).
     critical_points : list of CriticalPoint
         Limit and bifurcation points in the order of the path, converged as points of it.
     """

@@ -5,12 +5,14 @@ from __future__ import annotations
 import html
 import platform
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..core.archive import output_file
 from ..core.errors import AncfError, require_path, require_text
@@ -20,7 +22,8 @@ from ..visuals.diagrams import ROOM, lines_of
 from ..visuals.html import history_picture, picture
 from ..visuals.matplotlib import figure_class, plot_scene
 from ..visuals.scenery import rounded, unit_of_resultant
-from ..visuals.symbols import symbols_of
+from ..visuals.symbols import symbols_of, unit_of_load
+from .checks import has_strength, materials_of
 
 #: Fields whose largest values are listed, with their units.
 LISTED = {"displacement": "length", "S_xx": "stress", "von_mises": "stress", "utilisation": ""}
@@ -28,6 +31,8 @@ LISTED = {"displacement": "length", "S_xx": "stress", "von_mises": "stress", "ut
 ROWS, INSTANTS = 40, 50
 #: Sum of all forces over the largest of them in an equilibrium.
 BALANCED = 1e-5
+#: Decimals of coordinates; section forces relative to the largest of their kind that are zero.
+ROUNDED, ZERO = 12, 1e-12
 #: Resolution of the pictures, in dots per inch.
 DPI = 110
 
@@ -42,7 +47,7 @@ td, th { border-bottom: 1px solid #ccc; padding: 0.6mm 3mm 0.6mm 0; text-align: 
          vertical-align: top }
 th { border-bottom: 1.5px solid #222 } td.number { text-align: right; white-space: nowrap }
 img { max-width: 100%; max-height: 68mm; display: block; margin: 2mm auto }
-h2, figure { break-inside: avoid; break-after: avoid } figure { margin: 0 }
+h2 { break-after: avoid } h2, figure { break-inside: avoid } figure { margin: 0 }
 .tall img { max-height: 160mm }
 .bad { color: #b3261e }
 @media print { body { margin: 0; padding: 0; max-width: none } }
@@ -98,7 +103,7 @@ def report_of_history(history: Any, filename: StrPath, title: str | None = None)
     title = require_text("title", title)
     chosen = np.unique(np.linspace(0, len(history) - 1, min(len(history), INSTANTS)).astype(int))
     states = list(history.states(chosen.tolist()))
-    strong = any(_strengths(b) for b in states[0].beams)
+    strong = has_strength(states[0])
     size = [one.extremes("utilisation" if strong else "displacement", 1)[0].value
             for one in states]
     state = states[int(np.argmax(size))]
@@ -142,10 +147,6 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
         + "".join(f"<tr>{row}</tr>" for row in cells) + f"</table>{more}")
 
 
-def _strengths(beam):
-    return [layer.material for layer in beam.across.layers if layer.material.strength is not None]
-
-
 def total_force(system: Any, u: Array, force: Array) -> Array:
     """Resultant of a force on the DOFs (N,) and its moment about the origin, (3,)."""
     out = np.zeros(3)
@@ -175,7 +176,9 @@ def supports_of(state: Any) -> Iterator[tuple[str, tuple[float, float, float]]]:
             found = state.reactions(item.boundary, item.beam)
         except AncfError:
             continue
-        place = f"{_at(symbols[0].at[0])} of beam {name_of(system, layout.beam(item.beam))}"
+        member = layout.beam(item.beam)
+        place = (f"{_at(symbols[0].at[0])} of {'beam ' * isinstance(member, Beam)}"
+                 f"{name_of(system, member)}")
         if place not in known:
             known.add(place)
             yield place, (*found.force, found.moment)
@@ -192,7 +195,7 @@ class _Page:
     def __init__(self, state: Any) -> None:
         self.state, self.system = state, state.system
         self.units = units_of(state)
-        self.strong = any(map(_strengths, state.beams))
+        self.strong = has_strength(state)
 
     def number(self, value: float, kind: str = "") -> tuple[str]:
         """A number with the unit of a length, force, moment or stress, as a cell."""
@@ -213,7 +216,7 @@ class _Page:
         units = "" if self.units is None else f" Units: {', '.join(self.units)}."
         start = state.replace(u=np.zeros_like(state.u), load=0.0, t=None)
         model = _figure(lambda: plot_scene(start, names=len(self.system.members) > 1))
-        findings = list(state.checks.findings) if state.beams else []
+        findings = state.checks.findings
         return [
             _text(f"{how[0].upper()}{how[1:]}. Load factor {state.load:g}.{units}"),
             "<h2>Model</h2>", model, self._bodies(), self._materials(),
@@ -236,7 +239,8 @@ class _Page:
                          str(beam.section).strip("<>"),
                          f"{mesh.nelements} × {type(beam.element).__name__}",
                          (f"{beam.total_mass:.4g}",) if weighs else "–"))
-        others = [(name_of(self.system, one), repr(one)) for one in self.system.members[len(rows):]]
+        others = [(name_of(self.system, one), repr(one).strip("<>"))
+                  for one in self.system.members[len(rows):]]
         return _table(("beam", "length", "height", "section", "elements", "mass"), rows) + _table(
             ("body", ""), others)
 
@@ -250,15 +254,13 @@ class _Page:
                 self.number(x, "stress")[0] for x in given),) if isinstance(given, tuple) else (
                     self.number(given, "stress"))
 
-        every = dict.fromkeys((layer.material, layer.grade, layer.density)
-                              for beam in self.state.beams for layer in beam.across.layers)
+        every = dict.fromkeys(one for member in self.system.members for one in materials_of(member))
         return _table(("material", "E", "ν", "density", "strength"), [
             (f"{getattr(m, 'title', '') or type(m).__name__}, plane {m.plane}",
              cell(grade or m.E, "stress"), (f"{m.nu:g}",), cell(density, ""), strength(m.strength))
             for m, grade, density in every])
 
     def _actions(self):
-        kinds = {"force": "force", "moment": "moment"}
         rows = []
         for s in symbols_of(self.state, True, True, True):
             x, (a, b) = s.at[len(s.at) // 2].start, s.direction[0]
@@ -267,14 +269,12 @@ class _Page:
                 rows.append((s.kind, place, s.text.replace(" ", ", ") or "fixed", ""))
                 continue
             way = f"direction ({a:.3g}, {b:.3g})" if s.kind in ("force", "weight") else ""
-            kind, unit = s.kind, kinds.get(s.kind, "")
             if len(s.at) > 1:
                 place = f"from {_at(s.at[0])} to {_at(s.at[-1])}"
-                if kind == "force":
-                    kind, unit = "distributed force", ""
-            value = self.number(s.value, unit) if s.kind in (
+            value = (rounded(s.value + 0.0, unit_of_load(s, self.units)),) if s.kind in (
                 "force", "moment", "weight", "mass") else ""
-            rows.append((kind, place, f"{s.text.removesuffix('= ')} {way}".strip(), value))
+            rows.append(("distributed force" if s.per else s.kind, place,
+                         f"{s.text.removesuffix('= ')} {way}".strip(), value))
         rows.sort(key=lambda row: row[0] in ("support", "joint"))
         return _table(("what", "where", "", "value"), dict.fromkeys(rows))
 
@@ -313,20 +313,19 @@ class _Page:
     def _extremes(self):
         rows = []
         for field, kind in LISTED.items():
-            stress = [b for b in self.state.beams if b.section.has_fields]
-            if field == "utilisation" and not self.strong:
-                continue
-            try:
-                every = [self.state.extremes(field, 1, beam=b)[0] for b in (
-                    self.state.beams if field == "displacement" else stress)
-                    if field != "utilisation" or _strengths(b)]
-            except AncfError:
-                continue  # a law without this stress
-            if every:
-                one = max(every, key=lambda e: abs(e.value))
-                rows.append((f"largest {field.replace('_', ' ')}", self.number(one.value, kind),
-                             _pair(one.point), str(one.beam)))
-        return _table(("", "value", "at", "beam"), rows)
+            # of all beams, and of each domain
+            for group in (self.state.beams, *([domain] for domain in self.system.domains)):
+                every = []
+                for b in group:
+                    if isinstance(b, Beam) and not b.section.has_fields and kind == "stress":
+                        continue
+                    with suppress(AncfError):  # a law without this stress, or without strength
+                        every += self.state.extremes(field, 1, beam=b)
+                if every:
+                    one = max(every, key=lambda e: abs(e.value))
+                    rows.append((f"largest {field.replace('_', ' ')}", self.number(one.value, kind),
+                                 _pair(one.point), str(one.beam)))
+        return _table(("", "value", "at", "of"), rows)
 
     def _pictures(self):
         yield _figure(lambda: self.state.plot("displacement", scale="auto"))
@@ -336,7 +335,7 @@ class _Page:
     def _worst(self):
         if not self.strong:
             return ""
-        return _table(("utilisation", "at", "beam"), [
+        return _table(("utilisation", "at", "of"), [
             ((f"{one.value:.3f}",), _pair(one.point), str(one.beam))
             for one in self.state.extremes()])
 
@@ -344,12 +343,16 @@ class _Page:
         if not self.state.beams:
             return ""
         lines, rows = lines_of(self.state, self.state.beams), []
+        size = {name: max(np.max(np.abs(one[name])) for one in lines) for name in "NQM"}
+        size["N"] = size["Q"] = max(size["N"], size["Q"])
         for name in "NQM":
             unit = unit_of_resultant(name, self.units)
             for what, pick in (("maximum", np.argmax), ("minimum", np.argmin)):
                 line = lines[int(pick([one[name][pick(one[name])] for one in lines]))]
                 k = int(pick(line[name]))
-                rows.append((f"{what} {name}", (rounded(float(line[name][k]), unit),),
+                value = float(line[name][k])
+                value *= abs(value) > ZERO * size[name]
+                rows.append((f"{what} {name}", (rounded(value + 0.0, unit),),
                              _pair(line["x"][:, k]), name_of(self.system, line["beam"])))
         points = np.hstack([line["x"] for line in lines])
         width, height = np.ptp(points, axis=1) + 2.0 * ROOM * np.max(np.ptp(points, axis=1))
@@ -374,7 +377,8 @@ class _Page:
 
 
 def _pair(x):
-    return f"({x[0]:.4g}, {x[1]:.4g})"
+    x, y = np.round(x, ROUNDED) + 0.0
+    return f"({x:.4g}, {y:.4g})"
 
 
 def _at(vector):

@@ -11,10 +11,10 @@ import numpy as np
 from scipy import sparse
 
 from ..actions.eigenstrain import EigenStrain
-from ..actions.forces.base import Unscaled
 from ..actions.forces.springs import spring_force, spring_of
 from ..actions.item import Item
 from ..actions.joints.base import Joint
+from ..actions.loads import Unscaled
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
 from ..beam.beam import Beam
 from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector

@@ -183,7 +183,7 @@ class LoadCases(Mapping):
                 except InputError:
                     continue  # no strength
             every = [state.resultants(beam=b, sections=33) for b in state.beams]
-            for force in "NQM":
+            for force in "NQM" if every else "":
                 values = np.concatenate([getattr(r, force) for r in every])
                 row |= {f"least {force}": float(values.min()),
                         f"greatest {force}": float(values.max())}

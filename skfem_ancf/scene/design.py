@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..actions.forces.base import derivative
+from ..actions.bound import derivative
 from ..core.errors import (ConvergenceError, InputError, MissingExtra, NameUnknown, ask, ask_array,
                            require_finite, require_function, shown)
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..dynamics.sensors import Sensor, locate, read
 from ..equations.matrices import matrices_of
@@ -275,7 +275,7 @@ class Design:
         rows = [frozen.rows(self._built) for frozen in self._frozen]
         noise = CHANGED * self._magnitudes(state, rows)
         known = isinstance(self.build, Parameters)
-        by = _Differences(lambda p: self._equations(p, state), p, h, stencil, noise)
+        by = Differences(lambda p: self._equations(p, state), p, h, stencil, noise)
         if known:
             # the same degrees of freedom in the equations and in the rows of each eigenvalue
             n, c = len(self._values), self._built.system.constraints
@@ -324,7 +324,7 @@ class Design:
                                largest])
 
 
-class _Differences:
+class Differences:
     """Derivatives of equations by parameters p at a fixed state, by steps h."""
 
     def __init__(self, equations: Any, p: Array, h: Array, stencil: Any, noise: Array) -> None:

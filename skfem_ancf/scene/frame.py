@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actions.joints.base import bind_joint
 from ..actions.joints.nodes import COMPONENTS, Nodes, chain_ends
 from ..actions.loads import DeadLoad, EndMoment, LineLoad, Load, number_at
 from ..actions.places import members_at
@@ -139,7 +138,7 @@ class Frame(Scene):
         with self._lock:
             nodes, *others = self._entries
             if issubclass(Nodes, kind) and not nodes.bound:  # after the last support
-                nodes = nodes._replace(bound=(bind_joint(nodes.given, self.layout),))
+                nodes = nodes._replace(bound=tuple(nodes.given.bound_on(self.layout)))
                 self._entries = nodes, *others
         return super()._all(kind)
 

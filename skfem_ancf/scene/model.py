@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, NamedTuple, ParamSpec, TypeV
 
 from numpy.typing import ArrayLike
 
-from ..actions.binding import bind_item
+from ..actions.bound import BoundConstraint, BoundForce
 from ..actions.eigenstrain import EigenStrain, Temperature, require_alone
 from ..actions.energy import Energy
 from ..actions.form_load import FormLoad
@@ -129,12 +129,12 @@ class Model(NearMisses):
     @property
     def joints(self) -> tuple[Joint, ...]:
         """The joints, bound to the beams: a tuple of :class:`~skfem_ancf.actions.joints.Joint`."""
-        return self._all(Joint)
+        return self._all(BoundConstraint)
 
     @property
     def elements(self) -> tuple[ForceElement, ...]:
         """The bound force elements: springs, foundations, masses, obstacles, user-defined ones."""
-        return self._all(ForceElement)
+        return self._all(BoundForce)
 
     def _all(self, kind):
         return tuple(one for entry in self._entries for one in entry.bound if isinstance(one, kind))
@@ -148,7 +148,7 @@ class Model(NearMisses):
         if not isinstance(item, Item):
             raise InputError(f"the item must be an Item, as a Spring, a Load or a Joint, got "
                              f"{shown(item)}: derive yours from skfem_ancf.Item")
-        bound = [part for one in item.expand(self.layout) for part in bind_item(one, self.layout)]
+        bound = [part for one in item.expand(self.layout) for part in one.bound_on(self.layout)]
         numbers = {name: number for name, value in vars(item).items()
                    if isinstance(value, (Beam, tuple, list)) and name[0] != "_"
                    and (number := self._numbered(value)) is not value}

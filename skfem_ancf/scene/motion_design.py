@@ -1,17 +1,21 @@
-"""Readings of motions as functions of parameters, with derivatives by forward sensitivities."""
+"""Readings of motions as functions of parameters, with derivatives forward or by the adjoint."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse.linalg import lsqr
+from scipy import sparse
+from scipy.sparse.linalg import lsqr, splu
 
-from ..core.errors import (ConvergenceError, InputError, NameUnknown, require_flag,
+from ..actions.bound import derivative
+from ..beam.kinematics import element_dofs, entries_of
+from ..core.errors import (InputError, NameUnknown, require_flag, require_integer,
                            require_positive)
 from ..core.types import Array
 from ..dynamics import GeneralizedAlpha, get_scheme
@@ -20,28 +24,31 @@ from ..dynamics.history import state_of
 from ..dynamics.run import integrator_of
 from ..dynamics.sensors import locate, read
 from ..equations.matrices import matrices_of
-from .design import STENCIL, Design
-from .linear_model import Bordered
+from .design import STENCIL, Design, Differences
+from .eigen_readings import residual
+from .linear_model import rows_of
+from .parameters import Parameters
 
-#: Relative change of a sensitivity in the last iteration of a step, and the largest number of them.
-CLOSED, MOST = 1e-10, 12
-#: Change of a displacement by a step of a parameter, relative to the scene, that is round-off.
-NOISE = 1e-13
 #: Step of the parameters, relative to their size: what it moves of the motion must be small.
 STEP = 1e-4
 #: Time of differences for rates of joints, over that of a step.
 INSTANT = 1e-2
-#: The arrays of a motion that have sensitivities.
-NAMES = ("u", "v", "acceleration", "algorithmic", "multipliers")
+#: Step of displacements for derivatives of damping forces, relative to the scene.
+SMALL = 1e-3
+#: Relative change of an equation that is no round-off.
+CHANGED = 1e-9
+#: The arrays of a motion on which the next step depends.
+NAMES = ("u", "v", "acceleration", "algorithmic")
 
 
 class MotionDesign(Design):
-    """Readings of a motion as functions of few parameters, with derivatives.
+    """Readings of a motion as functions of parameters, with derivatives.
 
-    The derivatives are those of the discrete motion: each step is linearised with the tangent of
-    the scheme and solved for all parameters [1]. They cost about as much as the motion for each
-    parameter, so use it for up to ten. ``values``, ``jacobian`` and ``objective`` are those of a
-    :class:`Design`, for readings at all steps.
+    The derivatives are those of the discrete motion, whose steps are linearised with the tangent of
+    the scheme [1]. ``jacobian`` has those of all readings at all steps, forward in time, at the
+    cost of about a motion for each parameter: use it for up to ten. ``objective`` has those of one
+    number, as a final value or an integral, by one adjoint solution backward in time for any number
+    of parameters. Both are as in a :class:`Design`, for readings at all steps.
 
     Parameters
     ----------
@@ -59,12 +66,15 @@ class MotionDesign(Design):
         reference configuration.
     sizes
         Typical sizes of the parameters, (n,), by default their absolute values.
+    every
+        Keep the states after this number of steps; derivatives compute those between again. About
+        the root of the number of steps needs the least memory.
 
     Attributes
     ----------
     history
-        The last :class:`~skfem_ancf.History`. Readings are those at its instants, one after the
-        other: ``design.values(p).reshape(len(design.history), -1)``.
+        The last :class:`~skfem_ancf.History`. Readings are those of its sensors at all steps, one
+        after the other: ``design.values(p).reshape(len(design.history.sensors.t), -1)``.
 
     Raises
     ------
@@ -92,12 +102,16 @@ class MotionDesign(Design):
     >>> design = MotionDesign(build, ["tip"], t_end=0.1, dt=0.01)
     >>> design.jacobian([2e8]).shape, len(design.history)
     ((22, 1), 11)
+    >>> value, gradient = design.objective(lambda y: y[-1])([2e8])      # the last height
+    >>> bool(abs(gradient[0] / design.jacobian([2e8])[-1, 0] - 1) < 1e-6)
+    True
     """
 
     def __init__(self, build: Callable[[Array], Any], readings: Sequence[str], t_end: float,
                  dt: float, scheme: str | Scheme | type[Scheme] = "generalized-alpha",
-                 static: bool = False, sizes: ArrayLike | None = None) -> None:
+                 static: bool = False, sizes: ArrayLike | None = None, every: int = 1) -> None:
         super().__init__(build, readings, sizes)
+        self.every = require_integer("every", every, 1)
         self.t_end, self.dt = require_positive("t_end", t_end), require_positive("dt", dt)
         self.scheme, self.static = get_scheme(scheme), require_flag("static", static)
         if not isinstance(self.scheme, GeneralizedAlpha):
@@ -113,128 +127,327 @@ class MotionDesign(Design):
                 system.forces.changing):
             raise InputError("derivatives of a motion are of smooth forces without a history: this "
                              "scene has contact, friction or a material with a history")
-        self._p, self._built, self.state, self._J = p, scene, state, None
-        self.history = scene.integrate(self.t_end, self.dt, self.scheme, state)
-        if self.history.substeps:
-            raise InputError(f"{self.history.substeps} steps were halved, since they did not "
-                             "converge: derivatives need equal steps, so give a smaller dt")
-        own = self._located(scene)
-        self._values = np.concatenate([self._seen(*own, self.history.state(k)._motion)
-                                       for k in range(len(self.history))])
-
-    def _located(self, scene):
-        """The system of a scene, and the sensors read in it with their places."""
         for name in self.readings:
             if not isinstance(name, str) or name not in scene.sensors:
                 raise NameUnknown("sensor", name, scene.sensors)
-        return scene.system, [(one, locate(one, scene.system))
-                              for one in map(scene.sensors.get, self.readings)]
+        self._p, self._built, self.state, self._J = p, scene, state, None
+        n = max(1, round(self.t_end / self.dt))
+        kept = None if self.every == 1 else self.dt * np.append(np.arange(0, n, self.every), n)
+        self.history = scene.integrate(self.t_end, self.dt, self.scheme, state, t_eval=kept)
+        if self.history.substeps:
+            raise InputError(f"{self.history.substeps} steps were halved, since they did not "
+                             "converge: derivatives need equal steps, so give a smaller dt")
+        seen = self.history.sensors
+        self._values = np.concatenate([np.reshape(seen[name], (len(seen.t), -1))
+                                       for name in self.readings], axis=1).ravel()
 
-    def _seen(self, system, located, y):
-        """Readings at an instant."""
-        state = state_of(system, self.scheme, y)
-        return np.concatenate([np.ravel(read(one, place, state)) for one, place in located])
+    def _segment(self, j: int) -> list[Motion]:
+        """The instants from a kept state to the next, computed again."""
+        first, last = (self.history.state(k)._motion for k in (j, j + 1))
+        n = round((last.t - first.t) / self.dt)
+        if n <= 1:
+            return [first, last]
+        between = integrator_of(self._built.system, self.scheme).run(first, self.dt, n - 1)
+        if len(between) < n - 1:
+            raise InputError(f"the steps after t = {first.t:.6g} do not converge a second time: "
+                             "give a smaller dt, or every=1")
+        return [first, *between, last]
+
+    def _steps(self, back: bool = False) -> Iterator[tuple[Motion | None, Motion]]:
+        """Pairs of instants from the start, which is (None, first), or back from the end."""
+        start, order = (None, self.history.state(0)._motion), -1 if back else 1
+        if not back:
+            yield start
+        for j in range(len(self.history) - 1)[::order]:
+            found = self._segment(j)
+            yield from list(pairwise(found))[::order]
+        if back:
+            yield start
+
+    def _located(self, p):
+        """The scene at p, and its sensors that are read, with their places."""
+        scene = self._scene(p)
+        return scene, [(one, locate(one, scene.system))
+                       for one in map(scene.sensors.get, self.readings)]
+
+    def _read_in(self, scene, located, y):
+        """Readings of a scene at an instant, (r,)."""
+        state = state_of(scene.system, self.scheme, y)
+        return np.concatenate([np.ravel(read(one, at, state)) for one, at in located])
+
+    # forward
 
     def _jacobian(self, p, scene, state):
         sizes = np.abs(p) if self._sizes is None else self._sizes
         h = STEP * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
-        moved = [[(c / step, s * step, self._scene(p + s * step * unit)) for s, c in STENCIL]
+        moved = [[(c / step, s * step, self._located(p + s * step * unit)) for s, c in STENCIL]
                  for step, unit in zip(h, np.eye(len(p)))]
-        located = [[self._located(other) for _, _, other in some] for some in moved]
-        change = self._start(moved)
-        y, rows = self.history.state(0)._motion, []
-        for k in range(len(self.history)):
-            if k:
-                y = self.history.state(k)._motion
-                change = self._step(k, y, change, moved, h)
-            rows.append(np.array([sum(c * self._seen(*own, _moved(y, s, change, i))
-                                      for (c, s, _), own in zip(some, places))
-                                  for i, (some, places) in enumerate(zip(moved, located))]).T)
+
+        def by(equations):
+            """Derivatives of equations of a scene, (rows, n)."""
+            return np.column_stack([sum(c * equations(other) for c, _, (other, _) in some)
+                                    for some in moved])
+
+        rows, old = [], None
+        for before, y in self._steps():
+            step = _Step(self, y, before)
+            old = step.forward(by(step.equations), old)
+            rows.append(np.array([sum(c * self._read_in(*other, replace(y, **{
+                name: getattr(y, name) + s * x[:, i] for name, x in old.items()}))
+                for c, s, other in some) for i, some in enumerate(moved)]).T)
         return np.concatenate(rows)
 
-    def _start(self, moved):
-        """Derivatives of the first instant, arrays (..., n) by name."""
-        def first(scene):
-            u = np.zeros(scene.N)
-            if self.state is not None:  # near the one that is known
-                u = np.array(scene.solve_static(start=scene.state(self.state.u)).u)
-            return integrator_of(scene.system, self.scheme).start(u, scene._velocity, 0.0, self.dt)
+    # backward
 
-        found = [[(c, first(scene)) for c, _, scene in some] for some in moved]
-        return {name: np.column_stack([sum(c * getattr(y, name) for c, y in ends)
-                                       for ends in found]) for name in NAMES}
+    def objective(self, function: Callable[[Array], float]) -> Callable[[ArrayLike], Any]:
+        """For ``scipy.optimize.minimize(..., jac=True)``: a function of p, by the adjoint.
 
-    def _step(self, k, y, old, moved, h):
-        """Derivatives of the instant k from those of the one before."""
-        before, system = self.history.state(k - 1)._motion, self._built.system
-        alpha_m, alpha_f, beta, _ = self.scheme.parameters
-        dt, c, state = y.t - before.t, system.constraints, self.history.state(k)
-        M, D, K, _, J = matrices_of(system, state)
-        none = np.zeros((c.N, len(moved)))
-        solver, inertia = Bordered([K, D, M], J, c, none), Bordered([M], J, c, none)
-        kick = (1.0 - alpha_m) / (1.0 - alpha_f)
-        factors = (1.0, self.scheme.parameters[3] / (beta * dt), kick / (beta * dt**2))
-        # joints: multipliers of the corrections of velocity and acceleration
-        raw = self._raw(y.u, vars(before), dt)
-        impulse, force = (np.zeros(c.m) if not c.m else lsqr(
-            J.T, M @ (end - x), atol=0.0, btol=0.0)[0] for end, x in (
-                (raw[0], y.v), (raw[1], y.acceleration)))
-        u, l, found = old["u"].copy(), old["multipliers"].copy(), {}
-        sizes = c.coordinate_sizes[:, None]
-        rate, bend = (partial(one, INSTANT * dt) for one in (_rate, _bend))
+        Parameters
+        ----------
+        function
+            A number as a function of the readings at all steps, an array (r,).
+        """
+        def value_and_gradient(p: ArrayLike) -> tuple[float, Array]:
+            y = self.values(p)
+            return float(function(y)), self._backward(derivative(function, y))
 
-        def rest_of(equations, *parts):
-            return np.column_stack([sum(factor * equations(other.system, *(
-                x + s * dx[:, i] for x, dx in parts)) for factor, s, other in some)
-                for i, some in enumerate(moved)])
+        return value_and_gradient
 
-        def project(of_joints, x, dx, end, multiplier):
-            """Derivatives of what joints make of velocity or acceleration x, and multipliers."""
-            out, d = dx.copy(), np.zeros((c.m, len(moved)))
-            for _ in range(2 if c.m else 0):
-                rest = rest_of(lambda system, x, end, m, u, v: np.concatenate([
-                    system.mass.multiply(end - x) + system.constraints.sparse_jacobian(
-                        u, y.t).T @ m, of_joints(system, u, v, end, y.t)]),
-                    (x, dx), (end, out), (multiplier, d), (y.u, u), (y.v, found.get("v", out)))
-                change, m = inertia.solve([1.0], -rest[:c.N], -rest[c.N:])
-                out, d = out + change, d + m
-            return out, d
+    def _backward(self, weights):
+        """The derivative by the parameters of the sum of weighted readings (r,), (n,)."""
+        p, c = self._p, self._built.system.constraints
+        sizes = np.abs(p) if self._sizes is None else self._sizes
+        h = STEP * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
+        weights = weights.reshape(len(self.history.sensors.t), -1)
+        groups = [([k], np.full(c.N + c.m, k)) for k in range(len(p))]
+        if isinstance(self.build, Parameters):
+            groups = self.build.groups(c.N + c.m)
+        out, bars = np.zeros(len(p)), {name: np.zeros(c.N) for name in NAMES}
+        others: dict[bytes, Any] = {}
 
-        for _ in range(MOST):
-            v, a, w = self._raw(u, old, dt)
-            found = {}
-            found["v"], _ = project(rate, raw[0], v, y.v, impulse)
-            rest = rest_of(partial(_residual, y.t), (y.u, u), (raw[1], a),
-                           (y.multipliers - force, l), (y.v, found["v"]))
-            if np.any(np.abs(rest[c.fixed]) > 0.0):
-                raise InputError("a prescribed motion depends on the parameters: derivatives of "
-                                 "such motions are not available")
-            du, dl = solver.solve(factors, -rest[:c.N], -rest[c.N:])
-            u, l = u + du, l + dl
-            left, size = (np.abs(x / sizes).max(axis=0) for x in (du, u))
-            if np.all(left <= np.maximum(CLOSED * size, NOISE / h)):
-                break
+        def equations(step, w, q):
+            if q.tobytes() not in others:
+                others[q.tobytes()] = self._located(q)
+            scene, located = others[q.tobytes()]
+            seen = [w @ self._read_in(scene, located, step.y)] if w.any() else []
+            return np.append(step.equations(scene), seen)
+
+        for (before, y), w in zip(self._steps(back=True), weights[::-1]):
+            step, pull, read_here = _Step(self, y, before), np.zeros(c.m), int(w.any())
+            if read_here:
+                rows = [rows_of(self._built.system, state_of(self._built.system, self.scheme, y),
+                                self._built.sensors[name]) for name in self.readings]
+                *by, pull = (w @ np.concatenate(parts) for parts in zip(*rows))
+                for name, x in zip(NAMES, by):
+                    bars[name] = bars[name] + x
+            adjoint, bars = step.backward(bars, pull)
+            size = np.append(step.magnitudes(), [np.abs(w).max()] * read_here)
+            found = Differences(partial(equations, step, w), p, h, STENCIL, CHANGED * size).of(
+                [(members, np.append(np.tile(of, 3), [-1] * read_here)) for members, of in groups])
+            step.require_held(found[c.fixed].toarray())
+            out += np.append(-adjoint, [1.0] * read_here) @ found
+        return out
+
+
+class _Step:
+    """The equations of a step, or of the start, and their linearisation.
+
+    Unknowns and equations are in the order u, l; v, impulses; a, forces: the motion with l, what
+    joints make of the velocity of the scheme, and of its acceleration. At the start the first are
+    those of the static solution, or nothing.
+    """
+
+    def __init__(self, design: MotionDesign, y: Motion, before: Motion | None) -> None:
+        system = self._system = design._built.system
+        c, self.y, self._before, self._design = system.constraints, y, before, design
+        self._h = h = design.dt if before is None else y.t - before.t
+        alpha_m, alpha_f, beta, gamma = design.scheme.parameters
+        b, self._kick, q = 1.0 / (beta * h**2), (1.0 - alpha_m) / (1.0 - alpha_f), 1.0 - alpha_f
+        w = np.array([-b, -b * h, 0.0, -(0.5 - beta) / beta])
+        # velocity, acceleration and w of the scheme by u, v, a, w before
+        self._v = h * gamma * w + [0.0, 1.0, 0.0, h * (1.0 - gamma)]
+        self._a = self._kick * w + [0.0, 0.0, -alpha_f / q, alpha_m / q]
+        self._w = np.array([0.0, 0.0, alpha_f / q, -alpha_m / q]) / self._kick
+        if before is None:
+            # the velocity that is given may violate supports and joints
+            self._raw = None
+            v, a = design._built._velocity, y.acceleration
         else:
-            raise ConvergenceError(f"the derivatives of the step to t = {y.t:.6g} do not converge: "
-                                   "give a smaller dt", state)
-        v, a, w = self._raw(u, old, dt)
-        found["v"], _ = project(rate, raw[0], v, y.v, impulse)
-        end, dl = project(bend, raw[1], a, y.acceleration, force)
-        return dict(zip(NAMES, (u, found["v"], end, w + (end - a) / kick, l + dl)))
+            parts = [getattr(before, name) for name in NAMES]
+            v, a = (np.where(c.free, factor * y.u + sum(map(np.multiply, row, parts)), end)
+                    for factor, row, end in ((h * gamma * b, self._v, y.v),
+                                             (self._kick * b, self._a, y.acceleration)))
+            self._raw = v, a
+        M = system.mass.multiply
+        sides = [M(start - end)[c.free] for start, end in ((v, y.v), (a, y.acceleration))]
+        J = c.sparse_jacobian(y.u, y.t)
+        self._impulse, self._force = (lsqr(J[:, c.free].T, x, atol=0.0, btol=0.0)[0]
+                                      if c.m else np.zeros(0) for x in sides)
+        self._solver = self._linearised(h * gamma * b, self._kick * b)
 
-    def _raw(self, u, old, dt):
-        """Velocity, acceleration and w of the scheme at the displacement u, without joints."""
-        alpha_m, alpha_f, beta, gamma = self.scheme.parameters
-        w = (u - old["u"] - dt * old["v"]) / (beta * dt**2) - (
-            (0.5 - beta) / beta * old["algorithmic"])
-        return (old["v"] + dt * ((1.0 - gamma) * old["algorithmic"] + gamma * w),
-                ((1.0 - alpha_m) * w + alpha_m * old["algorithmic"]
-                 - alpha_f * old["acceleration"]) / (1.0 - alpha_f), w)
+    def equations(self, scene: Any) -> Array:
+        """The equations of a scene with other parameters at this step, (3 (N + m),)."""
+        system, y, c = scene.system, self.y, scene.system.constraints
+        if c.N != len(y.u) or c.m != len(y.multipliers):
+            raise InputError("the parameters change the number of degrees of freedom or of joint "
+                             "equations")
+        J, M, static = c.sparse_jacobian(y.u, y.t), system.mass.multiply, self._design.state
+        instant = INSTANT * self._h
+        rate, bend = (f(instant, system, y.u, y.v, x, y.t)
+                      for f, x in ((_rate, y.v), (_bend, y.acceleration)))
+        if self._raw is not None:
+            v, a = self._raw
+            # forces of damping are those of the velocity of the scheme, before the joints
+            first = _residual(y.t, system, y.u, a, y.multipliers - self._force, v)
+            last = M(y.acceleration - a) + J.T @ self._force
+        else:
+            v, first = scene._velocity, np.zeros(c.N + c.m)
+            if static is not None:
+                first = residual(system, y.u, static.multipliers, static.load)
+            last = _residual(y.t, system, y.u, y.acceleration, y.multipliers, y.v)[:c.N]
+        rest = np.concatenate([first, M(y.v - v) + J.T @ self._impulse, rate, last, bend])
+        return rest
+
+    def require_held(self, change: Array) -> None:
+        """Raise InputError if derivatives of supports by parameters are not zero."""
+        if np.any(np.abs(change) > 0.0):
+            raise InputError("a prescribed motion depends on the parameters: derivatives of such "
+                             "motions are not available")
+
+    def magnitudes(self) -> Array:
+        """Typical magnitudes of the equations."""
+        y, c, s = self.y, self._system.constraints, self._system.constraints.coordinate_sizes
+        force = self._system.internal_force(y.u, y.t) + self._system.mass.multiply(y.acceleration)
+        work = max(np.abs(force * s).max(), np.finfo(float).tiny)
+        speed = np.full(c.m, self._system.size / self._h)
+        return np.concatenate([work / s, speed * self._h, self._h * work / s, speed, work / s,
+                               speed / self._h])
+
+    def _linearised(self, to_v, to_a):
+        """The factors of the derivatives of the equations by the unknowns."""
+        y, system, design, h = self.y, self._system, self._design, self._h
+        c, held = system.constraints, y
+        if self._raw is not None:
+            held = replace(y, v=self._raw[0], multipliers=y.multipliers - self._force)
+        M, D, K, _, J = matrices_of(system, state_of(system, design.scheme, held))
+        K, self._damping = K + _turning(system, held), D
+        turned = [c.curvature(y.u, y.t, x) for x in (self._impulse, self._force)]
+        s = INSTANT * h
+        early, late = (c.sparse_jacobian(y.u + x * y.v + 0.5 * x * x * y.acceleration, y.t + x)
+                       for x in (-s, s))
+        slope, bend = (late - early) / (2.0 * s), (late - 2.0 * J + early) / s**2
+        none = [None, None]
+        if self._raw is not None:
+            rows = [[K + to_v * D + to_a * M, J.T, *none, *none],
+                    [turned[0] - to_v * M, None, M, J.T, *none],
+                    [turned[1] - to_a * M, None, *none, M, J.T]]
+            joints = J
+        else:
+            first, joints = (M, J) if design.state is None else matrices_of(
+                system, design.state)[2::2]
+            rows = [[first, joints.T, *none, *none], [turned[0], None, M, J.T, *none],
+                    [K, None, D, None, M, J.T]]
+        if c.m:
+            zero = sparse.csr_array((c.m, c.m))
+            rows = [rows[0], [joints, zero, *none, *none], rows[1], [slope, None, J, None, *none],
+                    rows[2], [bend, None, 2.0 * slope, None, J, None]]
+        else:
+            rows = [row[::2] for row in rows]
+        sizes, one = c.coordinate_sizes, np.ones(c.m)
+        scale = float(np.abs((K + M / h**2).diagonal() * sizes**2)[c.free].max())
+        left = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes,
+                               scale * h * h * one])
+        right = np.concatenate([sizes, scale * one, sizes / h, scale * h * one, sizes / h**2,
+                                scale * one])
+        keep = np.tile(np.append(c.free, np.ones(c.m, bool)), 3)
+        A = sparse.diags_array(left) @ sparse.block_array(rows, format="csr") @ (
+            sparse.diags_array(right))
+        return _Factors(splu(sparse.csc_array(A[keep][:, keep])), left, right, keep)
+
+    def forward(self, change: Array, old: Any) -> dict[str, Array]:
+        """Derivatives (..., n) by name, from those of the equations and of the instant before."""
+        system, c = self._system, self._system.constraints
+        n = c.N + c.m
+        self.require_held(change[:c.N][c.fixed])
+        right = -change
+        if old is not None:
+            v, a = (c.free[:, None] * sum(f * old[name] for f, name in zip(row, NAMES))
+                    for row in (self._v, self._a))
+            right[:c.N] -= self._damping @ v
+            v, a = system.mass.tocsc() @ v, system.mass.tocsc() @ a
+            right[:c.N] -= a
+            right[n:n + c.N] += v
+            right[2 * n:2 * n + c.N] += a
+        x = self._solver.solve(right).reshape(3, n, -1)
+        found = dict(zip(NAMES, (x[0, :c.N], x[1, :c.N], x[2, :c.N], x[2, :c.N])))
+        found["multipliers"] = x[2, c.N:]
+        if old is not None:
+            found["multipliers"] = x[2, c.N:] + x[0, c.N:]
+            found["algorithmic"] = x[2, :c.N] / self._kick + sum(
+                f * old[name] for f, name in zip(self._w, NAMES))
+        return found
+
+    def backward(self, bars: dict[str, Array], pull: Array) -> tuple[Array, dict[str, Array]]:
+        """The adjoint of the equations, and derivatives by the instant before.
+
+        ``bars`` are the derivatives by this instant, ``pull`` (m,) those by the multipliers.
+        """
+        c, M = self._system.constraints, self._system.mass.multiply
+        start = self._before is None
+        u, v, a, w = (bars[name] for name in NAMES)
+        right = np.concatenate([u, 0.0 * pull if start else pull, v, 0.0 * pull,
+                                a + (w if start else w / self._kick), pull])
+        found = self._solver.solve(right, "T")
+        one, two, three = (x[:c.N] for x in found.reshape(3, -1))
+        kinds = (self._a, c.free * M(three - one)), (self._v, c.free * (
+            M(two) - self._damping.T @ one)), (self._w, w)
+        return found, {name: sum(row[k] * x for row, x in kinds) for k, name in enumerate(NAMES)}
 
 
-def _moved(y: Motion, step: float, change: dict[str, Array], i: int) -> Motion:
-    """A Motion changed by a step along the derivatives by parameter i."""
-    return replace(y, **{name: getattr(y, name) + step * x[:, i] for name, x in change.items()})
+class _Factors(NamedTuple):
+    """LU factors of a scaled matrix, of the unknowns that are kept."""
+
+    lu: Any
+    left: Array
+    right: Array
+    keep: Array
+
+    def solve(self, b: Array, trans: str = "N") -> Array:
+        """The solution for b (k,) or (k, n); zero where fixed."""
+        before, after = (self.left, self.right) if trans == "N" else (self.right, self.left)
+        out = np.zeros_like(b)
+        b = (b.T * before).T[self.keep]
+        out[self.keep] = (self.lu.solve(b, trans).T * after[self.keep]).T
+        return out
+
+
+def _turning(system, y):
+    """The derivative of the damping force by the displacement, sparse (N, N).
+
+    By differences; columns without common rows are moved at once, see [2] of Design.
+    """
+    pattern = [entries_of(s.start + element_dofs(beam)) for beam, s in zip(
+        system.beams, system.slices) if system.viscous]
+    if system.forces.resists:
+        pattern.append(system.forces.entries(system.backend.tables.plain.forces, y.t, y.u, y.v,
+                                             1.0)[:2])
+    if not pattern or not y.v.any():
+        return sparse.csr_array((system.N, system.N))
+    i, j = (np.concatenate([np.ravel(part) for part in parts]) for parts in zip(*pattern))
+    touched = sparse.csr_array((np.ones(len(i)), (i, j)), shape=(system.N, system.N))
+    touched.sum_duplicates()
+    i, j = touched.nonzero()
+    near, colours = sparse.csr_array(touched.T @ touched), np.full(system.N, -1)
+    for k in np.unique(j):
+        used = colours[near.indices[near.indptr[k]:near.indptr[k + 1]]]
+        colours[k] = np.setdiff1d(np.arange(len(used) + 1), used)[0]
+    values, steps = np.zeros(len(i)), SMALL * system.constraints.coordinate_sizes
+    for colour in range(colours.max() + 1):
+        change = sum(c * system.damping_force(y.u + x * steps * (colours == colour), y.v, y.t)
+                     for x, c in STENCIL)
+        own = colours[j] == colour
+        values[own] = change[i[own]] / steps[j[own]]
+    return sparse.csr_array((values, (i, j)), shape=touched.shape)
 
 
 def _residual(t, system, u, a, l, v):

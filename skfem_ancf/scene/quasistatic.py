@@ -282,17 +282,16 @@ def _begin(system, t, start, u, rules, stable):
         return Instant(t, given, "given")
     if memory is None:
         system.forces.contacts.require_clear(np.zeros(system.N) if u is None else u, t)
-    with system.stopped_at(t):
-        search = Search(system, u, memory, rules, stable, False)
-        result = None
-        if search.stabilised_by_loads:
-            try:
-                result, way = search.at_rest(), AT_REST
-            except LoadStepFailed:
-                logger.debug("t = %.6g: not at rest", t)
-        if result is None:
-            result = search.find()
-            way = result.attempts[-1].strategy
+    search = Search(system.at(t), u, memory, rules, stable, False)
+    result = None
+    if search.stabilised_by_loads:
+        try:
+            result, way = search.at_rest(), AT_REST
+        except LoadStepFailed:
+            logger.debug("t = %.6g: not at rest", t)
+    if result is None:
+        result = search.find()
+        way = result.attempts[-1].strategy
     result.rubbed = 0.0 if motion is None else motion.dissipated
     return Instant(t, result, way)
 
@@ -358,42 +357,40 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
         "load": 0.0, "steps": [], "rejected": 0, "unstable": False, "doubt": "",
         "diverging": False})
     failed: Any = None
-    far = FAR * system.size
+    system, far = system.at(t), FAR * system.size
     if last.rate is not None:
         far = max(NEAR * system.size, FASTER * last.rate * (t - last.t))
-
-    with system.stopped_at(t):
-        if drag is not None:
-            return _loose(system, last, t, drag, start, Options(
-                route, "mixed", rules.tol, rules.max_iterations, close=True), smallest)
-        search = Search(system, last.result.u, last.result.memory, rules, stable, False,
-                        t - last.t)
-        bounded = search.touches or search.stabilised_by_loads
-        for method in ("mixed", "descent" if bounded else "newton"):
-            try:
-                if method == "descent":
-                    result = search.descent(most=BOUNDED)
-                else:
-                    step = Increment(system, start, 1.0, Options(
-                        route, method, rules.tol, rules.max_iterations, method == "mixed", True))
-                    with np.errstate(all="ignore"):  # overflow shows in the residual
-                        result = step.reached(step.solve(stable))
-            except LoadStepFailed as failure:
-                failed = failure
-                continue
-            moved = largest_displacement(system, result.u - last.result.u)
-            if moved > far and not smallest:
-                failed = LoadStepFailed(f"a node moves by {moved:.3g}")
-                continue
+    if drag is not None:
+        return _loose(system, last, t, drag, start, Options(
+            route, "mixed", rules.tol, rules.max_iterations, close=True), smallest)
+    search = Search(system, last.result.u, last.result.memory, rules, stable, False,
+                    t - last.t)
+    bounded = search.touches or search.stabilised_by_loads
+    for method in ("mixed", "descent" if bounded else "newton"):
+        try:
             if method == "descent":
-                result.rubbed += last.result.rubbed
-            way = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
-            return Instant(t, result, way, moved / (t - last.t))
-        if not smallest:
-            raise failed
-        logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
-        result = search.find()
-        result.rubbed += last.result.rubbed
+                result = search.descent(most=BOUNDED)
+            else:
+                step = Increment(system, start, 1.0, Options(
+                    route, method, rules.tol, rules.max_iterations, method == "mixed", True))
+                with np.errstate(all="ignore"):  # overflow shows in the residual
+                    result = step.reached(step.solve(stable))
+        except LoadStepFailed as failure:
+            failed = failure
+            continue
+        moved = largest_displacement(system, result.u - last.result.u)
+        if moved > far and not smallest:
+            failed = LoadStepFailed(f"a node moves by {moved:.3g}")
+            continue
+        if method == "descent":
+            result.rubbed += last.result.rubbed
+        way = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
+        return Instant(t, result, way, moved / (t - last.t))
+    if not smallest:
+        raise failed
+    logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
+    result = search.find()
+    result.rubbed += last.result.rubbed
     moved = largest_displacement(system, result.u - last.result.u)
     way = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
     return Instant(t, result, way, moved / (t - last.t))

@@ -647,7 +647,8 @@ class Scene(Model):
             Times to store, shape (n,); every step by default. An instant within a step is computed
             by a shorter step from the same start, without effect on the motion.
         tol
-            Tolerance of the iteration in a step; that of the scheme by default.
+            Relative error of the iteration in a step, in the energy norm; that of the scheme by
+            default.
         rtol
             Tolerance of ``dt="auto"``: the error of the displacement per step, relative to the size
             of the scene and in proportion to the step size. Of motions that are small beside the

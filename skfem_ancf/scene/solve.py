@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..actions.forces import PointMass
-from ..actions.forces.base import ForceElement
-from ..actions.joints import Joint
+from ..actions.bound import BoundConstraint, BoundForce
 from ..actions.loads import Load, bind_load
 from ..actions.point_force import PointForce
 from ..beam.beam import Beam
@@ -109,14 +108,14 @@ def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
               damping: Damping | None) -> System:
     """The equations of a scene."""
     loads = [one for one in bound if isinstance(one, Load)]
-    elements = [one for one in bound if isinstance(one, ForceElement)]
+    elements = [one for one in bound if isinstance(one, BoundForce)]
     masses = [one for one in elements if isinstance(one, PointMass) and one.mass]
     weights = [bind_load(PointForce(one.mass * g, one.at, None, load.amplitude), load.beam)
                for load in loads if (g := getattr(load, "g", None)) is not None
                for one in masses if layout.beam(one.beam) is load.beam]
     return System(layout.beams, loads + weights,
                   np.array(list(fixed), dtype=int), np.array(list(fixed.values()), dtype=float),
-                  [one for one in bound if isinstance(one, Joint)], damping, elements,
+                  [one for one in bound if isinstance(one, BoundConstraint)], damping, elements,
                   layout.bodies, eigen.rest_modes, layout.domains)
 
 
@@ -246,7 +245,7 @@ def _linear_solver(s, dynamic):
     if not dynamic and s.solver.coupled and (
             not s.constraints.few or s.forces.far or not s.symmetric):
         return "sparse LU on the null space of the joints"
-    solver = f"banded {'Cholesky' if s.symmetric else 'LU'}, half bandwidth {s.K.bandwidth}"
+    solver = f"banded {'Cholesky' if s.symmetric else 'LU'}, half bandwidth {s.K.width}"
     solver += "" if s.symmetric else ": a force has no potential"
     if s.constraints.m:
         solver += f", with a Schur complement for the {s.constraints.m} equations of joints"

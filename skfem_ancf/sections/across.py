@@ -50,10 +50,8 @@ def off_ends(X: Array) -> Array:
 
 def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float | None = None
           ) -> Array:
-    """Numbers of the elements at whose start a function jumps.
-
-    ``ask(X, e)`` returns its values (..., n, k) at reference points (2, n, k) of elements (n,).
-    ``size`` is the smallest change that counts as a jump, by default 1e-3 of the largest value.
+    """Elements at whose start a function ``ask(X, e)`` of reference points (2, n, k) jumps, by more
+    than ``size`` or 1e-3 of its largest value.
     """
     e = np.arange(n)
     left, right = (ask(np.array([np.full((n, len(eta)), xi), np.tile(eta, (n, 1))]), e)

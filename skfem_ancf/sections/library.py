@@ -8,7 +8,6 @@ formed), which set them for the calculation of properties.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Any
@@ -16,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, NameUnknown
-from ..core.types import Array
 from ..materials.library import LENGTHS
 
 #: Height, width, thickness of web and flange, root radius.
@@ -53,76 +51,47 @@ L_SHAPES = """
 #: Height and width: thickness in the middle of flange and web, which is the root radius.
 T_SHAPES = "30 4; 35 4.5; 40 5; 50 6; 60 7; 70 8; 80 9; 100 11; 120 13; 140 15"
 
-Shape = tuple[Callable[..., Array], tuple[float, ...], tuple[float, ...]]
+#: Slopes of the faces of a T, and of the flanges of a UPN up to 300 and beyond.
+T_SLOPE, U_SLOPE, LOW_U_SLOPE = 0.02, 0.08, 0.05
+#: Relative length of what is no piece.
+TINY = 1e-9
+
+#: Height in mm, 2 if one half is given, and the outer and inner side, see :func:`_side`.
+Shape = tuple[float, float, tuple[tuple[float, ...], ...], tuple[tuple[float, ...], ...]]
 
 
-def _arc(r, d):
-    """Distance from a side to a rounded corner of radius r, at d from the other side."""
-    return r - np.sqrt(np.maximum(r * r - np.clip(r - d, 0.0, r) ** 2, 0.0))
+def _side(*corners):
+    """A rising line through corners (x, y, radius), from which x = 0 to the last.
 
-
-def _i_width(h, b, tw, tf, r, y):
-    y = np.minimum(y, h - y)
-    return np.where(y < tf, b, tw + 2.0 * _arc(r, y - tf))
-
-
-def _flange(b, tw, tf, r1, r2, slope, at):
-    """Ends and centres of both roundings of a flange with a sloping inner face, and that face.
-
-    ``tf`` is the thickness at a distance ``at`` from the web's outer face.
+    Rows are the height where a piece begins, and x0, y0, slope and r of
+    ``x = x0 + slope (y - y0) + sign(r) sqrt(r^2 - (y - y0)^2)``.
     """
-    c = np.sqrt(1.0 + slope**2)
-    root = tf + slope * (at - tw - r1) + r1 * c  # heights of the centres of the roundings
-    tip = tf + slope * (at - b + r2) - r2 * c
-    return root, root - r1 / c, tip + r2 / c, tip
+    points, rows = np.array([corner[:2] for corner in corners]), [(-1.0, 0.0, 0.0, 0.0, 0.0)]
+    begin, high = points[0], corners[-1][1]
+    for k, (*_, r) in enumerate(corners[1:], 1):
+        end = after = points[k]
+        if r:  # an arc that touches both sides of the corner
+            a, b = ((points[n] - end) / np.hypot(*(points[n] - end)) for n in (k - 1, k + 1))
+            half = 0.5 * np.arccos(a @ b)
+            centre = end + (a + b) / np.hypot(*(a + b)) * r / np.sin(half)
+            end, after = (points[k] + r / np.tan(half) * way for way in (a, b))
+        if (rise := end[1] - begin[1]) > TINY * high:
+            rows.append((begin[1], *begin, (end[0] - begin[0]) / rise, 0.0))
+        if r:
+            rows.append((end[1], *centre, 0.0, r * np.sign(end[0] + after[0] - 2.0 * centre[0])))
+        begin = after
+    return tuple(tuple(map(float, row)) for row in (*rows, (high, 0.0, 0.0, 0.0, 0.0)))
 
 
-def _u_width(h, b, tw, tf, r1, r2, slope, at, y):
-    y = np.minimum(y, h - y)
-    root, low, high, tip = _flange(b, tw, tf, r1, r2, slope, at)
-    face = at + (tf - y) / slope
-    return np.select([y < tip, y < high, y < low], [b, b - _arc(r2, r2 + tip - y), face],
-                     tw + _arc(r1, r1 + y - root))
-
-
-def _t_width(h, b, t, slope, y):
-    """The flange at the top; flange and web taper by the slope."""
-    z, half = h - y, 0.5 * t + slope * (0.5 * h - (h - y))
-    root, low, high, tip = _flange(0.5 * b, 0.5 * t + slope * (0.5 * h - t), t, t, 0.5 * t, slope,
-                                   0.25 * b)
-    face = 0.25 * b + (t - z) / slope
-    web = np.minimum(half, half - 0.25 * t + np.sqrt(np.maximum(
-        (0.25 * t) ** 2 - np.maximum(0.25 * t - y, 0.0) ** 2, 0.0)))
-    return 2.0 * np.select([z < tip, z < high, z < low],
-                           [0.5 * b, 0.5 * b - _arc(0.5 * t, 0.5 * t + tip - z), face],
-                           web + _arc(t, t + z - root))
-
-
-def _l_width(a, t, r, y):
-    """One leg upright, the other at the bottom."""
-    tip = 0.5 * r
-    return np.where(y < t, a - _arc(tip, t - y), t + _arc(r, y - t) - _arc(tip, a - y))
-
-
-def _box_width(h, b, t, outer, inner, y):
-    y = np.minimum(y, h - y)
-    hole = np.where(y > t, b - 2.0 * t - 2.0 * _arc(inner, y - t), 0.0)
-    return b - 2.0 * _arc(outer, y) - hole
-
-
-def _tube_width(h, t, y):
-    outer, inner = 0.5 * h, 0.5 * h - t
-    x = y - outer
-    return 2.0 * (np.sqrt(np.maximum(outer**2 - x * x, 0.0))
-                  - np.sqrt(np.maximum(inner**2 - x * x, 0.0)))
+def _box(h, b, t, outer, inner):
+    """Both sides of the right half of a hollow section with rounded corners."""
+    x, y = 0.5 * b - t, h - t
+    return (_side((0, 0, 0), (0.5 * b, 0, outer), (0.5 * b, h, outer), (0, h, 0)),
+            _side((0, t, 0), (x, t, inner), (x, y, inner), (0, y, 0)))
 
 
 def _rows(text):
     return {row.split()[0]: tuple(map(float, row.split()[1:])) for row in text.split(";")}
-
-
-def _symmetric(h, *cuts):
-    return (0.0, *cuts, *(h - cut for cut in reversed(cuts)), h)
 
 
 def _found(series, number, rows):
@@ -133,7 +102,7 @@ def _found(series, number, rows):
 
 @lru_cache(64)
 def shape_of(name: str) -> Shape:
-    """Width as a function of sizes and height, the sizes, and where it is not smooth, in mm.
+    """The height and the sides of a profile, in mm.
 
     Raises
     ------
@@ -143,58 +112,69 @@ def shape_of(name: str) -> Shape:
     match = re.fullmatch(r"\s*([A-Za-z]+)\s*([\d.,\sx×X*]+?)\s*", name)
     series = match.group(1).upper() if match else name
     number = re.sub(r"[\s×X*]+", "x", match.group(2).replace(",", ".")) if match else ""
+    solid: Any = _side((0, 0, 0), (0, 0, 0))
     if series in ("HEA", "HEB", "IPE"):
         h, b, tw, tf, r = _found(series, number, _rows(I_SHAPES[series]))
-        return _i_width, (h, b, tw, tf, r), _symmetric(h, tf, tf + r)
+        b, tw = 0.5 * b, 0.5 * tw
+        return h, 2.0, _side((0, 0, 0), (b, 0, 0), (b, tf, 0), (tw, tf, r), (tw, h - tf, r),
+                             (b, h - tf, 0), (b, h, 0)), solid
     if series == "UPN":
         h, b, tw, tf, r1, r2 = _found(series, number, _rows(U_SHAPES))
-        slope, at = (0.08, 0.5 * b) if h <= 300 else (0.05, 0.5 * (b + tw))
-        root, low, high, tip = _flange(b, tw, tf, r1, r2, slope, at)
-        return _u_width, (h, b, tw, tf, r1, r2, slope, at), _symmetric(h, tip, high, low, root)
-    if series == "T":
+        # where the flange has its nominal thickness
+        slope, at = (U_SLOPE, 0.5 * b) if h <= 300 else (LOW_U_SLOPE, 0.5 * (b + tw))
+        tip, root = tf + slope * (at - b), tf + slope * (at - tw)
+        return h, 1.0, _side((0, 0, 0), (b, 0, 0), (b, tip, r2), (tw, root, r1),
+                             (tw, h - root, r1), (b, h - tip, r2), (b, h, 0)), solid
+    if series == "T":  # flange at the top; it and the web are t thick in their middle
         t, = _found(series, number, _rows(T_SHAPES))
-        h = float(number)
-        root, low, high, tip = _flange(0.5 * h, 0.5 * t + 0.02 * (0.5 * h - t), t, t, 0.5 * t, 0.02,
-                                       0.25 * h)
-        return _t_width, (h, h, t, 0.02), (0.0, 0.25 * t, h - root, h - low, h - high, h - tip, h)
+        h, s, b = float(number), T_SLOPE, 0.5 * float(number)
+        x = (0.5 * t + s * (0.5 * h - t - 0.5 * s * b)) / (1.0 - s * s)
+        under, out = h - t - s * (0.5 * b - x), h - t + 0.5 * s * b
+        return h, 2.0, _side((0, 0, 0), (0.5 * t - 0.5 * s * h, 0, 0.25 * t), (x, under, t),
+                             (b, out, 0.5 * t), (b, h, 0)), solid
     sizes = [float(x) for x in number.split("x")] if number else []
     if series == "L" and len(sizes) in (2, 3) and sizes[0] == sizes[-2]:
         r, = _found(series, f"{sizes[0]:g}x{sizes[-1]:g}", _rows(L_SHAPES))
         a, t = sizes[0], sizes[-1]
-        return _l_width, (a, t, r), (0.0, t - 0.5 * r, t, t + r, a - 0.5 * r, a)
+        return a, 1.0, _side((0, 0, 0), (a, 0, 0), (a, t, 0.5 * r), (t, t, r), (t, a, 0.5 * r),
+                             (0, a, 0)), solid
     if series in ("RHS", "SHS", "CFRHS", "CFSHS") and len(sizes) in (2, 3):
         h, b, t = sizes[0], sizes[-2], sizes[-1]
         times = 1.5 if series[0] != "C" else 2.0 if t <= 6.0 else 2.5 if t <= 10.0 else 3.0
         if 2.0 * times * t >= min(h, b):
             raise InputError(f"{name!r} has no hole, or no straight sides: a wall of {t:g} is too "
                              f"thick for {h:g} x {b:g}")
-        outer, inner = times * t, t if times == 1.5 else (times - 1.0) * t
-        return _box_width, (h, b, t, outer, inner), _symmetric(h, *sorted({t, outer, t + inner}))
+        return h, 2.0, *_box(h, b, t, times * t, t if times == 1.5 else (times - 1.0) * t)
     if series in ("CHS", "CFCHS") and len(sizes) == 2:
         h, t = sizes
         if 2.0 * t >= h:
             raise InputError(f"{name!r} has no hole: its wall is {t:g}")
-        return _tube_width, (h, t), _symmetric(h, t)
+        return h, 2.0, *_box(h, h, t, 0.5 * h, 0.5 * h - t)
     raise NameUnknown("profile", name, [
         "IPE 200", "HEA 200", "HEB 200", "UPN 200", "L 50x50x5", "T 50", "RHS 100x50x4",
         "SHS 100x5", "CHS 60.3x3.2", "CFRHS 100x50x4", "CFSHS 100x5", "CFCHS 60.3x3.2"])
 
 
-def _width(width, sizes, h, scale, eta):
-    return width(*sizes, h * np.asarray(eta)) / scale
+def _width(h, times, sides, eta):
+    """Width at heights eta h."""
+    y, x = h * np.asarray(eta), []
+    for side in sides:
+        row = np.searchsorted(side[:, 0], y, "right") - 1
+        x0, y0, slope, r = np.moveaxis(side[row, 1:], -1, 0)
+        x.append(x0 + slope * (y - y0) + np.sign(r) * np.sqrt(np.maximum(r**2 - (y - y0)**2, 0.0)))
+    return times * (x[0] - x[1])
 
 
 def pieces_of(name: str, unit: str) -> tuple[float, list[tuple[float, float, Any]]]:
     """Height in a unit of length; begin, end and width of intervals from bottom to top."""
-    width, sizes, cuts = shape_of(name)
-    h, scale = sizes[0], 1000.0 * LENGTHS[unit]
+    h, times, *sides = shape_of(name)
+    scale = 1000.0 * LENGTHS[unit]
+    of: Any = partial(_width, h, times / scale, [np.array(side) for side in sides])
     pieces = []
-    for low, high in pairwise(cuts):
-        of: Any = partial(_width, width, sizes, h, scale)
-        values = of((low + (high - low) * np.array([0.1, 0.5, 0.9])) / h)
-        one = float(values[0])
-        if np.ptp(values) <= 1e-12 * one:  # constant
-            of = one
-        if high - low > 1e-9 * h:
-            pieces.append((low / h, high / h, of))
+    for low, high in pairwise(sorted({max(row[0], 0.0) for side in sides for row in side})):
+        if high - low > TINY * h:
+            values = of((low + (high - low) * np.array([0.1, 0.5, 0.9])) / h)
+            one = float(values[0])
+            constant = np.ptp(values) <= 1e-12 * one
+            pieces.append((low / h, high / h, one if constant else of))
     return h / scale, pieces

@@ -35,9 +35,8 @@ MEAN = 8
 
 
 class Piece(NamedTuple):
-    """An interval from ``low`` to ``high`` with smooth width, a number or a function of eta (n,).
-
-    The width may behave like a square root at its ends.
+    """An interval with smooth width, a number or a function of eta (n,); at its ends maybe a square
+    root.
     """
 
     low: float
@@ -46,12 +45,8 @@ class Piece(NamedTuple):
 
 
 class Measure(Immutable):
-    """Width and quadrature across a layer.
-
-    ``low`` and ``high`` are relative heights, constant along the beam unless ``moves`` is true; the
-    width varies along the beam by a factor only. A rule uses up the degree ``spent`` of exactness
-    on the width. Methods take a layer at points, from :meth:`.Across.at`, and return numbers or
-    arrays (nelements, npoints).
+    """Width and quadrature across a layer, between relative heights ``low`` and ``high``. Rules use
+    up the degree ``spent`` of exactness on the width. Methods take points from :meth:`.Across.at`.
     """
 
     low: float
@@ -227,14 +222,10 @@ class Moving(Measure):
         return np.array([np.broadcast_to(end, h.shape + (1,))[..., 0]
                          for end in (found[0].low, *(p.high for p in found))])
 
-    def _inside(self, at):
-        """The points, moved to the layer's ends where they are outside of it."""
-        low, *_, high = self.ends(at.heights)
-        return at.moved(np.array([np.broadcast_to(at.X[0], low.shape),
-                                  np.clip(at.X[1], low, high)]))
-
     def values(self, at: Any, name: str, whole: bool = False) -> Array:
-        return self._inside(at).evaluated(name)
+        low, *_, high = self.ends(at.heights)  # points outside of the layer are moved to its ends
+        return at.moved(np.array([np.broadcast_to(at.X[0], low.shape),
+                                  np.clip(at.X[1], low, high)])).evaluated(name)
 
     def width(self, at: Any) -> Array:
         eta, h = (x[..., None] for x in np.broadcast_arrays(at.X[1], at.heights))
@@ -259,15 +250,20 @@ class Moving(Measure):
             xi, back = xi[:, :1], np.zeros(xi.shape[1], dtype=int)
         names = ("width", times) if times else ("width",)
         functions = [name for name in names if callable(getattr(at.layer, name))]
-        c = np.prod([at.factor(name) for name in names if name not in functions])
-
-        def product(eta):
+        # coefficients (degree + 1, ...) of the Legendre series of the width times the functions
+        eta, w = self.points(at.across.heights(xi, at.tind),
+                             self.degree // 2 + 1 + (2 * MORE if functions else 0))
+        if functions:
             X = np.array([np.broadcast_to(xi[..., None], eta.shape), eta])
             there = at.moved(X.reshape(2, len(eta), -1))
-            return np.prod([there.evaluated(name) for name in functions], axis=0).reshape(eta.shape)
-
-        c = c * self.moments(at.across.heights(xi, at.tind), product if functions else None)
-        return c[0][:, back] if whole else self.series(c[:, :, back], at.X[1])
+            values = np.prod([there.evaluated(name) for name in functions], axis=0)
+            w = w * values.reshape(eta.shape)
+        c = (2 * np.arange(self.degree + 1) + 1) * np.einsum(
+            "...q,...qk->...k", w, legvander(2.0 * eta - 1.0, self.degree))
+        c = np.moveaxis(c, -1, 0) * np.prod([at.factor(name) for name in names
+                                             if name not in functions])
+        return c[0][:, back] if whole else legval(2.0 * np.asarray(at.X[1]) - 1.0, c[:, :, back],
+                                                  tensor=False)
 
     def sampled(self, at: Any, n: int) -> tuple[Array, Array]:
         eta, w = self.points(at.heights[:, 0], n)
@@ -286,20 +282,6 @@ class Moving(Measure):
             weights.append((high - low) * w * (width(eta) if callable(width) else width)
                            + 0.0 * eta)
         return np.concatenate(places, axis=-1), np.concatenate(weights, axis=-1)
-
-    def moments(self, h: Array, times: Callable[[Array], Any] | None = None) -> Array:
-        """Coefficients (degree + 1, ...) of the Legendre series of the width times a function."""
-        eta, w = self.points(h, self.degree // 2 + 1 + (0 if times is None else 2 * MORE))
-        if times is not None:
-            w = w * times(eta)
-        k = np.arange(self.degree + 1)
-        return np.moveaxis((2 * k + 1) * np.einsum("...q,...qk->...k", w, legvander(
-            2.0 * eta - 1.0, self.degree)), -1, 0)
-
-    @staticmethod
-    def series(moments: Array, eta: Any) -> Array:
-        """The Legendre series with coefficients ``moments`` at eta (...)."""
-        return legval(2.0 * np.asarray(eta) - 1.0, moments, tensor=False)
 
 
 @dataclass(frozen=True)
@@ -750,13 +732,7 @@ class Profile(Section):
 
 
 class Standard(Section):
-    """A profile by its standard name, see :meth:`Section.profile`.
-
-    Attributes
-    ----------
-    height
-        Height in the given unit of length.
-    """
+    """A profile by its standard name, see :meth:`Section.profile`, with its ``height``."""
 
     def __init__(self, name: str, unit: str = "m", **sizes: float) -> None:
         if sizes:

@@ -11,16 +11,15 @@ import numpy as np
 
 from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
                            require_function, require_integer, require_positive, shown)
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.types import Array
+from ..equations.convergence import is_balanced, is_small, rules_of
 from ..equations.evaluation import invert
 from ..equations.stability import position_weights
 from ..equations.system import System
 from ..results.path import CriticalPoint
 from ..results.state import MaterialPoints, State
-from .increment import rules_of
-from .iteration import CLOSED
 from .outcome import LoadStepFailed
 
 logger = logging.getLogger(__name__)
@@ -42,12 +41,13 @@ class Point(MaterialPoints):
 
     ``displacement(point)`` and ``position(point)`` are as those of a State; ``state`` is one, with
     strain, stress, section forces and reactions. ``u`` (N,), ``multipliers`` (m,), ``load`` and
-    ``force`` (N,) are its data; ``arc`` is the arc length from the start, ``error`` the last
-    correction in the energy norm relative to the work done, ``iterations`` the linear systems
-    solved. ``rate``, ``tangent`` (N,) and ``multiplier_rate`` (m,) are derivatives of load,
-    displacement and multipliers by the arc length; at a critical point they are the null vector.
-    ``negative`` is the number of negative eigenvalues of the tangent stiffness on the null space of
-    J, None if loads have no potential. ``history`` is what forces remember of the path before.
+    ``force`` (N,) are its data; ``arc`` is the arc length from the start, ``error`` the error that
+    the last correction leaves in the energy norm, relative to the work done, ``iterations`` the
+    linear systems solved. ``rate``, ``tangent`` (N,) and ``multiplier_rate`` (m,) are derivatives
+    of load, displacement and multipliers by the arc length; at a critical point they are the null
+    vector. ``negative`` is the number of negative eigenvalues of the tangent stiffness on the null
+    space of J, None if loads have no potential. ``history`` is what forces remember of the path
+    before.
     """
 
     system: System
@@ -111,7 +111,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
         A function of a :class:`Point` that returns True to stop, as ``lambda p:
         p.displacement("right")[1] < -0.1``.
     tol
-        Relative error of a correction in the energy norm.
+        Relative error in the energy norm, see :mod:`skfem_ancf.equations.convergence`.
     max_iterations
         Iterations before a step is halved.
     locate
@@ -261,12 +261,13 @@ class Tracer:
 
         return self.correct(start, first, increment, ds)
 
-    def _small(self, residual, *forces):
-        """True if a residual (N,) is within tolerance, as in statics; before K has factors."""
+    def _balanced(self, residual, phi, *forces):
+        """True if residuals (N,) and (m,) are within tolerance; before K has factors."""
         e, rules, weights = self.system.backend.tables.plain, self.rules, self.system.K.diagonal()
         invert(weights, e.sizes)
         norms = np.sqrt([x * x @ weights for x in (residual * e.free, *forces)])
-        return bool(norms[0] <= rules.tol * norms[1:].max() + rules.force_floor)
+        gap = np.max(np.abs(phi) / e.joints.sizes, initial=0.0)
+        return bool(is_balanced(norms[0], norms[1:].max(), gap, rules.tol, rules.force_noise))
 
     def correct(self, start: Point, first: tuple[Any, Any, Any], increment: Callable[..., float],
                 ds: float) -> Point:
@@ -278,7 +279,7 @@ class Tracer:
         u, m, load = start.u, start.multipliers, start.load
         _, stresses = system.assemble(u, load)
         du, dm, dl = first
-        step, work, rules = np.zeros(system.N), np.inf, self.rules
+        step, work, before, rules = np.zeros(system.N), np.inf, 0.0, self.rules
         for k in range(1, rules.iterations + 1):
             independent = system.linearised_stress(u, stresses, du)
             u, m, load, step = u + du, m + dm, load + dl, step + du
@@ -290,13 +291,13 @@ class Tracer:
             residual, phi = load * external - force, system.constraints.constraint(u, load)
             if system.constraints.joints:
                 residual = residual - m @ system.constraints.jacobian(u, load)
-            closed = np.all(np.abs(phi) <= CLOSED * system.backend.tables.plain.joints.sizes)
             reference = np.sqrt(max(abs(force @ u), abs(load * (external @ u)),
                                     abs(external @ step * dl)))
-            if closed and work <= rules.tol * reference + rules.floor and self._small(
-                    residual, force, load * external):
+            contraction = work / before if 0.0 < work < before else 1.0
+            if is_small(work, contraction, rules.tol, reference, rules.noise) and self._balanced(
+                    residual, phi, force, load * external):
                 return Point(self.whole, u, m, load, force, start.arc + ds,
-                             work / reference if reference > 0 else 0.0, k)
+                             contraction * work / reference if reference > 0 else 0.0, k)
             drive, gap = self._drive(external, u, load)
             try:
                 system.solver.factorize(u, load, m)
@@ -309,6 +310,7 @@ class Tracer:
             du, dm = dR + dl * dF, mR + dl * mF
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise LoadStepFailed("the iteration leaves the path")
+            before = work if k > 1 else 0.0
             work = np.sqrt(abs((residual * system.constraints.free) @ du) + abs(phi @ dm)
                            + abs(dl * (external @ du)))
         raise LoadStepFailed(f"no convergence in {rules.iterations} iterations")

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..actions.forces.springs import Turns
-from ..core.band import fix
+from ..core.band import NO_FACTORS, fix
 from ..core.callbacks import handle_of
-from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..equations.stability import (DENSE, inverse_on_positions, largest_displacement,
                                    position_weights, potential, verdict)
@@ -154,7 +153,7 @@ class Descent:
 
     def _bounded(self, factorize, R, phi):
         """The correction with the smallest shift that suffices, to a factor of ten."""
-        band, system = self.system.K.band, self.system
+        band, system = self.system.K, self.system
         fix(band, system.constraints.fixed)
         tangent = band.flat.copy()
         scale = max(np.mean(np.abs(system.K.diagonal()) * self._sizes**2 * system.constraints.mask),

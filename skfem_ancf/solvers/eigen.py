@@ -7,10 +7,9 @@ import scipy.linalg
 from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
-from ..core.band import fix
+from ..core.band import NO_FACTORS, fix
 from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportError,
                            require_integer, warn)
-from ..core.linalg import NO_FACTORS
 from ..core.types import Array
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
 from ..equations.system import System
@@ -137,7 +136,7 @@ def _negative(tangent, state, shift):
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
     if shift < 0.0 and not system.solver.coupled:  # mostly indefinite: no factors needed
-        fix(system.K.band, system.constraints.fixed)
+        fix(system.K, system.constraints.fixed)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
     system.solver.factorize(state.u, state._time, state.multipliers)
     return system.solver.inertia().negative

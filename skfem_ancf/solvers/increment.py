@@ -8,14 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.errors import ConvergenceError
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.types import Array
 from ..equations import stability
+from ..equations.convergence import BY_SECOND_OR_LATE, BY_THIRD, NEVER, rules_of
 from ..equations.evaluation import Target
 from ..equations.system import System
 from . import descent
-from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
-                        Start, find_equilibrium)
+from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Start,
+                        find_equilibrium)
 from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                       StaticResult, Unstable)
 from .touching import MOST_FROM_SOFT, found_touching
@@ -189,7 +190,7 @@ class Increment:
         if backend is None:
             return self.iterate(options=options)
         try:
-            return self.iterate(options=options, wary=True)
+            return self.iterate(options=options, by_third=True)
         except LoadStepFailed as failed:
             failure = failed
         try:
@@ -203,19 +204,20 @@ class Increment:
         raise failure
 
     def iterate(self, begin: Any = None, options: Options | None = None, solver: Any = None,
-                backend: Any = None, wary: bool = False) -> Equilibrium:
+                backend: Any = None, by_third: bool = False) -> Equilibrium:
         """Iterate to equilibrium from ``begin``, by default the last one; raises LoadStepFailed.
 
         ``solver`` solves the linear systems, such as a
-        :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws; ``wary``
-        stops if the third correction is not smaller than the first.
+        :class:`~skfem_ancf.solvers.descent.Descent`; ``backend`` is that of other laws;
+        ``by_third`` stops if the third correction is not smaller than the first.
         """
         system, options = self.system, options or self.options
         u = self.start.u if options.guess is None else options.guess
         u, multipliers = (begin or (u, self.start.multipliers))[:2]
         backend = backend or system.backend
         rules = rules_of(system, options.method, options.tol, options.most,
-                         FIRST if wary else WATCHED if options.watched and not solver else 0)
+                         BY_THIRD if by_third else
+                         BY_SECOND_OR_LATE if options.watched and not solver else NEVER)
         by = solver or system.solver
         target, start, factors = self._target(backend.tables, u, multipliers, by)
         try:
@@ -280,9 +282,10 @@ class Increment:
         if status == CONVERGED:
             return
         if status == NOT_CONVERGED and n < rules.iterations:
-            if rules.wary == WATCHED and n == 2:
+            if rules.give_up == BY_SECOND_OR_LATE and n == 2:
                 raise FirstStepTooLarge("the first correction is far too large")
-            raise Diverging("the first corrections do not decrease" if rules.wary == FIRST else
+            raise Diverging("the first corrections do not decrease"
+                            if rules.give_up == BY_THIRD else
                             f"the corrections do not decrease in {n} iterations")
         raise LoadStepFailed({
             SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
@@ -312,12 +315,3 @@ class Increment:
                 f"{self.level:.6g}; the solution followed the unstable direction to a stable "
                 "equilibrium, which need not be the only one")
         return found
-
-
-def rules_of(system: System, method: str, tol: float, max_iterations: int,
-             wary: int = 0) -> Rules:
-    """Convergence criteria; ``wary`` as in :class:`~skfem_ancf.solvers.iteration.Rules`."""
-    scales = system.scales
-    # the residual has the round-off of all DOFs, the work that of the strains
-    return Rules(method == "mixed", max_iterations, tol, 8.0 * scales.work_noise,
-                 8.0 * scales.force_noise, wary)

@@ -12,6 +12,8 @@ from ..core.callbacks import call_solver
 from ..core.source import F1, MADE, apart, indices, source
 from ..core.types import Array
 from ..equations.backend import Backend
+from ..equations.convergence import (CLOSED, FEWEST, NEVER, Rules, diverges, is_balanced,
+                                     is_small)
 from ..equations.tables import Equations
 from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, GAP, LOAD, MOVED,
                                     RESIDUAL, ROWS, U, Target, balance, hold_back)
@@ -20,27 +22,6 @@ from ..equations.evaluation import (AT_END, AT_START, BETWEEN, DRAG, DU, FORCE, 
 ITERATIONS = 8
 #: How an iteration ends; the last is that of compiled code whose factors need LAPACK.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE, INDEFINITE = range(5)
-#: Least number of corrections, unless the initial residual is round-off.
-LEAST = 2
-#: The largest relative residual of joints.
-CLOSED = 1e-12
-#: Root of the relative work of the third correction that indicates divergence.
-DIVERGING = 0.9
-#: The same of the second correction, for a very soft scene; first late correction, and its limit.
-SOFT, LATE, LARGE = 10.0, 8, 3.0
-#: Early end of an iteration: by the third correction, or by the second and late ones.
-FIRST, WATCHED = 1, 2
-
-
-class Rules(NamedTuple):
-    """Convergence criteria and options."""
-
-    mixed: bool  # the geometric part uses independent stresses
-    iterations: int  # largest number
-    tol: float  # of a correction
-    floor: float  # round-off of its work
-    force_floor: float  # round-off of the residual
-    wary: int  # early end: 0, FIRST or WATCHED
 
 
 class Start(NamedTuple):
@@ -110,23 +91,23 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
     by_band = target.definite and e.factors.flat.size > 0
     norms = np.empty(3)
     loose = 1.0 if largest(x[DRAG]) > 0.0 else 0.0
-    quiet, last, moving, k = False, False, target.moving, 0
-    work = before = reference = np.inf
+    at_rest, last, moving, k = False, False, target.moving, 0
+    work = before = 0.0
     while True:
         # the last residual needs no tangent
         balance(e, target, factors, AT_START if k == 0 else AT_END if last else BETWEEN,
                 rules.mixed and k > 0, g, x, m, stresses, norms)
-        rho, size, opening = norms[0], norms[1], norms[2]
+        rho, size, joint_gap = norms[0], norms[1], norms[2]
         if not rho < 1e300:
             return NOT_FINITE, k, k, by_band and k > 0
         residuals[k] = rho / size if size > 0.0 else 0.0
         if k == 0:
-            small = rho <= 1e-3 * rules.tol * size
+            balanced = rho <= 1e-3 * rules.tol * size and joint_gap <= CLOSED
             # round-off, unless the correction shows that it is the load of a slender beam
-            quiet = rho <= rules.force_floor
+            at_rest = rho <= rules.force_noise
         else:
-            small = last and rho <= rules.tol * size + rules.force_floor
-        if small and not moving and opening <= CLOSED:
+            balanced = last and is_balanced(rho, size, joint_gap, rules.tol, rules.force_noise)
+        if balanced and not moving:
             return CONVERGED, k + 1, k, by_band and k > 0
         if k == rules.iterations:
             return NOT_CONVERGED, k + 1, k, by_band and k > 0
@@ -160,18 +141,11 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         reference = np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
         works[k] = work / reference if reference > 0.0 else 0.0
         k += 1
-        if rules.wary > 0 and _diverging(rules.wary, k - 1, works[k - 1]):
+        if rules.give_up > NEVER and diverges(rules.give_up, k - 1, works[k - 1]):
             return NOT_CONVERGED, k, k, by_band
-        part = work / before if k > 1 and 0.0 < work < before else 1.0
-        last = (k >= LEAST or quiet) and work * part <= rules.tol * reference + rules.floor
-
-
-@source
-def _diverging(wary, k, work):
-    """True if correction k indicates that the iteration will not converge."""
-    if wary == FIRST:
-        return k == 2 and work > DIVERGING
-    return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
+        contraction = work / before if before > 0.0 else 1.0
+        last = (k >= FEWEST or at_rest) and is_small(work, contraction, rules.tol, reference,
+                                                     rules.noise)
 
 
 @apart("statics", Equations, Annotated[Target, MADE], F1, F1, F1, F1, F1)

@@ -14,7 +14,7 @@ from ..beam.kinematics import bent
 from ..core.immutable import cached_property
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
                            require_flag, require_integer, require_option, require_positive)
-from ..core.linalg import NO_FACTORS
+from ..core.band import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.types import Array
 from ..equations import stability
@@ -67,10 +67,8 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     By default several strategies are tried in order, first the mixed iteration in one step, until
     one finds a stable equilibrium; the message of the result says which. ``method="mixed"`` and
     ``method="newton"`` use one iteration and load steps: the first is ``first_step`` of the load, a
-    failed step is cut to a quarter, an easy step doubles the next. An iteration has converged when
-    the work ``R . du`` of the correction is below ``tol^2`` times the work done, and the residual
-    in the norm ``sqrt(sum R_i^2 / K_ii)`` is below ``tol`` times that of the forces; the round-off
-    of the strain is a lower bound of both.
+    failed step is cut to a quarter, an easy step doubles the next. When an iteration has converged
+    is said by :mod:`skfem_ancf.equations.convergence`.
 
     Parameters
     ----------
@@ -84,7 +82,7 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
         stress, which is updated by linearisation. "newton": it uses the stress of the strain. All
         have the same solution.
     tol
-        Relative error of a correction in the energy norm.
+        Relative error in the energy norm.
     max_iterations
         Iterations before a step is cut.
     first_step, min_step

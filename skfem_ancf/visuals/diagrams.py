@@ -10,8 +10,9 @@ from ..beam.layout import WhichBeam, select_beam
 from ..core.errors import InputError, require_flag, require_like, require_option
 from ..core.types import Array, StrPath
 from ..recovery.fields import units_of
+from ..recovery.grids import grids
 from .matplotlib import dress, figure_class, page, plain, save
-from .scenery import INK, MUTED, rounded, unit_of_resultant
+from .scenery import GHOST, INK, MUTED, rounded, unit_of_resultant
 from .symbols import Sketch, symbols_of
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
@@ -74,6 +75,9 @@ def plot_resultants(state: Any, beam: WhichBeam = None, axes: Any = None, *, on:
     require_option("on", on, ("auto", "structure", "length"))
     beams = list(state.beams) if beam is None else [select_beam(state.beams, beam)]
     filename, dpi = page(None, title, filename, dpi)
+    if not beams:
+        raise InputError("section forces are those of beams, and this scene has none: see its "
+                         'stress by state.plot("von_mises") and state.extremes("von_mises")')
     if on == "auto":
         frame = getattr(state.system.constraints, "frame", None)
         on = "length" if frame is None and len(beams) == 1 else "structure"
@@ -153,8 +157,11 @@ def lines_of(state: Any, beams: Any, recover: bool = True) -> list[Any]:
 
 
 def _on_structure(axes, state, beams, recover):
+    from matplotlib.collections import PolyCollection
+
     lines, units = lines_of(state, beams, recover), units_of(state)
-    points = np.hstack([line["x"] for line in lines]).T
+    others = grids(state, (1, 1))[len(state.beams):] if len(beams) == len(state.beams) else []
+    points = np.hstack([*(line["x"] for line in lines), *(grid.x for grid in others)]).T
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.max(high - low))
     ordinate = min(ORDINATE * size, OF_MEMBERS * float(np.median(
@@ -170,6 +177,8 @@ def _on_structure(axes, state, beams, recover):
             ax.plot(*line["x"], color=INK, lw=1.6, zorder=3, solid_capstyle="round")
             if scale:
                 _fill(ax, line, line[name], -scale if name == "M" else scale)
+        for grid in others:  # rigid bodies and domains
+            ax.add_collection(PolyCollection(grid.x.T[grid.cells], color=GHOST, zorder=1))
         Sketch(ax, np.zeros_like(state.u), points).draw(supports)
         if scale:
             _label(ax, lines, name, -scale if name == "M" else scale, LABELLED * largest, size,

@@ -48,6 +48,14 @@ def symbols_of(state: Any, loads: bool, supports: bool, start: bool = False) -> 
     return [s for s in found if (loads if s.kind in LOADS else supports)]
 
 
+def unit_of_load(symbol: Symbol, units: tuple[str, str] | None) -> str:
+    """The unit of a force, per length or area where it is distributed, or moment; "" if unknown."""
+    if units is None or symbol.kind not in ("force", "moment"):
+        return ""
+    unit = unit_of_resultant("N" if symbol.kind == "force" else "M", units)
+    return unit + f"/{units[1]}" * (symbol.per > 0) + "²" * (symbol.per == 2)
+
+
 class Sketch:
     """Draws symbols on Axes ``ax``; the gid of each artist is the kind of its symbol.
 
@@ -116,14 +124,12 @@ class Sketch:
             self.taken = np.vstack([self.taken, 0.5 * (tails[1:] + tails[:-1])])
         if s.show:
             free, other = (tips[0], tails[0]) if tips is out else (tails[k], tips[k])
-            self._text(self._value(s, "N"), free,
+            self._text(self._value(s), free,
                        free - other, LOAD, s.kind)
 
-    def _value(self, s, what):
+    def _value(self, s):
         """Text and value, with the unit of a force or moment."""
-        unit = unit_of_resultant(what, self.units)
-        if unit and s.per:
-            unit += f"/{self.units[1]}" + "^2" * (s.per == 2)
+        unit = unit_of_load(s, self.units)
         return s.text + (rounded(abs(s.value), unit) if unit else f"{abs(s.value):.6g}")
 
     def _weight(self, s, at, largest):
@@ -137,7 +143,7 @@ class Sketch:
         angle = np.sign(s.value) * np.linspace(-0.75 * np.pi, 0.75 * np.pi, 40)
         arc = at[0] + 1.5 * SIZE * self.size * np.column_stack([np.cos(angle), np.sin(angle)])
         self._arrow(*arc, kind=s.kind, color=color)
-        self._beside(s.text or self._value(s, "M"), at[0], color, s.kind)
+        self._beside(s.text or self._value(s), at[0], color, s.kind)
 
     def _eigenstrain(self, s, at, largest):
         self._beside(s.text, at[0], LOAD, s.kind)

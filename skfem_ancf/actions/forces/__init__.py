@@ -1,10 +1,10 @@
 """Force elements: springs, dashpots, foundations, drag, masses, and user-defined ones."""
 
 from ..places import point, section
-from .base import ForceElement, bind_force
+from .base import ForceElement
 from .control import Control
 from .inertia import PointMass, RotatingFrame
 from .springs import Drag, Foundation, Spring, TorsionalSpring
 
 __all__ = ["Control", "Drag", "ForceElement", "Foundation", "PointMass", "RotatingFrame", "Spring",
-           "TorsionalSpring", "bind_force", "point", "section"]
+           "TorsionalSpring", "point", "section"]

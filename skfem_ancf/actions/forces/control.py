@@ -17,7 +17,8 @@ from ...core.types import Array
 from ...mesh.places import is_point
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol
-from .base import ForceElement, differences
+from ..bound import differences
+from .base import ForceElement
 from .kernels import turned, turning
 
 KINDS = ("force", "moment")

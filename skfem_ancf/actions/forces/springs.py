@@ -8,13 +8,12 @@ from typing import Any, cast
 import numpy as np
 import scipy
 
-from ...beam.distribution import AXIS, Facets
+from ...beam.distribution import AXIS, Facets, groups_of, surfaces_of
 from ...beam.kernels.moments import mean_turning
 from ...beam.kernels.section import beam_gradients
 from ...beam.kinematics import probe_reference
 from ...beam.layout import Layout, WhichBeam, select_beam
 from ...beam.rigid import RigidBody, on_body
-from ...beam.surfaces import groups_of, surfaces_of
 from ...core.errors import (InputError, ask_number, require_finite_scalar, require_flag,
                             require_function, require_integer, require_not_negative, shown)
 from ...core.quadrature import gauss

@@ -15,7 +15,8 @@ from ...core.types import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
-from .base import ForceElement, KernelElement, Remembering, recalled
+from ..bound import BoundForce, Remembering, recalled
+from .base import KernelElement
 from .control import Control
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING, TORSION,
@@ -25,7 +26,7 @@ from .springs import TorsionalSpring
 
 # the internal force of a domain as a force element
 
-class DomainForce(ForceElement):
+class DomainForce(BoundForce):
     """Internal force and tangent of a ``domain``, whose first DOF is ``first``, bound."""
 
     internal, resists = True, False
@@ -80,7 +81,7 @@ class Forces:
     _far = NONE > 0
     _between: Any = NONE, NONE, None
 
-    def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int,
+    def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
         self.masses: list[Any] = [e for e in elements if e.mass_entries() is not None]
         self.elements = [e.with_masses(self.masses, N) if isinstance(e, RotatingFrame) else e
@@ -244,7 +245,7 @@ class Forces:
                     element.hold(())
                 element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t)
 
-    def rows_of(self, element: ForceElement) -> Array:
+    def rows_of(self, element: BoundForce) -> Array:
         """Positions of the parts of an element among all, in its order; shape (n,)."""
         first = 0
         for other in self.elements:

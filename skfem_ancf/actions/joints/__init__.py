@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...core.errors import require_option
-from .base import Joint, bind_joint
+from .base import Joint
 from .sliders import OnCircle, OnLine, Sleeve, Slot
 from .weld import (Glue, Hinge, Motor, PlaneSection, PrescribedAngle, PrescribedPosition,
                    PrescribedTurn, Weld)
@@ -42,4 +42,4 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
 
 __all__ = ["JOINTS", "Glue", "Hinge", "Joint", "Motor", "OnCircle", "OnLine", "PlaneSection",
            "PrescribedAngle", "PrescribedPosition", "PrescribedTurn", "Sleeve", "Slot", "Weld",
-           "bind_joint", "get_joint"]
+           "get_joint"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -12,27 +11,14 @@ from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout
 from ...beam.rigid import RigidBody
-from ...core.errors import InputError, explained, require_finite, require_slope, shown
+from ...core.errors import InputError, explained, require_finite, shown
 from ...core.immutable import is_builtin
 from ...core.types import Array
 from ...mesh.places import is_point
-from ..item import Item, at_generic_displacements, require_entries
+from ..bound import (BoundConstraint, at_generic_displacements, require_derivatives,
+                     require_entries, user_parts)
+from ..item import Item
 from ..places import Vector, products
-
-
-def gradients(*equations: list) -> tuple[Array, Array, Array]:
-    """Nonzero entries of a Jacobian."""
-    none = np.zeros(0, dtype=int)
-    rows, columns, values = [none], [none], [np.zeros(0)]
-    for k, terms in enumerate(equations):
-        for vector, direction in terms:
-            found = vector.entries(direction)
-            rows.append(np.full(len(found[0]), k))
-            columns.append(found[0])
-            values.append(found[1])
-    i, j, v = map(np.concatenate, (rows, columns, values))
-    keep = v != 0.0
-    return i[keep], j[keep], v[keep]
 
 
 def rotation(angle: float) -> Array:
@@ -41,14 +27,15 @@ def rotation(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-class Joint(Item):
+class Joint(BoundConstraint, Item):
     """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
 
     :meth:`bind` finds the points of a joint in a scene; ``u`` is the displacement of all its
     degrees of freedom. The multipliers are the constraint forces (or moments), in the order of
     :attr:`equations`. A user-defined joint, for :meth:`skfem_ancf.Scene.add`, is a subclass that
-    sets :attr:`equations` and defines :meth:`bind`, :meth:`value`, :meth:`jacobian` or
-    :meth:`entries`, and :meth:`curvature` if the Jacobian depends on u.
+    sets :attr:`equations` and defines :meth:`bind` and :meth:`value`; :meth:`jacobian` or
+    :meth:`entries`, by default differences; and :meth:`curvature` if the Jacobian depends on u. It
+    may have forces too, as any :class:`~skfem_ancf.Item`: an energy, a force, a memory, a mass.
 
     Attributes
     ----------
@@ -83,151 +70,21 @@ class Joint(Item):
         Times, shape (n,), and the number of the scene's degrees of freedom.
     """
 
-    equations: tuple[str, ...] = ()
-    constant = True
-    moving = False
-    tabled = True
-    driver = ""
-
     def bind(self, layout: Layout) -> None:
         """Find the points and sections; called on a copy."""
         raise NotImplementedError
 
-    def value(self, u: Array, t: float) -> Array:
-        """Residual Phi, shape (m,)."""
-        raise NotImplementedError
-
-    def jacobian(self, u: Array, t: float) -> Array:
-        """Derivative of Phi by u, shape (m, N); by default from :meth:`entries`."""
-        rows, columns, values = self.entries(u, t)
-        J = np.zeros((len(self.equations), len(u)))
-        np.add.at(J, (rows, columns), values)
-        return J
-
-    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """Rows, columns and values (k,) of :meth:`jacobian`; repeated entries are summed.
-
-        By default from the dense matrix, which is slow in large scenes.
-        """
-        J = self.jacobian(u, t)
-        rows, columns = np.nonzero(J)
-        return rows, columns, J[rows, columns]
-
-    def curvature(self, u: Array, t: float,
-                  multipliers: Array) -> tuple[Array, Array, Array] | None:
-        """Hessian, the sum over k of multipliers[k] d^2 Phi_k / du^2.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,); or None if the Jacobian is constant.
-        """
-        return None
-
-    def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        """Second directional derivative of Phi along v, shape (m,)."""
-        out = np.zeros(len(self.equations))
-        for k, unit in enumerate(np.eye(len(out))):
-            second = self.curvature(u, t, unit)
-            if second is not None:
-                out[k] = second[2] @ (v[second[0]] * v[second[1]])
-        return out
-
-    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
-        """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
-
-        By default the Jacobian in the middle, exact for quadratic Phi.
-        """
-        return self.entries(0.5 * (u0 + u1), t)
-
-    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
-                     multipliers: Array) -> Array:
-        """X (N,) with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
-
-        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, exact for quadratic Phi.
-        """
-        second, v = self.curvature(0.5 * (u0 + u1), t, multipliers), v0 + v1
-        if second is None:
-            return 0.0 * v
-        rows, columns, values = second
-        return -0.25 * np.bincount(rows, values * v[columns], len(v))
-
-    def lost(self, u: Array) -> str:
-        """Reason why a converged state violates the joint; "" if it does not."""
-        return ""
-
-    def offset(self, times: Array, N: int) -> Array:
-        """Phi of the reference configuration at several times, shape (n, m)."""
-        zero = np.zeros(N)
-        return np.array([self.value(zero, t) for t in times])
-
-    @property
-    def turning(self) -> bool:
-        """True if the Jacobian in the reference configuration depends on time."""
-        return self.moving and not self.constant
-
-    def moved(self, times: Array, N: int) -> Array:
-        """Time-dependent columns of :meth:`offset`, shape (n, k)."""
-        return self.offset(times, N)
-
-    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        """Jacobian in the reference configuration at several times.
-
-        Returns
-        -------
-        rows, columns, values
-            Shapes (k,), (k,) and (n, k).
-        """
-        zero, m = np.zeros(N), len(self.equations)
-        if self.turning:
-            J = np.array([self.jacobian(zero, t) for t in times])
-            return np.repeat(np.arange(m), N), np.tile(np.arange(N), m), J.reshape(len(times), -1)
-        rows, columns, values = self.entries(zero, times[0])
-        return rows, columns, values[None].repeat(len(times), axis=0)
-
-    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
-        """Second derivatives of Phi in the reference configuration.
-
-        Returns
-        -------
-        equations, rows, columns, values
-            Shapes (k,).
-        """
-        none = np.zeros(0, dtype=int)
-        zero, out = np.zeros(N), [(none, none, none, np.zeros(0))]
-        for row, unit in enumerate(np.eye(len(self.equations))):
-            found = self.curvature(zero, 0.0, unit)
-            if found is not None:
-                i, j, v = (np.asarray(x) for x in found)
-                keep = v != 0
-                out.append((np.full(keep.sum(), row), i[keep], j[keep], v[keep]))
-        k, i, j, v = (np.concatenate(x) for x in zip(*out))
-        return k, i, j, v
-
-    def __repr__(self) -> str:
-        at = getattr(self, "at", None)
-        if isinstance(at, tuple) and not is_point(at) and all(x is at[0] for x in at):
-            at = at[0]  # given once for all
-        parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
-        return f"<{' '.join(part for part in parts if part)}>"
-
-
-def bind_joint(joint: Joint, layout: Layout) -> Joint:
-    """A copy of a joint, bound to a scene and checked.
-
-    Parameters
-    ----------
-    joint, layout
-        The unbound joint, and the :class:`~skfem_ancf.beam.layout.Layout` of the scene.
-    """
-    bound = joint._thawed()
-    hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
-            "multipliers) unless that is constant")
-    with nullcontext() if is_builtin(joint) else explained(
-            "{!r} fails in the reference configuration", hint, InputError, joint):
-        bound.bind(layout)
-        bound._freeze()
-        if not is_builtin(joint):
+    def bound_on(self, layout: Layout) -> list[Any]:
+        bound = self._thawed()
+        if is_builtin(self):
+            bound.bind(layout)
+            bound._freeze()
+            return [bound]
+        hint = ("a joint defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, "
+                "multipliers) unless that is constant")
+        with explained("{!r} fails in the reference configuration", hint, InputError, self):
+            bound.bind(layout)
+            bound._freeze()
             m, n, zero = len(bound.equations), layout.N, np.zeros(layout.N)
             require_finite(f"value(u, t) of {bound!r}", bound.value(zero, 0.0), (m,))
             require_finite(f"jacobian(u, t) of {bound!r}", bound.jacobian(zero, 0.0), (m, n))
@@ -237,35 +94,20 @@ def bind_joint(joint: Joint, layout: Layout) -> Joint:
                 require_entries(f"curvature of {bound!r}", i, j, values, n)
             at_generic_displacements(partial(require_derivatives, bound, layout.sizes),
                                      layout.sizes)
-    return bound
+            return [bound, *user_parts(bound, layout)]
 
-
-def require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
-    """Raise InputError unless jacobian and curvature of a user-defined joint fit its value."""
-    multipliers = np.cos(np.arange(len(joint.equations)))
-    try:
-        value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
-        J, *others = (joint.jacobian(u + s * d, 0.0) for s in (0.0, -1.0, 1.0))
-        found = joint.curvature(u, 0.0, multipliers)
-    except Exception:  # it may not be defined there
-        return
-    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values[1] - values[0],
-                  2.0 * (J @ d), 1e-13 * max(1.0, np.abs(value).max()) * np.abs(sizes).max())
-    turned = 0.0 * u
-    if found is not None:
-        i, j, v = found
-        np.add.at(turned, i, v * d[j])
-    change = multipliers @ (others[1] - others[0])
-    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
-                  "multipliers @ jacobian(u, t)", change * sizes, 2.0 * turned * sizes,
-                  1e-12 * np.max(np.abs(multipliers @ J) * sizes, initial=0.0))
+    def __repr__(self) -> str:
+        at = getattr(self, "at", None)
+        if isinstance(at, tuple) and not is_point(at) and all(x is at[0] for x in at):
+            at = at[0]  # given once for all
+        parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
+        return f"<{' '.join(part for part in parts if part)}>"
 
 
 def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
     """Names of the equations between the first of n beams and each of the others."""
-    if n == 2:
-        return tuple(names)
-    return tuple(f"{name}, from number {k}" for k in range(1, n) for name in names)
+    return tuple(names) if n == 2 else tuple(
+        f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
 def angle_to(d: ArrayLike, e: ArrayLike) -> float:
@@ -273,69 +115,61 @@ def angle_to(d: ArrayLike, e: ArrayLike) -> float:
     return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
 
 
-# equations of joints: their value at displacements u (N,) of the scene, their derivative for
-# :func:`gradients`, and a factor times their second derivative, rows, columns and values (k,)
+# equations of joints
 
-class Affine:
-    """The sum of ``direction . vector`` over pairs of both, less a constant."""
+class Equation:
+    """The sum of ``n . v`` over pairs of a vector and a direction, plus ``d . M e``, less a number.
 
-    def __init__(self, *pairs: tuple[Vector, Any], less: float = 0.0) -> None:
-        self.pairs, self.less = pairs, less
+    Vectors v, d and e are affine in the degrees of freedom u (N,) of the scene; M is (2, 2).
+    """
 
-    def value(self, u: Array) -> float:
-        return sum(float(direction @ vector(u)) for vector, direction in self.pairs) - self.less
-
-    def terms(self, u: Array) -> Sequence[Any]:
-        return self.pairs
-
-    def second(self, factor: float) -> tuple[Array, Array, Array]:
-        none = np.zeros(0, dtype=int)
-        return none, none, np.zeros(0)
-
-
-class Aligned:
-    """``(Q e) x d``: zero if d is parallel to e rotated by Q."""
-
-    def __init__(self, d: Vector, e: Vector, Q: Array) -> None:
-        self.d, self.e, self.Q = d, e, Q
+    def __init__(self, *pairs: tuple[Vector, Any],
+                 product: tuple[Vector, Vector, Array] | None = None, less: float = 0.0) -> None:
+        self.pairs, self.product, self.less = pairs, product, less
 
     def value(self, u: Array) -> float:
-        e, d = self.Q @ self.e(u), self.d(u)
-        return e[0] * d[1] - e[1] * d[0]
+        out = -self.less
+        if self.product is not None:
+            d, e, M = self.product
+            out += float(d(u) @ M @ e(u))
+        return out + sum(float(direction @ vector(u)) for vector, direction in self.pairs)
 
     def terms(self, u: Array) -> Sequence[Any]:
-        e, d = self.Q @ self.e(u), self.d(u)
-        return [(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ self.Q)]
+        """Pairs of vectors and directions whose products have the same derivative at u."""
+        if self.product is None:
+            return self.pairs
+        d, e, M = self.product
+        both = [(d, (M + M.T) @ d(u))] if d is e else [(d, M @ e(u)), (e, d(u) @ M)]
+        return [*self.pairs, *both]
 
     def second(self, factor: float) -> tuple[Array, Array, Array]:
-        J = np.array([[0.0, -1.0], [1.0, 0.0]]) @ self.Q  # (Q e) x d = -d^T [[0, 1], [-1, 0]] Q e
-        rows, columns, values = products(self.d, self.e, factor * J)
+        """A factor times the second derivative: rows, columns and values (k,)."""
+        if self.product is None:
+            none = np.zeros(0, dtype=int)
+            return none, none, np.zeros(0)
+        d, e, M = self.product
+        if d is e:
+            return products(d, d, factor * (M + M.T))
+        rows, columns, values = products(d, e, factor * M)
         return np.append(rows, columns), np.append(columns, rows), np.append(values, values)
 
 
-class Distant:
+def aligned(d: Vector, e: Vector, Q: Array) -> Equation:
+    """``(Q e) x d``: zero if d is parallel to e rotated by Q."""
+    return Equation(product=(d, e, np.array([[0.0, -1.0], [1.0, 0.0]]) @ Q))
+
+
+def distant(d: Vector, R: float) -> Equation:
     """``(|d|^2 - R^2) / (2 R)``: zero if a vector d has the length R."""
-
-    def __init__(self, d: Vector, R: float) -> None:
-        self.d, self.R = d, R
-
-    def value(self, u: Array) -> float:
-        d = self.d(u)
-        return float(d @ d - self.R**2) / (2 * self.R)
-
-    def terms(self, u: Array) -> Sequence[Any]:
-        return [(self.d, self.d(u) / self.R)]
-
-    def second(self, factor: float) -> tuple[Array, Array, Array]:
-        return products(self.d, self.d, factor / self.R * np.eye(2))
+    return Equation(product=(d, d, 0.5 / R * np.eye(2)), less=0.5 * R)
 
 
 class ComposedJoint(Joint):
-    """A joint whose equations are some of the above, which :meth:`bind` sets."""
+    """A joint whose equations are :class:`Equation`, which :meth:`bind` sets."""
 
-    parts: Sequence[Any] = ()
+    parts: Sequence[Equation] = ()
 
-    def parts_at(self, t: float) -> Sequence[Any]:
+    def parts_at(self, t: float) -> Sequence[Equation]:
         """The equations at a time."""
         return self.parts
 
@@ -343,7 +177,17 @@ class ComposedJoint(Joint):
         return np.array([part.value(u) for part in self.parts_at(t)])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        return gradients(*(part.terms(u) for part in self.parts_at(t)))
+        none = np.zeros(0, dtype=int)
+        rows, columns, values = [none], [none], [np.zeros(0)]
+        for k, part in enumerate(self.parts_at(t)):
+            for vector, direction in part.terms(u):
+                found = vector.entries(direction)
+                rows.append(np.full(len(found[0]), k))
+                columns.append(found[0])
+                values.append(found[1])
+        i, j, v = map(np.concatenate, (rows, columns, values))
+        keep = v != 0.0
+        return i[keep], j[keep], v[keep]
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
@@ -362,7 +206,7 @@ class UnitDirector(ComposedJoint):
 
     def __init__(self, body: RigidBody, first: int) -> None:
         self.name = body.name
-        self.parts = [Distant(Vector(body.q0[2:], first + np.array([[2], [3]]), 1.0), 1.0)]
+        self.parts = [distant(Vector(body.q0[2:], first + np.array([[2], [3]]), 1.0), 1.0)]
 
 
 # independent equations of a joint
@@ -382,18 +226,13 @@ class IndependentPart(Joint):
     def __repr__(self) -> str:
         return repr(self.joint)
 
-    def bind(self, layout: Layout) -> None:  # the joint is bound already
-        pass
-
     def _of(self, rows: Array, *others: Array) -> tuple[Any, ...]:
         rows = self._number[rows]
         keep = rows >= 0
         return (rows[keep], *(x[..., keep] for x in others))
 
     def _all(self, multipliers: Array) -> Array:
-        out = np.zeros(len(self._number))
-        out[self.kept] = multipliers
-        return out
+        return np.bincount(self.kept, multipliers, len(self._number))
 
     def value(self, u: Array, t: float) -> Array:
         return np.asarray(self.joint.value(u, t))[self.kept]

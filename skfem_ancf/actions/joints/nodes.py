@@ -27,11 +27,9 @@ COMPONENTS = "x", "y", "angle"
 
 
 class Settlements:
-    """Prescribed displacements of supports along x and y, and rotations in radians.
-
-    ``numbers``, (n, 3), are proportional to the load factor of a static solution. ``functions`` of
-    time, in statics of the load factor, replace those of the node and the number in
-    :data:`COMPONENTS` in ``at``.
+    """Prescribed displacements of supports along x and y, and rotations in radians: ``numbers`` (n,
+    3) proportional to the load factor, replaced by ``functions`` of time of the node and component
+    ``at``.
     """
 
     def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),
@@ -87,10 +85,10 @@ class Nodes(Joint):
 
     constant = False
 
-    def __init__(self, nodes: Array, hinged: Array, fixed: Array, graph: FrameGraph, lines: Array,
-                 settlements: Settlements | None = None) -> None:
+    def __init__(self, nodes: Array, hinged: Array, fixed: Array, graph: FrameGraph, lines: Array
+                 ) -> None:
         self.nodes, self.hinged, self.fixed = nodes, hinged, fixed
-        self.settlements = settlements or Settlements(np.zeros(fixed.shape))
+        self.settlements = Settlements(np.zeros(fixed.shape))
         #: functions of time of these
         self.functions = self.settlements.functions
         self.graph, self.lines = graph, lines
@@ -305,9 +303,8 @@ class Nodes(Joint):
         return np.asarray(connected_components(links, directed=False)[1])
 
     def fixed_motions(self, parts: Array, origin: Array, size: float, number: int) -> Any:
-        """Constraints of nodes and supports on the rigid motions of groups, one row each.
-
-        A sparse matrix; for one group a dense one.
+        """Constraints of nodes and supports on rigid motions of groups; dense for one group, else
+        sparse.
         """
         part = np.repeat(parts, 2)
         x, y = (self.graph.points[:, self.nodes] - origin[:, None]) / size

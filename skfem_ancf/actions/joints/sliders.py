@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from math import factorial, floor
 from typing import Any, NamedTuple
 
@@ -16,11 +16,11 @@ from ...core.errors import (InputError, require_direction, require_finite, requi
                             require_label, require_positive, shown)
 from ...core.immutable import array_cache
 from ...core.types import Array
-from ...mesh.mapping import cross
+from ...mesh.mapping import cross, turned
 from ...core.quadrature import hermite_basis
 from ..places import GROUND, Vector, is_ground, named_place, point, section
 from ..symbols import Symbol, tangent_at
-from .base import Affine, Aligned, ComposedJoint, Distant, Joint, angle_to, rotation
+from .base import ComposedJoint, Equation, Joint, aligned, angle_to, distant, rotation
 
 
 class OnLine(ComposedJoint):
@@ -48,7 +48,7 @@ class OnLine(ComposedJoint):
     def bind(self, layout: Layout) -> None:
         r = point(layout, self.beam, self.at)
         through = r.start if self.through is None else self.through
-        self.parts = [Affine((r - Vector(through), self.normal))]
+        self.parts = [Equation((r - Vector(through), self.normal))]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
@@ -84,7 +84,7 @@ class OnCircle(ComposedJoint):
         if R < 1e-9 * distance:
             raise InputError(f"radius = {R!r} is negligible against the distance of the point "
                              "from the centre")
-        self.parts = [Distant(d, R)]
+        self.parts = [distant(d, R)]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = point(layout, self.beam, self.at)
@@ -202,42 +202,32 @@ def _mean(pair: Any) -> Array:
 
 
 class AffineVector(NamedTuple):
-    """A vector, affine in the DOFs, at both parameters, and its divided difference.
+    """A vector, affine in the DOFs, at both parameters, and its divided difference."""
 
-    ``rows`` are derivatives by the DOFs at both parameters, (2, 2, n), ``values`` those at
-    parameter k and displacement j, (2, 2, 2), ``quotient`` the derivative of the divided
-    difference, (2, n), and ``slopes`` the divided difference at both displacements, (2, 2).
-    """
+    rows: Array  # derivatives by the DOFs at both parameters, (2, 2, n)
+    values: Array  # at parameter k and displacement j, (2, 2, 2)
+    quotient: Array  # derivative of the divided difference, (2, n)
+    slopes: Array  # the divided difference at both displacements, (2, 2)
 
-    rows: Array
-    values: Array
-    quotient: Array
-    slopes: Array
-
-    def turned(self, Q: Array) -> AffineVector:
-        """The family of Q times the vector, Q of shape (2, 2)."""
+    def times(self, Q: Array) -> AffineVector:
+        """Q times the vector, Q of shape (2, 2)."""
         return AffineVector(Q @ self.rows, self.values @ Q.T, Q @ self.quotient, self.slopes @ Q.T)
 
-    def minus(self, other: AffineVector) -> AffineVector:
-        """The difference of two families."""
-        return AffineVector(*(a - b for a, b in zip(self, other)))
 
+class ScalarProduct:
+    """The scalar product of two families between two displacements."""
 
-class VectorProduct:
-    """A product of two families between two displacements; ``times`` is that of two vectors."""
-
-    def __init__(self, times: Callable[[Array, Array], Array], x: AffineVector, y: AffineVector
-                 ) -> None:
-        self._times, self._x, self._y = times, x, y
+    def __init__(self, x: AffineVector, y: AffineVector) -> None:
+        self._x, self._y = x, y
         self._passing = [_mean(f.values) for f in (x, y)]  # means over s, at each displacement
-        (a, b), d, e = self._passing, x.slopes, y.slopes
+        a, b = self._passing
         #: f_s
-        self.quotient = 0.5 * sum(float(times(a[j], e[j]) + times(d[j], b[j])) for j in range(2))
+        self.quotient = 0.5 * float(np.sum(a * y.slopes + x.slopes * b))
         #: f_u
         self.row = _mean([self._row(_mean(x.values[k]), _mean(y.values[k]), k) for k in range(2)])
 
     def _row(self, x: Array, y: Array, k: int) -> Array:
-        return self._times(x, self._y.rows[k]) + self._times(self._x.rows[k], y)
+        return x @ self._y.rows[k] + y @ self._x.rows[k]
 
     def rate(self, j: int, v: Array) -> float:
         """f_u(u_j, s_j) . v."""
@@ -250,26 +240,20 @@ class VectorProduct:
 
     def mixed(self) -> Array:
         """The derivative of f_s by u at u_m."""
-        x, y, times = self._x, self._y, self._times
-        a, b = map(_mean, self._passing)
-        return (times(a, y.quotient) + times(_mean(x.rows), _mean(y.slopes))
-                + times(x.quotient, b) + times(_mean(x.slopes), _mean(y.rows)))
+        (a, b), x, y = map(_mean, self._passing), self._x, self._y
+        return (a @ y.quotient + _mean(y.slopes) @ _mean(x.rows)
+                + b @ x.quotient + _mean(x.slopes) @ _mean(y.rows))
 
 
 class Span(NamedTuple):
-    """The equations of a sleeve between two displacements.
+    """The equations of a sleeve between two displacements."""
 
-    ``columns`` are numbers of DOFs, ``change`` is ``u_1 - u_0`` of these, (n,), ``advance`` is
-    ``s_1 - s_0`` in elements, ``place`` the product G, zero at both ends, ``equations`` the other
-    products, and ``shares`` ``f_s / G_s`` of each at both ends, (m, 2).
-    """
-
-    columns: Array
-    change: Array
-    advance: float
-    place: VectorProduct
-    equations: list[VectorProduct]
-    shares: Array
+    columns: Array  # numbers of DOFs
+    change: Array  # u_1 - u_0 of these, (n,)
+    advance: float  # s_1 - s_0, in elements
+    place: ScalarProduct  # G, zero at both ends
+    equations: list[ScalarProduct]
+    shares: Array  # f_s / G_s of each equation at both ends, (m, 2)
 
     def rows(self) -> Array:
         """D of each equation, shape (m, n)."""
@@ -277,12 +261,10 @@ class Span(NamedTuple):
                          for f in self.equations])
 
     def force(self, multipliers: Array, v0: Array, v1: Array) -> Array:
-        """X with ``X . (u_1 - u_0) = multipliers . D (v_1 - v_0) / 2``.
-
-        Both velocities satisfy the constraint. For quadratic Phi, X is ``-(multipliers . Phi'')
-        (v_0 + v_1) / 4``. The part linear in ``u_1 - u_0`` is written as such; the rest has the
-        factor ``s_1 - s_0``, which is ``-G_u . (u_1 - u_0) / G_s``.
-        """
+        """X with ``X . (u_1 - u_0) = multipliers . D (v_1 - v_0) / 2``."""
+        # both velocities satisfy the constraint; for quadratic Phi, X is -(multipliers . Phi'')
+        # (v_0 + v_1) / 4. The part linear in u_1 - u_0 is written as such; the rest has the factor
+        # s_1 - s_0, which is -G_u . (u_1 - u_0) / G_s
         place, v = self.place, v0 + v1
         passing = [place.rate(0, v0), place.rate(1, v1)]
         out, work, rows = np.zeros(len(v)), 0.0, self.rows()
@@ -302,23 +284,6 @@ class Span(NamedTuple):
 BEYOND = 1e-6
 #: Size of the cache of closest points, for all sleeves.
 KNOWN = 64
-
-
-def dot(a: Array, b: Array) -> Array:
-    """Scalar product of vectors (2, ...), or of one with several."""
-    return a[0] * b[0] + a[1] * b[1]
-
-
-def _pairs(A: Array, B: Array) -> Array:
-    """a_i x b_j of the columns of two matrices, symmetrised."""
-    M = np.outer(A[0], B[1]) - np.outer(A[1], B[0])
-    return M + M.T
-
-
-def _dots(A: Array, B: Array) -> Array:
-    """a_i . b_j of the columns of two matrices, symmetrised."""
-    M = A.T @ B
-    return M + M.T
 
 
 def _placed(*dofs: Array) -> tuple[Array, Any]:
@@ -419,10 +384,7 @@ class Sleeve(Joint):
 
     @array_cache(KNOWN)
     def _slopes(self, u: Array) -> tuple[Any, ...]:
-        """Derivatives of the equations and of s, and intermediate results.
-
-        Derivatives c and C of the axis and of its weights are by the reference length.
-        """
+        """Derivatives of the equations and of s; those c, C of the axis are by its length."""
         s = self._parameter(u)
         dofs, weights = self.axis.weights(s)
         lengths = self.axis.beam.mesh.lengths[self.axis.element(s)] ** np.arange(4)[:, None]
@@ -440,28 +402,28 @@ class Sleeve(Joint):
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         columns, *_, s_y, first = self._slopes(u)
         rows = [slope + by_s * s_y for by_s, slope in first]
-        k = len(rows)
-        return (np.repeat(np.arange(k), len(columns)), np.tile(columns, k), np.concatenate(rows))
+        k, n = len(rows), len(columns)
+        return np.repeat(np.arange(k), n), np.tile(columns, k), np.concatenate(rows)
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         columns, c, e, E, C, D, Gs, s_y, first = self._slopes(u)
+        n, square = len(columns), np.outer(s_y, s_y)
 
-        def mixed(row: Array) -> Array:
-            M = np.outer(row, s_y)
+        def both(A: Array, B: Array, row: Array) -> Array:
+            M = A.T @ B + np.outer(row, s_y)  # of the variations of two factors, in both orders
             return M + M.T
 
         # of c'(s) . (p - c(s)) = 0
-        s_yy = -(_dots(C[1], E) + mixed(c[2] @ E + e @ C[2] - 2.0 * c[1] @ C[1])
-                 + (c[3] @ e - 3.0 * c[1] @ c[2]) * np.outer(s_y, s_y)) / Gs
+        s_yy = -(both(C[1], E, c[2] @ E + e @ C[2] - 2.0 * c[1] @ C[1])
+                 + (c[3] @ e - 3.0 * c[1] @ c[2]) * square) / Gs
         H = multipliers[0] * (
-            _pairs(C[1], E) + mixed(cross(c[2], E) - cross(e, C[2]))
-            + (cross(c[3], e) - cross(c[2], c[1])) * np.outer(s_y, s_y) + first[0][0] * s_yy)
+            both(turned(C[1]), E, cross(c[2], E) - cross(e, C[2]))
+            + (cross(c[3], e) - cross(c[2], c[1])) * square + first[0][0] * s_yy)
         if self.angle:
             d, Q = self.d(u), self.Q
             H = H + multipliers[1] * (
-                _pairs(D, Q @ C[1]) + mixed(cross(d, Q @ C[2]) - cross(Q @ c[2], D))
-                + cross(d, Q @ c[3]) * np.outer(s_y, s_y) + first[1][0] * s_yy)
-        n = len(columns)
+                both(turned(D), Q @ C[1], cross(d, Q @ C[2]) - cross(Q @ c[2], D))
+                + cross(d, Q @ c[3]) * square + first[1][0] * s_yy)
         return np.repeat(columns, n), np.tile(columns, n), H.ravel()
 
     # between two displacements
@@ -486,21 +448,21 @@ class Sleeve(Joint):
                           np.array([[w[k, order] @ x for x in places] for k in range(2)]),
                           rows(2, q[None]), np.array([q @ x for x in places]))
 
-        c = along(1)
-        gap = held(0, self.p).minus(along(0))
-        equations = [VectorProduct(cross, c, gap)]
+        # a x b is the scalar product of a, turned by a right angle, and b
+        c, right = along(1), np.array([[0.0, -1.0], [1.0, 0.0]])
+        gap = AffineVector(*map(np.subtract, held(0, self.p), along(0)))
+        equations = [ScalarProduct(c.times(right), gap)]
         if self.angle:
-            equations.append(VectorProduct(cross, held(1, self.d), c.turned(self.Q)))
+            equations.append(ScalarProduct(held(1, self.d).times(right), c.times(self.Q)))
         shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
                   for slopes in (self._slopes(u) for u in ends)]
-        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], VectorProduct(dot, c, gap),
+        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], ScalarProduct(c, gap),
                     equations, np.array(shares).T)
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         span = self._span(u0, u1)
         values, k = span.rows(), len(self.equations)
-        return (np.repeat(np.arange(k), len(span.columns)), np.tile(span.columns, k),
-                values.ravel())
+        return np.repeat(np.arange(k), len(span.columns)), np.tile(span.columns, k), values.ravel()
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
@@ -564,7 +526,7 @@ class Slot(ComposedJoint):
             raise InputError(f"{self!r}: the point ({p.start[0]:.6g}, {p.start[1]:.6g}) "
                              f"is {abs(gap):.6g} off the line: give another through=")
         kept = [(w, self.direction)] if d is None else [(w, self.direction), (d, d.start)]
-        self.parts = [Aligned(vector, e, rotation(angle_to(start, e.start)))
+        self.parts = [aligned(vector, e, rotation(angle_to(start, e.start)))
                       for vector, start in kept]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:

@@ -26,7 +26,7 @@ from ..item import Item
 from ..loads import EndMoment
 from ..places import Vector, both_of, each, is_ground, point, section, several
 from ..symbols import Symbol, boundary_of, support_of, supports_of
-from .base import Affine, Aligned, ComposedJoint, Joint, angle_to, equations_of, rotation
+from .base import ComposedJoint, Equation, Joint, aligned, angle_to, equations_of, rotation
 
 # hinge between two or more beams
 
@@ -51,7 +51,7 @@ class Hinge(ComposedJoint):
 
     def bind(self, layout: Layout) -> None:
         first, *others = (point(layout, beam, at) for beam, at in zip(self.beams, self.at))
-        self.parts = [Affine((first, n), (other, -n)) for other in others for n in np.eye(2)]
+        self.parts = [Equation((first, n), (other, -n)) for other in others for n in np.eye(2)]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         return symbol_of(self, layout, "hinge", "x y", point)
@@ -219,8 +219,8 @@ class Weld(ComposedJoint):
                     f"({b.start[0]:.6g}, {b.start[1]:.6g}){centre} name sections that meet, move a "
                     f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
                     "apart=True to draw them together")
-            self.parts += [*(Affine((a, n), (b, -n)) for n in np.eye(2)),
-                           Aligned(d, e, rotation(angle_to(d.start, e.start)))]
+            self.parts += [*(Equation((a, n), (b, -n)) for n in np.eye(2)),
+                           aligned(d, e, rotation(angle_to(d.start, e.start)))]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         return symbol_of(self, layout, "weld", "x y angle",
@@ -265,8 +265,8 @@ class PrescribedPosition(ComposedJoint):
     def bind(self, layout: Layout) -> None:
         self.r = point(layout, self.beam, self.at)
 
-    def parts_at(self, t: float) -> Sequence[Any]:
-        return [Affine((self.r, n), less=n @ x) for n in np.eye(2)
+    def parts_at(self, t: float) -> Sequence[Equation]:
+        return [Equation((self.r, n), less=n @ x) for n in np.eye(2)
                 for x in sample(self.motion, np.array([t]), "r", (2,))]
 
     def offset(self, times: Array, N: int) -> Array:
@@ -278,16 +278,7 @@ class PrescribedPosition(ComposedJoint):
 
 
 class PrescribedDisplacement(Joint):
-    """Degrees of freedom of a place follow a function of time: ``u[dofs] = displacement(t)``.
-
-    Parameters
-    ----------
-    boundary, names, beam
-        As for a support, see :class:`~skfem_ancf.actions.supports.Support`.
-    displacement
-        A function of time, in statics of the load factor, that returns a number in the unit of the
-        degrees of freedom.
-    """
+    """Degrees of freedom of a place follow a function of time: ``u[dofs] = displacement(t)``."""
 
     moving = True
     driver = "displacement"
@@ -350,8 +341,8 @@ class PrescribedAngle(ComposedJoint):
         _, self.d = section(layout, self.beam, self.at)
         self.start = np.arctan2(*self.d.start[::-1])
 
-    def parts_at(self, t: float) -> Sequence[Any]:
-        return [Affine((self.d, n)) for n in self._normals(np.array([t]))]
+    def parts_at(self, t: float) -> Sequence[Equation]:
+        return [Equation((self.d, n)) for n in self._normals(np.array([t]))]
 
     def _normals(self, times: Array) -> Array:
         a = self.start + sample(self.angle, times, "angle", ())
@@ -414,9 +405,9 @@ class PrescribedTurn(ComposedJoint):
         (_, self.d), (_, self.e) = (section(layout, *place) for place in (self.at, self.other))
         self.start = angle_to(self.d.start, self.e.start)
 
-    def parts_at(self, t: float) -> Sequence[Any]:
+    def parts_at(self, t: float) -> Sequence[Equation]:
         angle = self.start + ask_number("angle(t={:g})", self.angle, t)
-        return [Aligned(self.d, self.e, rotation(angle))]
+        return [aligned(self.d, self.e, rotation(angle))]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         at = section(layout, *self.at)[0]
@@ -495,7 +486,7 @@ class PlaneSection(ComposedJoint):
         self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
         first = layout.offset(beam) + node * beam.nd
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in fixed)
-        self.parts = [Affine((Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0),
+        self.parts = [Equation((Vector(np.zeros(2), first + 2 * k + np.arange(2)[:, None], 1.0),
                               self.direction)) for k in fixed]
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:

@@ -1,0 +1,671 @@
+"""What the equations of a scene see of items: forces and constraints on degrees of freedom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+from numpy.typing import ArrayLike
+
+from ..beam.beam import Beam
+from ..beam.distribution import Facets
+from ..beam.layout import Layout
+from ..core.errors import (InputError, require_finite, require_slope, shown,
+                           warnings_as_errors)
+from ..core.immutable import is_builtin
+from ..core.types import Array
+from .places import Vector
+
+#: Relative step of differences, where a force does not accept complex numbers.
+STEP = 1e-6
+#: Relative round-off of a potential.
+ROUND_OFF = 1e-14
+#: Relative perturbation of the reference configuration for checks of user-defined elements.
+ASIDE = 0.01
+#: The span of a mean at one time.
+TINY = 1e-300
+_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
+
+
+class Bound:
+    """Part of a bound item, with its name and the key of its copies."""
+
+    name: str | None = None
+    _key: bytes = b""
+
+    def same(self, other: Any) -> bool:
+        """True if both are of one item, bound or not."""
+        return self._key == getattr(other, "_key", None)
+
+
+class BoundConstraint(Bound):
+    """Equations Phi(u, t) = 0, see :class:`~skfem_ancf.actions.joints.Joint` for its methods.
+
+    Attributes
+    ----------
+    equations, constant, moving, driver, tabled
+        As of a Joint.
+
+    Other Parameters
+    ----------------
+    u, v, t, multipliers, u0, u1, v0, v1, times, N
+        As of a Joint.
+    """
+
+    equations: tuple[str, ...] = ()
+    constant = True
+    moving = False
+    tabled = True
+    driver = ""
+
+    def value(self, u: Array, t: float) -> Array:
+        """Residual Phi, shape (m,)."""
+        raise NotImplementedError
+
+    def jacobian(self, u: Array, t: float) -> Array:
+        """Derivative of Phi by u, (m, N); by default from :meth:`entries`, or by differences."""
+        if type(self).entries is BoundConstraint.entries:
+            return derivative(lambda w: self.value(w, t), u)
+        rows, columns, values = self.entries(u, t)
+        J = np.zeros((len(self.equations), len(u)))
+        np.add.at(J, (rows, columns), values)
+        return J
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        """Rows, columns and values (k,) of :meth:`jacobian`; repeated entries are summed.
+
+        By default from the dense matrix, which is slow in large scenes.
+        """
+        J = self.jacobian(u, t)
+        rows, columns = np.nonzero(J)
+        return rows, columns, J[rows, columns]
+
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array] | None:
+        """Hessian, the sum over k of multipliers[k] d^2 Phi_k / du^2.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,); or None if the Jacobian is constant.
+        """
+        return None
+
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        """Second directional derivative of Phi along v, shape (m,)."""
+        out = np.zeros(len(self.equations))
+        for k, unit in enumerate(np.eye(len(out))):
+            second = self.curvature(u, t, unit)
+            if second is not None:
+                out[k] = second[2] @ (v[second[0]] * v[second[1]])
+        return out
+
+    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
+        """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
+
+        By default the Jacobian in the middle, exact for quadratic Phi.
+        """
+        return self.entries(0.5 * (u0 + u1), t)
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        """X (N,) with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
+
+        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, exact for quadratic Phi.
+        """
+        second, v = self.curvature(0.5 * (u0 + u1), t, multipliers), v0 + v1
+        if second is None:
+            return 0.0 * v
+        rows, columns, values = second
+        return -0.25 * np.bincount(rows, values * v[columns], len(v))
+
+    def lost(self, u: Array) -> str:
+        """Reason why a converged state violates the joint; "" if it does not."""
+        return ""
+
+    def offset(self, times: Array, N: int) -> Array:
+        """Phi of the reference configuration at several times, shape (n, m)."""
+        zero = np.zeros(N)
+        return np.array([self.value(zero, t) for t in times])
+
+    @property
+    def turning(self) -> bool:
+        """True if the Jacobian in the reference configuration depends on time."""
+        return self.moving and not self.constant
+
+    def moved(self, times: Array, N: int) -> Array:
+        """Time-dependent columns of :meth:`offset`, shape (n, k)."""
+        return self.offset(times, N)
+
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
+        """Jacobian in the reference configuration at several times.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,), (k,) and (n, k).
+        """
+        zero, m = np.zeros(N), len(self.equations)
+        if self.turning:
+            J = np.array([self.jacobian(zero, t) for t in times])
+            return np.repeat(np.arange(m), N), np.tile(np.arange(N), m), J.reshape(len(times), -1)
+        rows, columns, values = self.entries(zero, times[0])
+        return rows, columns, values[None].repeat(len(times), axis=0)
+
+    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
+        """Second derivatives of Phi in the reference configuration.
+
+        Returns
+        -------
+        equations, rows, columns, values
+            Shapes (k,).
+        """
+        none = np.zeros(0, dtype=int)
+        zero, out = np.zeros(N), [(none, none, none, np.zeros(0))]
+        for row, unit in enumerate(np.eye(len(self.equations))):
+            found = self.curvature(zero, 0.0, unit)
+            if found is not None:
+                i, j, v = (np.asarray(x) for x in found)
+                keep = v != 0
+                out.append((np.full(keep.sum(), row), i[keep], j[keep], v[keep]))
+        k, i, j, v = (np.concatenate(x) for x in zip(*out))
+        return k, i, j, v
+
+
+class BoundForce(Bound):
+    """A force on ``links``, see :class:`~skfem_ancf.actions.forces.ForceElement` for its methods.
+
+    Attributes
+    ----------
+    distributed, along, links, groups, entries, changing, symmetric
+        As of a ForceElement.
+
+    Other Parameters
+    ----------------
+    x, y, v, t, history, dt, past
+        As of a ForceElement.
+    """
+
+    symmetric = True
+    distributed = False
+    #: It is the internal force of a member of the scene.
+    internal = False
+    #: Its force may depend on velocities.
+    resists = True
+    along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None
+    links: Any = ()
+    groups: Any = ()
+    entries: tuple[Array, Array] | None = None
+    changing = False
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        """Force on each point, (n, 2); on section directions the conjugate force."""
+        raise NotImplementedError
+
+    def potential(self, x: Array) -> float | None:
+        """Potential of the force at zero velocity; None if there is none."""
+        return None
+
+    def potential_at(self, x: Array, t: float) -> float | None:
+        """Potential at a time, for time-dependent energies."""
+        return self.potential(x)
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        """Mean force (n, 2) at zero velocity, whose work is minus the change of the potential.
+
+        By default the force in the middle, corrected along the displacement (Gonzalez 1996): the
+        work is exact, but the correction may have a moment. :class:`Spring` and
+        :class:`TorsionalSpring` define means that conserve the angular momentum exactly.
+        """
+        d = y - x
+        force = np.asarray(self.force(0.5 * (x + y), 0.0 * x, t), dtype=float)
+        before = self.potential_at(x, t) if np.any(d) else None
+        after = None if before is None else self.potential_at(y, t)
+        if before is None or after is None:
+            return force
+        excess = after - before + np.sum(force * d)
+        if abs(excess) <= ROUND_OFF * (abs(before) + abs(after)):
+            return force  # next to rest round-off, divided by |d|, would be a large force
+        return force - excess / np.sum(d * d) * d
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Any:
+        """Derivative of the force by the positions, shape (n, 2, n, 2), the derivative's axes last.
+
+        By default by a complex step or differences.
+        """
+        return derivative(lambda y: self.force(y, v, t), x)
+
+    def mean_stiffness(self, x: Array, y: Array, t: float, *past: Any) -> Any:
+        """Twice the derivative of :meth:`mean_force` by y, if ``changing``.
+
+        By default the stiffness in the middle.
+        """
+        return self.stiffness(0.5 * (x + y), 0.0 * x, t, *past)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Any:
+        """Derivative of the force by the velocities, as :meth:`stiffness`."""
+        return derivative(lambda w: self.force(x, w, t), v)
+
+    def stride(self, x: Array, y: Array) -> float:
+        """Number of intervals in which a line search looks at the force from x to y."""
+        return 1.0
+
+    def corrected(self, x: Array, t: float, history: Array) -> Array | None:
+        """In statics, a history with which to repeat an increment that ends at x, or None."""
+        return None
+
+    def passed(self, x: Array, y: Array, t: float) -> str | None:
+        """Why a step must not lead from x to y, as through a body; None if it may."""
+        return None
+
+    def mass_entries(self) -> tuple[Array, Array, Array] | None:
+        """Rows, columns and values (k,) added to the mass matrix; None for none."""
+        return None
+
+    def parts(self) -> list[Any] | None:
+        """Its parts of kinds that kernels know, once bound; None for a user-defined element."""
+        return None
+
+
+def differences(function: Callable[[Array], Any], x: Array) -> Array:
+    """Derivative of a function of an array by central differences."""
+    step = STEP * max(1.0, float(np.abs(x).max(initial=0.0)))
+    units = step * np.eye(x.size).reshape(x.size, *x.shape)
+    columns = [(np.asarray(function(x + d)) - function(x - d)) / (2.0 * step) for d in units]
+    return np.stack(columns, axis=-1).reshape(*np.shape(columns[0]), *x.shape)
+
+
+def derivative(function: Callable[[Array], Any], x: Array) -> Array:
+    """As :func:`differences`, by complex steps where both agree; for complex x by these only."""
+    if np.iscomplexobj(x):
+        raise TypeError("complex steps of complex steps")
+    out = differences(function, x)
+    for k in np.ndindex(x.shape):
+        column = (..., *k)
+        step, rough = np.zeros(x.shape, dtype=complex), out[column]
+        step[k] = 1e-30j
+        try:
+            with warnings_as_errors(_COMPLEX):
+                found = np.imag(function(x + step)) / 1e-30
+            if np.allclose(found, rough, rtol=1e-4, atol=1e-4 * np.abs(rough).max(initial=0.0)):
+                out[column] = found
+        except (TypeError, ValueError, _COMPLEX):
+            pass
+    return out
+
+
+class Remembering:
+    """A bound force element with a memory, at one history: as one without memory.
+
+    ``history`` (k,) is that at the start of an increment, ``span`` (1,) the time since.
+    """
+
+    def __init__(self, element: Any) -> None:
+        self.element = element
+        self.start = np.array(require_finite(f"start() of {element!r}", element.start(), (None,)))
+        self._at(self.start, np.zeros(1))
+
+    def __getattr__(self, name):
+        return getattr(vars(self)["element"], name)
+
+    def __repr__(self) -> str:
+        return repr(self.element)
+
+    def after(self, history: Array, span: Array) -> Remembering:
+        """A copy at another history and span, of which it has views."""
+        other = object.__new__(Remembering)
+        vars(other).update(vars(self))
+        other._at(history, span)
+        return other
+
+    def _at(self, history, span):
+        self._values, self.history, self.span = history, history.view(), span
+        self.history.flags.writeable = False
+
+    def evaluate(self, x: Array, v: Array, t: float, dt: float | None = None
+                 ) -> tuple[Array, Array]:
+        """Force and history after ``dt``, by default the span."""
+        dt = float(self.span[0]) if dt is None else dt
+        force, after = self.element.evaluate(x, v, t, self.history, dt)
+        if np.shape(after) != self.start.shape:
+            raise InputError(f"evaluate(x, v, t, history, dt) of {self!r} must return the force "
+                             f"and a history of the shape of start(), {self.start.shape}, got "
+                             f"{np.shape(after)}")
+        return np.asarray(force), np.asarray(after)
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        return self.evaluate(x, v, t)[0]
+
+    def mean_force(self, x: Array, y: Array, t: float, span: float) -> Array:
+        """The mean force (n, 2) of a step about t: of its ends; with the span 0 that at the end."""
+        if span and hasattr(self.element, "mean"):
+            return self.element.mean(x, y, t, self.history, float(self.span[0]))
+        end = self.force(y, 0.0 * y, t + 0.5 * span)
+        return 0.5 * (self.evaluate(x, 0.0 * x, t - 0.5 * span, 0.0)[0] + end) if span else end
+
+    def _derivative(self, name, function, at, *x):
+        own = getattr(self.element, name)
+        if own.__func__ is not getattr(BoundForce, name):
+            return own(*x, self.history, float(self.span[0]))
+        return derivative(function, at)
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        return self._derivative("stiffness", lambda y: self.force(y, v, t), x, x, v, t)
+
+    def mean_stiffness(self, x: Array, y: Array, t: float) -> Any:
+        return self.element.mean_stiffness(x, y, t, self.history, float(self.span[0]))
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        return self._derivative("resistance", lambda w: self.force(x, w, t), v, x, v, t)
+
+    def potential_at(self, x: Array, t: float, history: Array | None = None) -> float | None:
+        own = self.element.potential
+        if own.__func__ is BoundForce.potential:
+            return None
+        found = own(x, self.history if history is None else history)
+        return None if found is None else float(found)
+
+    def accept(self, x: Array, y: Array, v: Array, t: float) -> float:
+        """Set the history at the end of an increment from x to y; returns what it dissipates."""
+        dt, after = float(self.span[0]), self.evaluate(y, v, t)[1]
+        mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)
+        lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
+            self.potential_at(y, t, after) or 0.0)
+        self._values[:] = after
+        return float(lost)
+
+    def settle(self, u0: Array, u: Array, t: float) -> float:
+        """As :meth:`accept` in statics, between displacements (N,)."""
+        x, y = (positions(self, w) for w in (u0, u))
+        return self.accept(x, y, 0.0 * y, t)
+
+    def relax(self, u: Array) -> None:
+        """Set a history with less stiffness, of contact between members at u (N,)."""
+        if hasattr(self.element, "relaxed"):
+            self._values[:] = self.element.relaxed(positions(self, u), self.history)
+
+    def correct(self, u: Array, t: float) -> bool:
+        """Set a history with which to repeat an increment that ends at u (N,); False for none."""
+        new = self.element.corrected(positions(self, u), t, self.history)
+        if new is not None:
+            self._values[:] = new
+        return new is not None
+
+
+def positions(element: Any, u: Array) -> Array:
+    """Positions (n, 2) of the links of a bound element at displacements (N,)."""
+    if not element.changing:
+        return np.array([link(u) for link in element.links])
+    return u[[link.dofs[:, 0] for link in element.links]]
+
+
+def recalled(element: Any) -> Any:
+    """A bound force element as solvers see it: one with a memory is :class:`Remembering`."""
+    return Remembering(element) if hasattr(element, "start") else element
+
+
+def try_force(bound: Any, sizes: Any = None) -> None:
+    """Raise InputError unless the methods of a user-defined force element are consistent."""
+    bound = recalled(bound)
+    x = np.array([x.start for x in bound.links])
+    n, zero = len(x), np.zeros_like(x)
+    require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
+    own = not is_builtin(getattr(bound, "item", bound))
+    if bound.changing:
+        _require_pairs(bound)
+        if not own:
+            return
+    else:
+        for name in ("stiffness", "resistance"):
+            require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
+                           (n, 2, n, 2))
+    # generic positions, as terms may vanish in the reference configuration
+    sizes = max(1.0, float(np.abs(x).max())) if sizes is None else sizes
+    y = x + ASIDE * sizes * np.cos(np.arange(2.0 * n)).reshape(n, 2)
+    K = _matrix(bound.stiffness(y, zero, 0.0), 2 * n)
+    if own:
+        at_generic_displacements(partial(_require_derivatives, bound, x), (sizes + 0.0 * x).ravel())
+    if bound.symmetric and not abs(K - K.T).max() <= 1e-4 * abs(K).max():
+        raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
+                         "symmetric: it has no potential. Set symmetric = False in its class")
+    if not hasattr(bound, "start") and bound.potential_at(y, 0.0) is not None:
+        at_generic_displacements(partial(_require_potential, bound, x), (sizes + 0.0 * x).ravel())
+
+
+def _matrix(K, n):
+    """A derivative as a matrix (n, n)."""
+    return K if sparse.issparse(K) else np.reshape(K, (n, n))
+
+
+def _require_pairs(bound):
+    """Raise InputError unless the links of a changing element are pairs of DOFs."""
+    x, n = np.array([x.start for x in bound.links]), len(bound.links)
+    K = bound.stiffness(x, 0.0 * x, 0.0)
+    if not sparse.issparse(K) or K.shape != (2 * n, 2 * n):
+        raise InputError(f"the stiffness of {bound!r}, with changing = True, must be a sparse "
+                         f"matrix of shape {(2 * n, 2 * n)}, got {shown(K)}")
+    if any(link.dofs.shape != (2, 1) or np.any(link.weights != 1.0) for link in bound.links):
+        raise InputError(f"{bound!r} has changing = True: each of its links must be a pair of "
+                         "degrees of freedom, as Vector(np.zeros(2), [[0], [1]], 1.0)")
+
+
+def _require_derivatives(bound, x, u, d):
+    """Raise InputError unless stiffness and resistance are the derivatives of the force."""
+    v, d = u.reshape(x.shape), d.reshape(x.shape)
+    for name, at in (("stiffness", lambda s: (x + v + s * d, 0.0 * d, 0.0)),
+                     ("resistance", lambda s: (x, v + s * d, 0.0))):
+        before, now, after = (np.asarray(bound.force(*at(s))) for s in (-1.0, 0.0, 1.0))
+        slope = (_matrix(getattr(bound, name)(*at(0.0)), d.size) @ d.ravel()).reshape(d.shape)
+        require_slope(f"{name}(x, v, t) of {bound!r}", "force(x, v, t)", after - before,
+                      2.0 * slope, 1e-12 * np.abs(now).max())
+
+
+def _require_potential(bound, x, u, d):
+    """Raise InputError unless the force without velocities is minus the slope of the potential."""
+    x, d = x + u.reshape(x.shape), d.reshape(x.shape)
+    for t in (0.0, ASIDE):
+        now, before, after = (bound.potential_at(x + s * d, t) for s in (0.0, -1.0, 1.0))
+        work = 2.0 * np.sum(bound.force(x, 0.0 * x, t) * d)
+        require_slope(f"minus force(x, v, t) of {bound!r}", "potential(x)", after - before, -work,
+                      1e-12 * abs(now), ". Without potential(x), as for a force that depends on "
+                      "time, the energy balance is that of the scheme")
+
+
+def require_derivatives(joint: BoundConstraint, sizes: Array, u: Array, d: Array) -> None:
+    """Raise InputError unless jacobian and curvature of a user-defined joint fit its value."""
+    multipliers = np.cos(np.arange(len(joint.equations)))
+    try:
+        value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
+        J, *others = (joint.jacobian(u + s * d, 0.0) for s in (0.0, -1.0, 1.0))
+        found = joint.curvature(u, 0.0, multipliers)
+    except Exception:  # it may not be defined there
+        return
+    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values[1] - values[0],
+                  2.0 * (J @ d), 1e-13 * max(1.0, np.abs(value).max()) * np.abs(sizes).max())
+    turned = 0.0 * u
+    if found is not None:
+        i, j, v = found
+        np.add.at(turned, i, v * d[j])
+    change = multipliers @ (others[1] - others[0])
+    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
+                  "multipliers @ jacobian(u, t)", change * sizes, 2.0 * turned * sizes,
+                  1e-12 * np.max(np.abs(multipliers @ J) * sizes, initial=0.0))
+
+
+def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
+    """Raise InputError unless rows, columns and values are entries of an n x n matrix."""
+    i, j = np.asarray(i), np.asarray(j)
+    v = require_finite(what, v, (None,))
+    if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
+        raise InputError(f"{what} must be rows, columns and values of one length, got shapes "
+                         f"{i.shape}, {j.shape}, {v.shape}")
+    if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
+        raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
+                         f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
+
+
+def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array) -> None:
+    """Call a check of derivatives at two generic displacements.
+
+    It may fail at one of them, where there may be a kink.
+    """
+    angles = np.arange(len(sizes))
+    try:
+        check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
+    except InputError:
+        check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))
+
+
+# user-defined items
+
+class UserForce(BoundForce):
+    """Energy, force and mass of a user-defined item, on pairs of its degrees of freedom.
+
+    ``past`` are history and time of an increment, of an item with a memory.
+    """
+
+    def __init__(self, item: Any, layout: Layout) -> None:
+        if hasattr(item, "start"):
+            self.start, self.evaluate = item.start, self._evaluate
+        self.item, self._N, self.symmetric = item, layout.N, item.symmetric
+        self.name, self._key = item.name, item._key
+        dofs = np.arange(layout.N) if item.dofs is None else np.unique(item.dofs)
+        if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < layout.N):
+            raise InputError(f"dofs of {item!r} must be numbers from 0 to {layout.N - 1}, got "
+                             f"{shown(item.dofs)}")
+        self.resists = hasattr(item, "force") or hasattr(item, "evaluate")
+        self._forced = hasattr(item, "energy") or self.resists
+        pairs = np.unique(dofs // 2) if self._forced else dofs[:0]
+        self._dofs = (2 * pairs[:, None] + np.arange(2)).ravel()
+        self.links = [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in pairs]
+        self._mass = None if not hasattr(item, "mass") else _entries(
+            f"mass() of {item!r}", item.mass(), layout.N)
+        if self._forced:
+            self.changing = self._is_sparse(layout)
+            try_force(self, layout.sizes[self._dofs].reshape(-1, 2))
+
+    def _is_sparse(self, layout):
+        if not hasattr(self.item, "stiffness"):
+            return False
+        zero = np.zeros(layout.N)
+        past = (self.item.start(), 0.0) if hasattr(self.item, "start") else ()
+        return sparse.issparse(self.item.stiffness(zero, zero, 0.0, *past))
+
+    def _whole(self, x):
+        out = np.zeros(self._N, dtype=np.asarray(x).dtype)
+        out[self._dofs] = np.ravel(x)
+        return out
+
+    def _evaluate(self, x, v, t, history, dt):
+        force, after = self.item.evaluate(self._whole(x), self._whole(v), t, history, dt)
+        return self._at(force), after
+
+    def force(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        if past:
+            return self._evaluate(x, v, t, *past)[0]
+        if hasattr(self.item, "force"):
+            return self._at(self.item.force(self._whole(x), self._whole(v), t))
+        return -derivative(lambda y: self.item.energy(self._whole(y), t), np.asarray(x))
+
+    def _at(self, force):
+        found = np.asarray(force)
+        if found.shape != (self._N,):
+            raise InputError(f"the force of {self.item!r} must have the shape ({self._N},), got "
+                             f"{found.shape}")
+        return found[self._dofs].reshape(-1, 2)
+
+    def potential(self, x: Array, *past: Any) -> float | None:
+        """Energy at a history, or at a time without a memory."""
+        return float(self.item.energy(self._whole(x), *past)) if hasattr(
+            self.item, "energy") else None
+
+    def potential_at(self, x: Array, t: float) -> float | None:
+        return self.potential(x, t)
+
+    def _derivative_by(self, name, x, v, t, otherwise, *past):
+        if not hasattr(self.item, name):
+            return sparse.csr_array((x.size, x.size)) if self.changing else otherwise()
+        found = getattr(self.item, name)(self._whole(x), self._whole(v), t, *past)
+        matrix = sparse.csr_array(found)[self._dofs][:, self._dofs]
+        n = len(self._dofs) // 2
+        return matrix if self.changing else matrix.toarray().reshape(n, 2, n, 2)
+
+    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Any:
+        return self._derivative_by("stiffness", x, v, t, lambda: derivative(
+            lambda y: self.force(y, v, t, *past), x), *past)
+
+    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Any:
+        if not (self.resists or self.changing):
+            return np.zeros((len(x), 2, len(x), 2))
+        return self._derivative_by("damping", x, v, t, lambda: derivative(
+            lambda w: self.force(x, w, t, *past), v), *past)
+
+    def mass_entries(self) -> tuple[Array, Array, Array] | None:
+        return self._mass
+
+    def parts(self) -> list[Any] | None:
+        return None if self._forced else []
+
+    def __repr__(self) -> str:
+        return repr(self.item)
+
+
+class UserConstraint(BoundConstraint):
+    """The constraint of a user-defined item."""
+
+    constant = tabled = False
+
+    def __init__(self, item: Any, layout: Layout) -> None:
+        self.item, self.moving, self.name, self._key = item, item.moving, item.name, item._key
+        zero = np.zeros(layout.N)
+        value = item.constraint(zero, 0.0)
+        m = len(require_finite(f"constraint(u, t) of {item!r}", value, (None,)))
+        self.equations = tuple(f"equation {k}" for k in range(m))
+        require_finite(f"jacobian(u, t) of {item!r}", self.jacobian(zero, 0.0), (m, layout.N))
+        at_generic_displacements(partial(require_derivatives, self, layout.sizes), layout.sizes)
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.asarray(self.item.constraint(u, t))
+
+    def jacobian(self, u: Array, t: float) -> Array:
+        if hasattr(self.item, "jacobian"):
+            found = self.item.jacobian(u, t)
+            return found.toarray() if sparse.issparse(found) else np.asarray(found)
+        return super().jacobian(u, t)
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        rows = np.flatnonzero(np.any(self.jacobian(u, t) != 0.0, axis=0))
+
+        def pulled(x: Array) -> Array:
+            w = np.asarray(u, dtype=x.dtype).copy()
+            w[rows] = x
+            return multipliers @ self.jacobian(w, t)
+
+        H = derivative(pulled, u[rows])
+        i, j = np.nonzero(H)
+        return i, rows[j], H[i, j]
+
+    def __repr__(self) -> str:
+        return repr(self.item)
+
+
+def _entries(what, matrix, N):
+    """Rows, columns and values of a matrix, checked."""
+    found = sparse.coo_array(matrix)
+    if found.shape != (N, N):
+        raise InputError(f"{what} must have the shape ({N}, {N}), got {found.shape}")
+    require_entries(what, found.row, found.col, found.data, N)
+    return found.row, found.col, found.data
+
+
+def user_parts(item: Any, layout: Layout, force: bool = True) -> list[Any]:
+    """The force and the constraint that a bound item has; ``force`` False leaves out the first."""
+    out: list[Any] = []
+    if force and any(hasattr(item, name) for name in ("energy", "force", "mass", "evaluate")):
+        out.append(UserForce(item, layout))
+    if hasattr(item, "constraint"):
+        out.append(UserConstraint(item, layout))
+    return out
