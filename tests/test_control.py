@@ -66,9 +66,28 @@ def test_samples_that_are_held():
     at = np.searchsorted(history.t, dt * np.arange(1, 21) - 1e-9)
     assert_allclose(history.t[at], dt * np.arange(1, 21), atol=1e-12)
     assert_allclose(angle(history, at), expected, atol=3e-3 * np.ptp(expected))
-    held = history.system.forces.sampled[0].held
+    held = np.unique([state.memory[1:] for state in history], axis=0)
     assert_allclose(held[:, 0], dt * np.arange(20), atol=1e-12)
     assert_allclose(held[:, 1], torques, atol=1e-2 * np.ptp(torques))
+
+
+def test_a_state_keeps_the_sample_of_its_motion():
+    """The force on it is the one that was held, whatever the scene has done since."""
+    scene = Scene(beam_of(ElementBeamCable(3), modulus=1e7)).clamp("left").control(
+        lambda t, tip: (0.0, 0.1 - 3.0 * tip.position[1]), (1, 0), points={"tip": (1, 0)}, dt=0.013)
+    history = scene.integrate(0.1, 1e-3)
+    state, other = history.state(80), scene.solve_static()
+    force = scene.matrices(state).force
+    scene.integrate(0.1, 1e-3, start=other)
+    assert np.array_equal(scene.matrices(state).force, force)
+    k = 78  # the last sample before
+    assert_allclose(state.memory[1:], [0.078, 0.0, 0.1 - 3.0 * history.position((1, 0))[k, 1]],
+                    atol=1e-12)
+    # balance at the end: M a is the force of elements and control
+    M = scene.matrices(state).M
+    assert_allclose(force[-6:], (M @ state.acceleration)[-6:], atol=2e-2 * np.abs(force).max())
+    # held from here: a motion that goes on takes a new sample
+    assert scene.integrate(0.11, 1e-3, start=state).state(1).memory[1] == pytest.approx(0.08)
 
 
 def test_a_force_on_a_point_that_another_measures():

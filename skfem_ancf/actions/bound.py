@@ -200,6 +200,8 @@ class BoundForce(Bound):
     groups: Any = ()
     entries: tuple[Array, Array] | None = None
     changing = False
+    #: Steps and increments change its history, if it has one; else only samples do.
+    evolves = True
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         """Force on each point, (n, 2); on section directions the conjugate force."""
@@ -370,6 +372,8 @@ class Remembering:
 
     def accept(self, x: Array, y: Array, v: Array, t: float) -> float:
         """Set the history at the end of an increment from x to y; returns what it dissipates."""
+        if not self.element.evolves:
+            return 0.0
         dt, after = float(self.span[0]), self.evaluate(y, v, t)[1]
         mean = self.mean_force(x, y, t - 0.5 * dt, dt or TINY)
         lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
@@ -381,6 +385,12 @@ class Remembering:
         """As :meth:`accept` in statics, between displacements (N,)."""
         x, y = (positions(self, w) for w in (u0, u))
         return self.accept(x, y, 0.0 * y, t)
+
+    def sample(self, u: Array, v: Array, t: float, first: bool) -> None:
+        """Set the history after a measurement at u and v (N,), if due; ``first`` is anew."""
+        w = np.array([link(v) - link.start for link in self.element.links])
+        self._values[:] = self.element.sample(positions(self, u), w, t,
+                                              self.start if first else self.history)
 
     def relax(self, u: Array) -> None:
         """Set a history with less stiffness, of contact between members at u (N,)."""

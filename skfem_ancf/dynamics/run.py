@@ -255,8 +255,8 @@ class Run:
     def begin(self, u: Array, v: Array, history: Array | None = None,
               turns: Array | None = None) -> None:
         """Start with a displacement and a velocity."""
-        self._sample(u, v, self.task.t_start, True)
-        self.y = self._start(u, v, history)
+        t = self.task.t_start
+        self.y = self._start(u, v, self.system.histories.sampled(u, v, t, history, True))
         if turns is None or len(turns) != self._turns.number:
             turns = self._turns.begin(self.y.u)
         self._follow(turns, self.y)
@@ -275,12 +275,6 @@ class Run:
         if self._sizes is not None and "averages" in arrays:
             self._size = min(float(arrays["size"]), self.task.span)
             self._sizes.load(arrays)
-
-    def _sample(self, u, v, t, first):
-        """Evaluate sampled controllers that are due."""
-        s = self.system
-        if s.forces.sampled:
-            s.forces.sample(s.backend.tables.plain.forces, u, v, t, first)
 
     def _start(self, u, v, history):
         """The Motion at the start of a segment."""
@@ -328,8 +322,8 @@ class Run:
         if self._sizes is not None:
             self._size = FIRST * self.task.span
             self._sizes.begin()
-        self._sample(y.u, y.v, self._begun, False)
-        turned = self._start(y.u, y.v, y.history)
+        turned = self._start(y.u, y.v, self.system.histories.sampled(
+            y.u, y.v, self._begun, y.history, False))
         turned.dissipated = y.dissipated
         return self._follow(y.turns, turned)
 
@@ -527,8 +521,6 @@ class Run:
         found = self.integrator.arrays() | {"size": np.array(self._size)}
         if self._sizes is not None:
             found |= self._sizes.arrays()
-        for k, control in enumerate(self.system.forces.sampled):
-            found[f"held {k}"] = control.held
         found["counts"] = np.array([self._segment, self._n, self._next, self.steps, self.rejected])
         return found
 
@@ -539,8 +531,6 @@ class Run:
         self.integrator.load(arrays)
         if self._sizes is not None:
             self._sizes.load(arrays)
-        for k, control in enumerate(self.system.forces.sampled):
-            control.hold(arrays[f"held {k}"])
         counts = map(int, arrays["counts"])
         self._segment, self._n, self._next, self.steps, self.rejected = counts
         self._size = float(arrays["size"])

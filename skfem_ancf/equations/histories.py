@@ -53,9 +53,9 @@ class Histories:
             key: slice(a, b) for key, a, b in zip(keys, ends, ends[1:])}
         self._end = ends[len(some)]
         self.rest = np.concatenate([np.zeros(self._end), *(item.start for item in items)])
-        self.evolve = bool(some or items)
+        self.evolve = bool(some) or any(item.element.evolves for item in items)
         lasting = forces.contacts.tables.lasting
-        self.lasting = int(lasting > 0 or self.evolve) + 2 * bool(some)
+        self.lasting = int(lasting > 0 or bool(some or items)) + 2 * bool(some)
         self.dissipates = lasting not in (0, TURNS) or self.evolve
         self._have(forces, first, None, 0.0)
 
@@ -118,6 +118,18 @@ class Histories:
         if self.forces.contacts.obstacles:
             self.forces.contacts.begin(u, t, anew)
         return self.get()
+
+    def sampled(self, u: Array, v: Array, t: float, history: Array | None,
+                first: bool) -> Array | None:
+        """A history after what controllers measure at t, if it is time to; ``first``, all do."""
+        if not self.forces.sampled:
+            return history
+        now = self.after(history)
+        if history is None:
+            now.begin(u, t, True)
+        for item in now.forces.sampled:
+            item.sample(u, v, t, first)
+        return now.values
 
     def accept(self, u0: Array, u: Array, t: float) -> tuple[Array | None, float]:
         """The history after an increment in statics from u0 to u, and what it dissipates."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...beam.layout import Layout, WhichBeam
 from ...beam.rigid import RigidBody
@@ -69,6 +67,7 @@ class Control(ForceElement):
     """
 
     symmetric = False
+    evolves = False
 
     def __init__(self, law: Callable[..., Any], at: Any, kind: str = "force", other: Any = None,
                  points: Mapping[str, Any] | None = None,
@@ -99,7 +98,8 @@ class Control(ForceElement):
         places = [self._point(layout, place) for _, place in self.points]
         directions = [self._section(layout, place) for _, place in self.sections]
         self._ends = len(ends)
-        self._held: list[tuple[float, Any]] = []
+        if self.dt is not None:
+            self.start, self.evaluate = self._at_rest, self._held
         self._starts = [d.start for d in directions]
         return [*ends, *places, *directions]
 
@@ -119,7 +119,7 @@ class Control(ForceElement):
             raise InputError("the ground does not turn: leave other= out for a moment from there")
         return section(layout, which, at)[1]
 
-    # forces
+    # measurements
 
     def measured(self, x: Array, v: Array) -> dict[str, Any]:
         """Measurements by name."""
@@ -143,31 +143,33 @@ class Control(ForceElement):
             return ask_number("law(t = {:g})", lambda t: self.law(t, **values), float(t))
         return ask_array("law(t = {:g})", (2,), lambda t: self.law(t, **values), float(t))
 
-    def sample(self, x: Array, v: Array, t: float) -> None:
-        """Evaluate the law and hold its value, if it is time to."""
-        if self.dt is None:
-            return
-        if not self._held or t >= self._held[-1][0] + (1.0 - ROUND_OFF) * self.dt:
-            self._held.append((float(t), self.ask(x, v, t)))
+    # with a sampling time it has a history: 1 after a sample, its time and its value
 
-    @property
-    def held(self) -> Array:
-        """Sampling times and held values, shape (n, 2) or (n, 3)."""
-        return np.array([np.append(t, value) for t, value in self._held])
+    def _at_rest(self):
+        return np.zeros(3 if self.kind == "moment" else 4)
 
-    def hold(self, held: ArrayLike) -> None:
-        """Restore held values of another run, from :attr:`held`; (n, 2) or (n, 3)."""
-        moment = self.kind == "moment"
-        self._held[:] = [(float(row[0]), float(row[1]) if moment else row[1:])
-                         for row in np.asarray(held)]
+    def _held(self, x, v, t, history, dt):
+        """Force by the last sample; before the first one, as in statics, by the law."""
+        value = self.ask(x, v, t) if history[0] == 0.0 else (
+            history[2] if self.kind == "moment" else history[2:])
+        return self._on_ends(x, value), history
 
-    def force(self, x: Array, v: Array, t: float) -> Array:
+    def sample(self, x: Array, v: Array, t: float, history: Array) -> Array:
+        """The history after a measurement at t, if one is due."""
+        due = history[0] == 0.0 or t >= history[1] + (1.0 - ROUND_OFF) * (self.dt or 0.0)
+        return np.append((1.0, t), self.ask(x, v, t)) if due else history
+
+    def mean(self, x: Array, y: Array, t: float, history: Array, dt: float) -> Array:
+        """The force (n, 2) in the middle of a step."""
+        return self._held(0.5 * (x + y), 0.0 * x, t, history, dt)[0]
+
+    # forces
+
+    def force(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        return self._held(x, v, t, *past)[0] if past else self._on_ends(x, self.ask(x, v, t))
+
+    def _on_ends(self, x, value):
         out = np.zeros(np.shape(x))
-        if self.dt is None or not self._held:
-            value = self.ask(x, v, t)
-        else:
-            k = bisect_right(self._held, t, key=lambda sample: sample[0])
-            value = self._held[max(k - 1, 0)][1]
         if self.kind == "moment":
             g = np.empty((4, 1))
             turning(np.reshape(x[:2], (4, 1)), g)
@@ -178,11 +180,11 @@ class Control(ForceElement):
                 out[1] = -np.asarray(value)
         return out
 
-    def stiffness(self, x: Array, v: Array, t: float) -> Array:
-        return differences(lambda y: self.force(y, v, t), x)
+    def stiffness(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        return differences(lambda y: self.force(y, v, t, *past), x)
 
-    def resistance(self, x: Array, v: Array, t: float) -> Array:
-        return differences(lambda w: self.force(x, w, t), v)
+    def resistance(self, x: Array, v: Array, t: float, *past: Any) -> Array:
+        return differences(lambda w: self.force(x, w, t, *past), v)
 
     def symbols(self, layout: Layout) -> Iterable[Symbol]:
         yield Symbol("control", (self._point(layout, self.at),), text=f"{self.kind}(t, ...)")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from ..contact.contacts import NO_CONTACTS, Contacts
 from ..places import Vector
 from ..bound import BoundForce, Remembering, recalled
 from .base import KernelElement
-from .control import Control
 from .inertia import RotatingFrame
 from .kernels import (ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING, TORSION,
                       ForceTables, element_stiffness, potential, run_kinds, vectors_of)
@@ -230,20 +228,10 @@ class Forces:
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
             for element, (rows, _) in zip(self.custom, self._slices))
 
-    @cached_property
-    def sampled(self) -> list[Control]:
+    @property
+    def sampled(self) -> list[Any]:
         """Controls with a sampling time."""
-        return [e for e in self.custom if isinstance(e, Control) and e.dt is not None]
-
-    def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
-        """Evaluate sampled controls that are due; ``first`` clears held values."""
-        y, w = self.vectors(tables, u), np.empty(self.rows)
-        vectors_of(tables, v, 0.0, w)
-        for element, (rows, _) in zip(self.custom, self._slices):
-            if isinstance(element, Control):
-                if first:
-                    element.hold(())
-                element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t)
+        return [e for e in self.remembering if hasattr(e.element, "sample")]
 
     def rows_of(self, element: BoundForce) -> Array:
         """Positions of the parts of an element among all, in its order; shape (n,)."""
