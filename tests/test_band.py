@@ -17,26 +17,17 @@ def matrix(n, width, storage, sign):
         D = D + D.T
     D += np.diag((3 * width + 4) * np.where(rng.random(n) < 0.3, sign, 1))
     i, j = np.nonzero(np.tril(D) if storage == "symmetric" else D)
-    if storage != "halves":
-        found = band.BandMatrix.zeros(n, width, symmetric=storage == "symmetric")
-        found.add(i, j, D[i, j])
-        return D, found
-    A = band.halves(n, width)
-    columns = A.flat.reshape(n, 2, -1)
-    low = i >= j
-    columns[j[low], 0, (i - j)[low]] = D[i[low], j[low]]
-    low = i <= j
-    columns[i[low], 1, (j - i)[low]] = D[i[low], j[low]]
-    return D, A
+    found = band.BandMatrix.zeros(n, width, symmetric=storage == "symmetric")
+    found.add(i, j, D[i, j])
+    return D, found
 
 
 def check(storage, sign, multiply, factorize, solve):
     for n, width in SIZES:
         D, A = matrix(n, width, storage, sign)
         x, y = np.random.default_rng(1).standard_normal(n), np.empty(n)
-        if storage != "halves":
-            multiply(A, x, y)
-            assert np.allclose(y, D @ x, rtol=0.0, atol=1e-12 * np.abs(D).max())
+        multiply(A, x, y)
+        assert np.allclose(y, D @ x, rtol=0.0, atol=1e-12 * np.abs(D).max())
         assert factorize(A)
         z = x.copy()
         solve(A, z)
@@ -44,14 +35,14 @@ def check(storage, sign, multiply, factorize, solve):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("storage", ["symmetric", "both", "halves"])
+@pytest.mark.parametrize("storage", ["symmetric", "both"])
 def test_bands_are_the_dense_matrices(storage, sign):
     check(storage, sign, band.multiply, band.factorize, band.solve)
 
 
 @pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("storage", ["symmetric", "both", "halves"])
+@pytest.mark.parametrize("storage", ["symmetric", "both"])
 def test_compiled_bands_are_the_dense_matrices(storage, sign, compiled):
     check(storage, sign, *compiled)
 

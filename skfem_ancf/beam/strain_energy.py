@@ -305,9 +305,9 @@ def add_force_by(body, copies, gradients, stresses, f):
 
 @source
 def add_unsymmetric(body, u, v, U):
-    """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
+    """Add ``B(u)^T D (B(v) - B(u))`` to an unsymmetric band matrix."""
     for k in range(body.table.shape[0]):
-        run_unsymmetric(tables_of(body, k), u, v, U.flat, U.ld)
+        run_unsymmetric(tables_of(body, k), u, v, U.flat[U.top:], U.ld)
 
 
 @source

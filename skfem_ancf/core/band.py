@@ -1,10 +1,8 @@
 """Band matrices of chains of elements, for kernels and with LAPACK.
 
 Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, with :data:`SPARE` zeros after each
-column; L D L^T factors replace it. In two halves (``top`` < 0): each column of the lower half, then
-that of the transpose; L D R^T factors of compiled code replace it, or the pivoted ones of LAPACK's
-``gbtrf``. Otherwise entry (i, j) is at ``j * ld + top + i - j``, the storage of ``gbtrf``, whose
-factors replace it.
+column; L D L^T factors replace it. Unsymmetric (``top`` > 0): entry (i, j) at ``j * ld + top + i -
+j``, the storage of LAPACK's ``gbtrf``, whose factors replace it.
 """
 
 from __future__ import annotations
@@ -26,8 +24,6 @@ from .types import Array
 SPARE = 6
 #: Relative size of a pivot that is round-off.
 LOST = 1e-13
-#: ``top`` of a matrix in two halves.
-HALVES = -1
 #: Relative squared remainder of a redundant equation.
 REPEATED = 1e-13
 #: Eigenvalue that is round-off, for a unit diagonal.
@@ -181,7 +177,8 @@ class BandMatrix(Band):
     def general(self) -> BandMatrix:
         """A copy with both halves stored."""
         out = BandMatrix.zeros(self.n, self.width, symmetric=False)
-        as_lapack(out)[:] = _whole(self) if self.symmetric else as_lapack(self)
+        i, j, values = _entries(self)
+        out.flat[out.position(i, j)] = values
         return out
 
     def solve(self, b: Array) -> Array:
@@ -331,37 +328,14 @@ def _entries(A):
         j, k = np.nonzero(rows)
         return j + k - w, j, rows[j, k]
     j, k = np.nonzero(rows[:, :w + 1])
-    upper = rows if A.top == 0 else rows[:, A.ld // 2:]
-    i, below = j + k, k > 0
-    return (np.append(i, j[below]), np.append(j, i[below]),
-            np.append(rows[j, k], upper[j[below], k[below]]))
-
-
-def halves(n: int, bandwidth: int) -> Band:
-    """A zero unsymmetric :class:`Band` of n rows, stored in two halves."""
-    ld = 2 * max(bandwidth + 1 + SPARE, (3 * bandwidth + 2) // 2)  # space for gbtrf too
-    return Band(np.zeros(n * ld), np.zeros(n, np.int64), ld, bandwidth, HALVES)
+    i, values, below = j + k, rows[j, k], k > 0
+    return (np.append(i, j[below]), np.append(j, i[below]), np.append(values, values[below]))
 
 
 def as_lapack(A: Band) -> Array:
     """LAPACK's band storage, a view of shape (rows, n)."""
     ab = A.flat.reshape(-1, A.ld).T
     return ab if A.top > 0 else ab[:A.width + 1]
-
-
-def _pivoted(A):
-    """Storage of ``gbtrf``, in which NumPy's factors of two halves are left."""
-    return A.flat.reshape(-1, A.ld).T[:3 * A.width + 1]
-
-
-def _whole(A):
-    """A symmetric matrix, or one in two halves, in the storage of ``gbtrf``."""
-    n, w = len(A.flat) // A.ld, A.width
-    columns, out = A.flat.reshape(n, A.ld), np.zeros((3 * w + 1, n))
-    out[2 * w:] = columns[:, :w + 1].T
-    for k in range(1, min(w + 1, n)):
-        out[2 * w - k, k:] = columns[:n - k, (A.ld // 2 if A.top < 0 else 0) + k]
-    return out
 
 
 @primitive("skfem_ancf.core.loops")
@@ -398,11 +372,10 @@ def factorize(A):
             return False
         if A.lu is not None:
             return True
-    if A.top != 0:
-        ab, whole = (_pivoted(A), _whole(A)) if A.top < 0 else 2 * (as_lapack(A),)
-        ab[:], A.pivots[:], info = lapack.dgbtrf(whole, A.width, A.width)
-        return bool(info == 0 and np.all(np.isfinite(ab[2 * A.width])))
     ab = as_lapack(A)
+    if A.top > 0:
+        ab[:], A.pivots[:], info = lapack.dgbtrf(ab, A.width, A.width)
+        return bool(info == 0 and np.all(np.isfinite(ab[A.top])))
     c, info = lapack.dpbtrf(ab, lower=1)
     if info != 0:
         return _eliminate(A)
@@ -532,14 +505,12 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
     if isinstance(A, CoupledBand) and A.lu is not None:
         X[:] = A.lu.solve(B.T.copy()).T
         return
-    if A.top > 0 or A.pivots[-1:].any():
-        ab = _pivoted(A) if A.top < 0 else as_lapack(A)
+    ab = as_lapack(A)
+    if A.top > 0:
         X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T
         return
-    ab, first = as_lapack(A), A.ld // 2 if A.top < 0 else 0
-    rows = A.flat.reshape(-1, A.ld).T[first:first + A.width + 1]
     y = lapack.dtbtrs(ab, B.T, uplo="L", diag="U")[0] / ab[0][:, None]
-    X[:] = lapack.dtbtrs(rows, y, uplo="L", trans="T", diag="U")[0].T
+    X[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].T
 
 
 @primitive("skfem_ancf.core.loops")
@@ -604,21 +575,22 @@ def mirror(A):
 
 
 @source
-def add_halves(A, factor, U):
-    """U = A + factor U, where U stores two halves."""
-    n, m, top = A.flat.size // A.ld, A.width + 1, A.top
-    rows, both = shaped(A.flat, (n, A.ld)), shaped(U.flat, (n, 2, U.ld // 2))
-    if top > 0:
-        for k in range(min(m, n)):
-            later = rows[k:]
-            for j in indices(n - k):
-                both[j, 0, k] = rows[j, top + k] + factor * both[j, 0, k]
-                both[j, 1, k] = later[j, top - k] + factor * both[j, 1, k]
-        return
-    for i in range(2):
+def add_scaled(A, factor, U):
+    """U = A + factor U, where U is unsymmetric."""
+    n, top = A.flat.size // A.ld, U.top
+    rows, both = shaped(A.flat, (n, A.ld)), shaped(U.flat, (n, U.ld))
+    if A.top > 0:
         for j in indices(n):
-            for k in indices(m):
-                both[j, i, k] = rows[j, k] + factor * both[j, i, k]
+            for k in indices(U.ld):
+                both[j, k] = rows[j, k] + factor * both[j, k]
+        return
+    for k in range(min(A.width + 1, n)):
+        later = both[k:]
+        for j in indices(n - k):
+            both[j, top + k] = rows[j, k] + factor * both[j, top + k]
+        if k > 0:
+            for j in indices(n - k):
+                later[j, top - k] = rows[j, k] + factor * later[j, top - k]
 
 
 @source
@@ -631,14 +603,12 @@ def fix(A, fixed):
 def fix_stored(flat, ld, width, top, fixed):
     """:func:`fix` for stored entries."""
     n, k = flat.size // ld, np.arange(1, width + 1)
-    at, back = fixed[:, None] * ld + max(top, 0), k * (ld - 1)
+    at, back = fixed[:, None] * ld + top, k * (ld - 1)
     before, after = k <= fixed[:, None], k < n - fixed[:, None]
     flat.reshape(n, ld)[fixed] = 0.0
     flat[(at - back)[before]] = 0.0
     if top > 0:
         flat[(at + back)[after]] = 0.0
-    if top < 0:
-        flat[(at + ld // 2 - back)[before]] = 0.0
     flat[at] = 1.0
 
 

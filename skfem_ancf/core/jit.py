@@ -153,6 +153,7 @@ class Record(types.NamedTuple):
     dtype = types.int64  # of the words
 
     def __init__(self, kind: Any) -> None:
+        kind = next(one for one in kind.__mro__ if "_fields" in vars(one))  # not a subclass
         super().__init__([type_of(hint) for hint in hints(kind)], kind)
         sizes = [size_of(hint) for hint in hints(kind)]
         self.name = f"Record({kind.__module__}.{kind.__qualname__})"

@@ -27,16 +27,14 @@ def multiply(A, x, y):
 
 
 def factorize(A):
-    if A.top == 0:
-        return factorize_lower(A.flat, A.ld, A.width) > 0
-    return (exchange(A) if A.top > 0 else factorize_halves(A)) > 0
+    return (exchange(A) if A.top > 0 else factorize_lower(A.flat, A.ld, A.width)) > 0
 
 
 def solve(A, x):
     if A.top > 0:
         solve_exchanged(A, x)
     else:
-        solve_lower(A.flat, A.ld, A.width, A.ld // 2 if A.top < 0 else 0, x)
+        solve_lower(A.flat, A.ld, A.width, x)
 
 
 def solve_joined(A, J, J1, free, anew, Y, S, b, x):
@@ -129,26 +127,9 @@ def factorize_lower(A, ld, width):
     return 1
 
 
-@apart("bands", Band, returns=int)
-def factorize_halves(A):
-    n = A.flat.size // A.ld
-    L = A.flat.reshape(n, 2, A.ld // 2)  # entry i of half h of column j
-    for j in range(n):
-        m, d = min(A.width, n - 1 - j), L[j, 0, 0]
-        if not 0.0 < abs(d) < np.inf:
-            return 0
-        inverse = 1.0 / d
-        for k in range(1, m + 1):
-            before, c, d = L[j + k, 0, 0], L[j, 1, k] * inverse, L[j, 0, k] * inverse
-            for i in range(m + 1 - k):
-                L[j + k, 0, i] -= c * L[j, 0, k + i]
-                L[j + k, 1, i] -= d * L[j, 1, k + i]
-            if not abs(L[j + k, 0, 0]) > LOST * abs(before):
-                return 0
-        for k in range(1, m + 1):
-            L[j, 0, k] *= inverse
-            L[j, 1, k] *= inverse
-    return 1
+#: Size of a diagonal entry, relative to the largest below it, that serves as a pivot. LAPACK takes
+#: the largest; with fewer exchanges the factors are narrower.
+PIVOT = 1e-2
 
 
 @apart("bands", Band, returns=int)
@@ -158,32 +139,32 @@ def exchange(A):
     n = A.flat.size // ld
     flat, last = A.flat, 0
     for j in range(n):
-        at, m, p = j * ld + top, min(width, n - 1 - j), 0
-        for i in range(1, m + 1):
-            if abs(flat[at + i]) > abs(flat[at + p]):
-                p = i
+        at, m, p = U(j * ld + top), U(min(width, n - 1 - j)), U(0)
+        most = abs(flat[at]) / PIVOT
+        for i in range(I, m + I):
+            if abs(flat[at + i]) > most:
+                p, most = i, abs(flat[at + i])
         A.pivots[j] = j + p
         if not abs(flat[at + p]) > 0.0 or not abs(flat[at + p]) < np.inf:
             return 0
         last = max(last, min(j + width + p, n - 1))
         if p != 0:
             for c in range(j, last + 1):
-                row = c * ld + top + j - c
+                row = U(c * (ld - 1) + top + j)
                 flat[row], flat[row + p] = flat[row + p], flat[row]
         inverse = 1.0 / flat[at]
-        for i in range(1, m + 1):
+        for i in range(I, m + I):
             flat[at + i] *= inverse
         for c in range(j + 1, last + 1):
-            row = c * ld + top + j - c
+            row = U(c * (ld - 1) + top + j)
             x = flat[row]
-            if x != 0.0:
-                for i in range(1, m + 1):
-                    flat[row + i] -= flat[at + i] * x
+            for i in range(I, m + I):
+                flat[row + i] -= flat[at + i] * x
     return 1
 
 
-@apart("band", F1, int, int, int, F1)
-def solve_lower(A, ld, width, half, x):
+@apart("band", F1, int, int, F1)
+def solve_lower(A, ld, width, x):
     n = x.size
     last = n - n % 4
     for j in range(0, last, 4):
@@ -203,10 +184,9 @@ def solve_lower(A, ld, width, half, x):
         x[j] /= A[j * ld]
     for j in range(n - 1, last - 1, -1):
         for k in range(1, n - j):
-            x[j] -= A[j * ld + half + k] * x[j + k]
+            x[j] -= A[j * ld + k] * x[j + k]
     for j in range(last - 4, -1, -4):
-        at = j * ld + half
-        p, q, r, s, t = U(at), U(at + ld), U(at + 2 * ld), U(at + 3 * ld), U(j + 4)
+        p, q, r, s, t = U(j * ld), U(j * ld + ld), U(j * ld + 2 * ld), U(j * ld + 3 * ld), U(j + 4)
         f, g, h, i = p + U(4), q + K, r + J, s + I
         a, b, c, d = x[j], x[j + 1], x[j + 2], x[j + 3]
         for k in range(U(min(width, n - 4 - j))):
@@ -226,18 +206,19 @@ def solve_exchanged(A, x):
     """As LAPACK's gbtrs."""
     flat, ld, top, n, reach = A.flat, A.ld, A.top, x.size, A.width
     for j in range(n):
-        p = A.pivots[j]
+        p, at, b = A.pivots[j], U(j * ld + top), U(j)
         reach = max(reach, A.width + p - j)  # bandwidth of U
         x[j], x[p] = x[p], x[j]
         xj = x[j]
-        for i in range(1, min(A.width, n - 1 - j) + 1):
-            x[j + i] -= flat[j * ld + top + i] * xj
+        for i in range(I, U(min(A.width, n - 1 - j)) + I):
+            x[b + i] -= flat[at + i] * xj
     for j in range(n - 1, -1, -1):
-        at = j * ld + top
-        x[j] /= flat[at]
+        m = min(reach, j)
+        at, b = U(j * ld + top - m), U(j - m)
+        x[j] /= flat[at + U(m)]
         xj = x[j]
-        for i in range(j - min(reach, j), j):
-            x[i] -= flat[at - j + i] * xj
+        for i in range(U(m)):
+            x[b + i] -= flat[at + i] * xj
 
 
 def factorize_complex(A, width):
@@ -542,15 +523,11 @@ def everywhere(condition):
 def fix_stored(flat, ld, width, top, fixed):
     n, step = flat.size // ld, max(1, ld - 1)
     for i in fixed:
-        at = i * ld + max(top, 0)
+        at = i * ld + top
         flat[i * ld:(i + 1) * ld] = 0.0
         for k in range(at - step * min(width, i), at, step):
             flat[k] = 0.0
         if top > 0:
             for k in range(at + step, at + step * min(width, n - 1 - i) + 1, step):
-                flat[k] = 0.0
-        if top < 0:
-            back = at + ld // 2
-            for k in range(back - step * min(width, i), back, step):
                 flat[k] = 0.0
         flat[at] = 1.0

@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..actions.tables import constraint, joint_directions
-from ..core.band import CoupledBand, halves
+from ..core.band import BandMatrix, CoupledBand
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
 from ..core.types import Array
@@ -116,7 +116,7 @@ class Integrator:
         if in_steps(scheme) and system.mass_solver.by_nodes:
             self._nodes = Condensed(system, A), CondensedMass(system)
         unsymmetric = scheme.conserving and self._nodes is None
-        U = halves(system.N if unsymmetric else 0, system.bandwidth)
+        U = BandMatrix.zeros(system.N if unsymmetric else 0, system.bandwidth, symmetric=False)
         self._matrices = Matrices(M, system.mass_solver.factors, _coupled(A, system),
                                   _coupled(U, system), *_damping(system))
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
@@ -282,9 +282,6 @@ class Integrator:
             self.dt, state.factors[0] = dt, 0
         state.last_dt[0], state.failure[0], state.dissipated[0] = y.before, 0, y.dissipated
         call = self._backend.of(function, OF_STEP * len(rows), calls=True)
-        pivots = self._matrices.U.pivots
-        if pivots.any() and not isinstance(call, partial):  # compiled code has none
-            pivots[:], state.factors[0] = 0, 0
         try:
             s.histories.put(y.history)
             with np.errstate(all="ignore"):

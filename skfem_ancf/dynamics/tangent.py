@@ -8,7 +8,7 @@ from ..actions.tables import (add_curvature_force, add_joint_force, add_load_sti
                               add_products, joint_directions, mean_external_force)
 from ..beam.strain_energy import (add_force_of, add_unsymmetric, body_force, body_linearised,
                                   body_mean, body_mixed, body_stress, body_tangent)
-from ..core.band import (add_halves, add_multiple, clear, copy, dot, factorize, fix, multiply,
+from ..core.band import (add_multiple, add_scaled, clear, copy, dot, factorize, fix, multiply,
                          subtract_rows)
 from ..core.callbacks import call_solver, custom_joints
 from ..core.source import apart, indices, source
@@ -266,5 +266,5 @@ def _unsymmetric_tangent(e, matrices, rule, s, w, state):
     copy(w.x.u, w.x.ahead)
     clear(U.flat)
     add_unsymmetric(e.body, w.x.middle, w.x.ahead, U)
-    add_halves(matrices.A, s.stiffness_factor, U)
+    add_scaled(matrices.A, s.stiffness_factor, U)
     fix(U, e.fixed)

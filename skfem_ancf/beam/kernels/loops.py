@@ -137,7 +137,7 @@ def run_tangent(t, u, given, out, f, A, ld):
 
 @apart("unsymmetric", CompiledTables, F1, F1, F1, int)
 def run_unsymmetric(t, u, v, A, ld):
-    """Add ``B(u)^T H (B(v) - B(u))`` to a matrix in two halves."""
+    """Add ``B(u)^T H (B(v) - B(u))`` to a matrix, entry (i, j) at ``A[j * ld + i - j]``."""
     R, m, ns, n = t.G.shape[0], t.G.shape[1], t.pattern.rows.shape[1], 3 * t.G.shape[0] // 2
     du = v.copy()
     add_multiple(-1.0, u, du)
@@ -165,7 +165,7 @@ def run_unsymmetric(t, u, v, A, ld):
         if len(t.D) > 0:
             scale_products(block(t.D, first), K, 1)
             scale_products(block(t.D, first), Z, 0)
-        add_to_halves(t.start, first, ld, m, K, Z, A)
+        add_unsymmetric(t.start, first, ld, m, K, Z, A)
 
 
 @apart("unsymmetric", CompiledTables, F2, F2, F2, F2, F2)
@@ -187,22 +187,19 @@ def add_difference(t, H, X, D, w, z):
 
 
 @apart("unsymmetric", I1, int, int, int, F2, F2, F1)
-def add_to_halves(start, first, ld, m, K, Z, A):
-    """Add matrices to both halves."""
+def add_unsymmetric(start, first, ld, m, K, Z, A):
+    """Add matrices that are not symmetric."""
     for j in range(2 * m + 2):
         l, b, sj = place(j, m)
         for i in range(2 * m + 2):
             k, a, si = place(i, m)
             high, low, at = max(k, l), min(k, l), (2 * a + b) * W
-            p = j * ld + i - j if i >= j else i * ld + j - i + ld // 2
             for e in range(min(W, len(start) - first)):
                 x = K[high * (high + 1) // 2 + low, at + e]
                 if k != l:
                     y = Z[high * (high - 1) // 2 + low, at + e]
                     x += y if k > l else -y
-                A[start[first + e] * ld + p] += si * sj * x
-                if i == j:  # the diagonal is in both
-                    A[start[first + e] * ld + p + ld // 2] += si * sj * x
+                A[(start[first + e] + j) * ld + i - j] += si * sj * x
 
 
 # gradients of strains

@@ -130,14 +130,14 @@ def run_gradients(e, u, out):
 
 @kernel
 def run_unsymmetric(e, u, v, flat, ld):
-    """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
+    """Add ``B(u)^T D (B(v) - B(u))`` to a matrix, entry (i, j) at ``flat[j * ld + i - j]``."""
     _, d, one = e.at(u)
     two = e.at(v)[2]
     B, change = e.derivatives(e.directions(one, one)), e.derivatives(e.directions(two, two))
     K = B.transpose(0, 2, 1) @ (e.square(e.moduli_at(e.strain(d, one))) @ (change - B))
-    i, j = np.tril_indices(K.shape[1])
-    e.add_to_band(K[:, i, j].T, flat, ld)
-    e.add_to_band(K[:, j, i].T, flat[ld // 2:], ld)
+    j = np.arange(K.shape[1])
+    at = (e.t.start[:, None, None] + j) * ld + j[:, None] - j
+    flat += np.bincount(at.ravel(), K.ravel(), len(flat))
 
 
 def _shift(e, given):
