@@ -51,13 +51,6 @@ class Sweep:
     failures : list of Failure
         The members that failed, among them those whose values differ in names or shapes from those
         of the first.
-
-    Examples
-    --------
-    >>> from skfem_ancf import sweep
-    >>> result = sweep(lambda x: x, {"x": [1.0, 2.0]}, lambda x: {"square": x**2})
-    >>> result["square"], result["x"], result.failures
-    (array([1., 4.]), array([1., 2.]), [])
     """
 
     parameters: dict[str, Array]
@@ -114,8 +107,7 @@ def sweep(build: Callable[..., Any],
         What computes the members, instead of ``workers``: a ``dask.distributed.Client``, or an
         executor of ``concurrent.futures``, as of threads, of MPI or of joblib's loky.
     progress
-        Show a progress bar: True, False, or None: on a terminal, after a second, if tqdm is
-        installed.
+        Show a progress bar by tqdm: True, False, or None: on a terminal, after a second.
 
     Raises
     ------
@@ -306,18 +298,15 @@ def _arrays(members, found):
              "names and shapes must be those of all members" for one in found]
     values = {name: np.array([one[name] if isinstance(one, dict) else x * np.nan for one in found])
               for name, x in first.items()}
-    return Sweep({name: _column([member[name] for member in members]) for name in members[0]},
-                 values, [Failure(k, dict(members[k]), one) for k, one in enumerate(found)
-                          if isinstance(one, str)])
-
-
-def _column(values):
-    try:
-        return np.array(values)
-    except ValueError:  # rows of different lengths
-        column = np.empty(len(values), dtype=object)
-        column[:] = values
-        return column
+    columns = {}
+    for name in members[0]:
+        column = [member[name] for member in members]
+        try:
+            columns[name] = np.array(column)
+        except ValueError:  # rows of different lengths
+            columns[name] = np.fromiter(column, object, len(column))
+    return Sweep(columns, values, [Failure(k, dict(members[k]), one) for k, one in enumerate(found)
+                                   if isinstance(one, str)])
 
 
 __all__ = ["Failure", "Sweep", "sweep"]

@@ -56,18 +56,6 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
 
     Links are not followed, and the file mode is kept. With ``durable`` the new file, of the same
     suffix, is synchronised to disk first.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> from skfem_ancf.core.archive import replacing
-    >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "note.txt"
-    ...     with replacing(path) as new:
-    ...         size = new.write_text("whole")
-    ...     path.read_text()
-    'whole'
     """
     new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
     new.touch(0o600 if path.is_file() else 0o666, exist_ok=False)

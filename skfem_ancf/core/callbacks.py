@@ -135,7 +135,7 @@ def call_solver(handle, t, u, multipliers, R, phi, du, dm):
 
 #: Callbacks of compiled code by number, with one signature: a handle, a selector, a time, a factor
 #: and three arrays.
-_QUESTIONS = (
+_CALLBACKS = (
     lambda handle, what, t, scale, u, _, out: custom_force(handle, t, scale, u, out),
     lambda handle, what, t, _, u0, u1, out: custom_mean_force(handle, t, u0, u1, out),
     lambda handle, what, t, scale, u, _, flat: custom_load_stiffness(handle, t, scale, u, flat),
@@ -179,11 +179,11 @@ def _views(places, n):
 
 
 @apart(PYTHON, int, int, int, float, float, int)
-def ask(question, handle, what, t, x, places):
-    """Answer a question of compiled code with three arrays."""
+def ask(callback, handle, what, t, x, places):
+    """Answer a callback of compiled code with three arrays."""
     a, b, answer = _views(places, 3)
     try:
-        _QUESTIONS[question](handle, what, t, x, a, b, answer)
+        _CALLBACKS[callback](handle, what, t, x, a, b, answer)
     except BaseException:
         answer[:] = np.nan  # ends the iteration
         raise

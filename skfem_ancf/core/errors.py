@@ -118,12 +118,7 @@ class ConvergenceError(AncfError):
     message
         What did not converge, where, and what to change.
     state
-        The last converged state, or None.
-
-    Attributes
-    ----------
-    state
-        The last converged state, or None.
+        The last converged state, or None: an attribute.
     """
 
     def __init__(self, message: str, state: Any = None) -> None:
@@ -149,12 +144,7 @@ class Interrupted(KeyboardInterrupt):
     message
         Where the solution stopped.
     state
-        The result so far.
-
-    Attributes
-    ----------
-    state
-        The History or the Path so far, or the last converged State.
+        The History or the Path so far, or the last converged State: an attribute.
     """
 
     def __init__(self, message: str, state: Any = None) -> None:
@@ -375,11 +365,10 @@ SLOPE = 0.01
 
 def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
                   else_: str = "") -> None:
-    """Raise InputError unless ``slope`` is close to ``change``, a difference of a function.
+    """Raise InputError unless ``slope``, times a step, is close to ``change`` over that step.
 
-    ``what`` and ``of`` are names of derivative and function; ``change`` over a small step and
-    ``slope`` times that step are arrays of one shape, ``noise`` is the round-off; ``else_`` ends
-    the message.
+    ``what`` and ``of`` are names of derivative and function, ``noise`` is the round-off of the
+    change; ``else_`` ends the message.
     """
     change, slope = np.ravel(change), np.ravel(slope)
     off = np.abs(change - slope)
@@ -487,15 +476,6 @@ def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator
     """Convert any exception of the block to the error ``kind`` with a hint.
 
     ``what`` is formatted with ``of``. Errors of the package pass unchanged.
-
-    Examples
-    --------
-    >>> from skfem_ancf.core.errors import InputError, explained
-    >>> with explained("{} fails", "give a number", InputError, "f(x)"):  # doctest: +ELLIPSIS
-    ...     1 / 0
-    Traceback (most recent call last):
-    ...
-    skfem_ancf.core.errors.InputError: f(x) fails: ZeroDivisionError: ...; give a number
     """
     try:
         yield
@@ -508,16 +488,8 @@ def explained(what: str, hint: str, kind: type[AncfError], *of: Any) -> Iterator
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
     """Call a user's function; its exceptions become :class:`CallbackError`.
 
-    ``what`` describes the call and is formatted with the arguments. Errors of the package pass
-    unchanged.
-
-    Examples
-    --------
-    >>> from skfem_ancf.core.errors import ask
-    >>> ask("amplitude(t={:g})", lambda t: 1 / t, 0.0)  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    ...
-    skfem_ancf.core.errors.CallbackError: amplitude(t=0) raised ZeroDivisionError: ...
+    ``what`` describes the call, as "amplitude(t={:g})", and is formatted with the arguments. Errors
+    of the package pass unchanged.
     """
     try:
         return function(*args)
@@ -585,14 +557,13 @@ def warn(message: str, category: type[Warning]) -> None:
     warnings.warn(message, category, stacklevel=level)
 
 
-#: Synonyms in other packages. The first word of a key is the attribute that an object must have.
+#: Attributes and their names in other packages. The first word must be there.
 MEANT = {
     "solve_static": "solve run_static static equilibrium analyze analyse analysis newton nonlinear",
-    "solve_linear": "linear run_linear linear_static",
     "run": "quasi_static quasistatic solve_steps steps",
     "integrate": "simulate simulation transient dynamic dynamics solve_dynamic time_history evolve",
     "modes": "eigenvalues eigenfrequencies eigenmodes frequencies natural_frequencies modal eig",
-    "buckling": "buckle buckling_loads linear_buckling critical_load critical_loads",
+    "buckling": "buckle critical_load critical_loads",
     "continuation": "arc_length arclength riks path equilibrium_path",
     "point_force": "force forces add_force point_load nodal_force nodal_load concentrated_force",
     "line_load": "distributed_load distributed_force uniform_load q",
@@ -607,43 +578,33 @@ MEANT = {
     "obstacle": "contact wall ground",
     "replace(loads=...)": "load_case load_cases with_loads set_loads",
     "replace(beams=...)": "with_beams",
-    "solve_static().plot": "plot_deformed plot_displacement plot_stress plot_strain draw_deformed",
-    "solve_static().displacement": "displacement displacements deflection deflections u",
-    "solve_static().stress": "stress stresses von_mises",
-    "solve_static().strain": "strain strains",
-    "solve_static().reactions": "reactions reaction",
-    "solve_static().save": "save export write to_vtk",
-    "plot": "plot_deformed plot_displacement draw show",
-    "field": "von_mises sigma",
-    "displacement": "deflection deflections disp",
-    "resultants": "section_forces internal_forces bending_moment normal_force shear_force N Q M",
-    "reactions": "support_forces support_reactions forces",
-    "save": "export write to_vtk to_vtu",
     "sensors.to_csv": "to_csv csv write_csv save_csv",
     "to_xarray": "to_pandas to_dataframe dataset",
     "animate": "film movie video gif",
     "t": "time times",
     "frequencies": "omega omegas eigenfrequencies natural_frequencies",
-    "shapes": "eigenvectors vectors mode_shapes modeshapes",
+    "shapes": "eigenvectors vectors modeshapes",
     "load": "load_factor load_factors lambdas",
     "p": "nodes points coordinates vertices",
-    "nelements": "n_elements elements ne",
-    "refined": "refine subdivide",
+    "refined": "subdivide",
+    "plot": "draw show",
     "draw": "plot show",
+}
+#: The same of a State, which a scene has only when it is solved.
+OF_STATE = {
+    "plot": "plot_deformed plot_displacement plot_stress plot_strain draw_deformed",
+    "displacement": "displacements deflection deflections u disp",
+    "stress": "stresses sigma",
+    "strain": "strains",
+    "field": "von_mises",
+    "reactions": "reaction support_forces support_reactions forces",
+    "resultants": "section_forces internal_forces bending_moment normal_force shear_force N Q M",
+    "save": "export write to_vtk to_vtu",
 }
 
 
 class NearMisses:
-    """Base class whose AttributeError suggests attributes for synonyms.
-
-    Examples
-    --------
-    >>> from skfem_ancf import MeshBeam
-    >>> MeshBeam.init_line([0, 1], height=0.1).refine(2)
-    Traceback (most recent call last):
-    ...
-    AttributeError: MeshBeam has no attribute 'refine'; did you mean refined?
-    """
+    """Base class whose AttributeError suggests attributes for synonyms."""
 
     if not TYPE_CHECKING:  # type checkers must see the real attributes only
         def __getattr__(self, name):
@@ -652,8 +613,11 @@ class NearMisses:
             text = ""
             if not name.startswith("_"):
                 there = [one for one in dir(self) if not one.startswith("_")]
-                others = [key for key, words in MEANT.items() if name.lower() in
-                          words.lower().split() and re.split(r"\W", key)[0] in there]
+                solved = {f"solve_static().{key}": f"{key} {words}" for key, words in
+                          OF_STATE.items()}
+                others = [key for table in (MEANT, solved, OF_STATE)
+                          for key, words in table.items() if name.lower() in words.lower().split()
+                          and re.split(r"\W", key)[0] in there]
                 others = others or difflib.get_close_matches(name, there, 3, 0.6)
                 text = f"; did you mean {' or '.join(others[:3])}?" if others else ""
             # without name=, else Python adds its own suggestion
@@ -671,13 +635,6 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
 
     If the function accepts arrays, it is called once. This is checked at the first, the middle and
     the last time. ``shape`` is the expected shape of a value, None for any.
-
-    Examples
-    --------
-    >>> float(sample(lambda t: 2 * t, np.linspace(0, 1, 11))[-1])
-    2.0
-    >>> sample(lambda t: (t, 1.0 if t < 0.5 else 2.0), np.array([0.0, 1.0])).tolist()
-    [[0.0, 1.0], [1.0, 2.0]]
     """
     require_function(name, function, "of time")
     times = require_finite("times", times, (None,))

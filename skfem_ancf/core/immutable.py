@@ -7,8 +7,7 @@ import inspect
 import sys
 from collections.abc import Callable, Sequence
 from functools import lru_cache, wraps
-from importlib import import_module
-from operator import attrgetter
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -29,10 +28,6 @@ class _Packed:
         return self._recipe
 
 
-def _form_of(module, name):
-    return attrgetter(name)(import_module(module))
-
-
 def packed(value: Any) -> Any:
     """A value for pickle: forms by the name that they share with the decorated function.
 
@@ -41,7 +36,7 @@ def packed(value: Any) -> Any:
     if isinstance(value, Form):
         module, name = (getattr(value.form, x, None) for x in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(str(module)), str(name), None) is value:
-            return _Packed(value, _form_of, (module, name))
+            return _Packed(value, resolve_name, (f"{module}:{name}",))
     elif isinstance(value, OrientedBoundary):
         return _Packed(value, OrientedBoundary, (np.asarray(value), value.ori))
     elif type(value) in (tuple, list):
@@ -63,15 +58,7 @@ def unpacked(value: Any) -> Any:
 # whether a class or function belongs to the package
 
 def is_builtin(thing: Any) -> bool:
-    """True if a function, or the class of an object, is defined in this package.
-
-    Examples
-    --------
-    >>> from skfem import ElementLineP1
-    >>> from skfem_ancf import ElementBeamCable
-    >>> is_builtin(ElementBeamCable(5)), is_builtin(ElementLineP1()), is_builtin(is_builtin)
-    (True, False, True)
-    """
+    """True if a function, or the class of an object, is defined in this package."""
     named = thing if isinstance(getattr(thing, "__qualname__", None), str) else type(thing)
     return str(named.__module__).partition(".")[0] == __package__.partition(".")[0]
 
@@ -225,18 +212,7 @@ class ArrayKey:
 
 
 def array_cache(maxsize: int) -> Callable[[Function], Function]:
-    """``functools.lru_cache`` for functions of arrays; results must be read-only.
-
-    Examples
-    --------
-    >>> @array_cache(maxsize=8)
-    ... def total(x):
-    ...     print("computed")
-    ...     return x.sum()
-    >>> bool(total(np.ones(3)) == total(np.ones(3)))
-    computed
-    True
-    """
+    """``functools.lru_cache`` for functions of arrays; results must be read-only."""
     def decorate(function: Function) -> Any:
         @lru_cache(maxsize)
         def of_keys(*keys: Any) -> Any:

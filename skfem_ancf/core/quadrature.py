@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import comb, perm
-from typing import Any
 
 import numpy as np
 import scipy
@@ -52,7 +51,13 @@ def tensor(axis: Rule, section: Rule) -> Rule:
     Returns points (2, n), the section fastest, and weights (n,), as for scikit-fem's
     ``Basis(quadrature=(X, W))``.
     """
-    return product_rule(_rule("axis", axis), _rule("section", section))
+    rules = []
+    for name, rule in (("axis", axis), ("section", section)):
+        if not isinstance(rule, (tuple, list)) or len(rule) != 2:
+            raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")
+        x = require_finite(f"the points of {name}", rule[0], (None,))
+        rules.append((x, require_finite(f"the weights of {name}", rule[1], x.shape)))
+    return product_rule(*rules)
 
 
 def product_rule(axis: Rule, section: Rule) -> Rule:
@@ -61,13 +66,6 @@ def product_rule(axis: Rule, section: Rule) -> Rule:
     X = np.empty((2, len(x), len(y)))
     X[0], X[1] = x[:, None], y
     return X.reshape(2, -1), (wx[:, None] * wy).ravel()
-
-
-def _rule(name: str, rule: Any) -> Rule:
-    if not isinstance(rule, (tuple, list)) or len(rule) != 2:
-        raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")
-    x = require_finite(f"the points of {name}", rule[0], (None,))
-    return x, require_finite(f"the weights of {name}", rule[1], x.shape)
 
 
 def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:

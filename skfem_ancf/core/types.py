@@ -35,26 +35,3 @@ class Law(Protocol):
 
     def moduli(self, strain: Array) -> Array:
         """Derivative of the stress, shape (3, 3, ...)."""
-
-
-class HasShear(Protocol):
-    """An element, for the shear factor."""
-
-    @property
-    def carries_shear_parabola(self) -> bool: ...
-
-
-class Isotropic(Protocol):
-    """Elastic constants, for the choice of an element."""
-
-    @property
-    def E(self) -> float: ...
-
-    @property
-    def G(self) -> float: ...
-
-    @property
-    def nu(self) -> float: ...
-
-    @property
-    def is_hooke(self) -> bool: ...

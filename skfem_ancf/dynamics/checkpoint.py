@@ -76,10 +76,10 @@ class Checkpoint:
         run, now = self.run, dict(vars(self.run.y))
         groups = {"task": vars(run.task), "run": run.arrays(), "memory": now.pop("memory") or {},
                   "now": now, "history": run.columns(), "sensor": run.recorder.arrays()}
+        q0, scheme = _identity(run.system, run.scheme)
         write(self.path, {
-            "format": np.array(FORMAT), "every": np.array(self.every or 0),
-            "q0": _start(run.system),
-            "scheme": np.array(_text_of(run.scheme)), "done": np.array(run.done), **{
+            "format": np.array(FORMAT), "every": np.array(self.every or 0), "q0": q0,
+            "scheme": np.array(scheme), "done": np.array(run.done), **{
                 f"{group}.{name}": x for group, arrays in groups.items()
                 for name, x in arrays.items() if x is not None}})
         self._steps, self._clock = run.steps, time.monotonic()
@@ -105,8 +105,6 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
     """The Run of a checkpoint file, and the Checkpoint that continues to write it."""
     found = _read(path)
     try:
-        if not np.array_equal(found["q0"], _start(system)):
-            raise CheckpointError("it is from another scene: beams, bodies or their meshes differ")
         name, values = json.loads(found["scheme"])
         if scheme is None or scheme == "auto":  # the file has the scheme that "auto" chose
             if name not in SCHEMES:
@@ -116,7 +114,10 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
             vars(made).update(values)
         else:
             made = get_scheme(scheme)
-        if _text_of(made) != found["scheme"]:
+        q0, text = _identity(system, made)
+        if not np.array_equal(found["q0"], q0):
+            raise CheckpointError("it is from another scene: beams, bodies or their meshes differ")
+        if text != found["scheme"]:
             raise CheckpointError(f"the file is from a run with {name!r} and {values}, not with "
                                   f"{made!r}")
         said = {"dt": "auto", "tol": None, "t_eval": None, **found["task"]}
@@ -126,17 +127,13 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
                  found["history"])
         every = found["every"]
     except (CheckpointError, KeyError, ValueError, TypeError) as error:
-        text = error if isinstance(error, CheckpointError) else (
+        why = error if isinstance(error, CheckpointError) else (
             f"it is damaged, or from another scene: {error!r}")
-        raise CheckpointError(f"{str(path)!r} cannot be resumed: {text}") from None
+        raise CheckpointError(f"{str(path)!r} cannot be resumed: {why}") from None
     return run, Checkpoint(path, every or None, run)
 
 
-def _text_of(scheme):
-    """The class and parameters of a scheme as JSON."""
-    return json.dumps([scheme.name or type(scheme).__name__, vars(scheme)], default=repr)
-
-
-def _start(system: System) -> Array:
-    """Reference positions and directions of all degrees of freedom: by them a scene is known."""
-    return np.concatenate([np.ravel(member.q0) for member in system.members])
+def _identity(system: System, scheme: Scheme) -> tuple[Array, str]:
+    """What a scene is known by, positions and directions of all DOFs; the scheme as JSON."""
+    return (np.concatenate([np.ravel(member.q0) for member in system.members]),
+            json.dumps([scheme.name or type(scheme).__name__, vars(scheme)], default=repr))

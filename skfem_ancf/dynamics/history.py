@@ -18,11 +18,15 @@ from ..beam.points import require_body
 from ..core.errors import InputError, require_finite, require_index, shown
 from ..core.types import Array, Place, StrPath
 from ..equations.system import System
+from ..core.progress import progress_bar
 from ..io.tables import to_xarray
+from ..io.vtu import PvdWriter
 from ..recovery.resultants import Resultants, over_time
 from ..results.report import report_of_history
 from ..results.state import MaterialPoints, Reaction, SpringForces, State
 from ..visuals.animation import animate
+from ..visuals.html import history_html
+from ..visuals.matplotlib import plot_curve, plot_state
 from ..visuals.pyvista import Series
 from .base import Motion, Scheme
 from .sensors import Readings
@@ -110,6 +114,12 @@ class History(MaterialPoints, SpringForces):
     error
         With ``integrate(..., check=True)``, the largest difference in position from the same motion
         with half the step size, relative to the size of the scene; NaN if that failed.
+
+    Other Parameters
+    ----------------
+    at, field, recover
+        As ``point``; a field, and whether to use the recovered one, as for
+        :class:`~skfem_ancf.results.State`; shape (2,) or (2, n).
     """
 
     event: float | None
@@ -190,48 +200,22 @@ class History(MaterialPoints, SpringForces):
 
     def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
-        """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n).
-
-        Parameters
-        ----------
-        point, beam, recover, line
-            One point, shape (2,), or many, as for :meth:`State.strain
-            <skfem_ancf.results.State.strain>`.
-        """
+        """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n)."""
         return np.array(self._read("strain", point, beam, line, recover=recover))
 
     def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
-        """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n).
-
-        Parameters
-        ----------
-        point, beam, recover, line
-            As for :meth:`strain`, shape (2,) or (2, n).
-        """
+        """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n)."""
         return np.array(self._read("stress", point, beam, line, recover=recover))
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
               recover: bool = True, line: int | None = None) -> Array:
-        """Any field of :meth:`State.field <skfem_ancf.results.State.field>`, shape (nt, ...).
-
-        Parameters
-        ----------
-        field, point, beam, recover, line
-            As there; one point, shape (2,), or many.
-        """
+        """Any field of :meth:`State.field <skfem_ancf.results.State.field>`, shape (nt, ...)."""
         return np.array(self._read("field", point, beam, line, field, recover=recover))
 
     def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True,
                    line: int | None = None) -> Resultants:
-        """Section forces and strains of the axis at all instants: arrays (nt,) or (nt, n).
-
-        Parameters
-        ----------
-        at, beam, recover, line
-            As for :meth:`State.resultants <skfem_ancf.results.State.resultants>`; one point, shape
-            (2,), or many.
-        """
+        """Section forces and strains of the axis at all instants: arrays (nt,) or (nt, n)."""
         return over_time(self._read("resultants", at, beam, line, recover=recover))
 
     def joint_force(self, joint: Joint) -> Array:
@@ -247,18 +231,6 @@ class History(MaterialPoints, SpringForces):
         ----------
         boundary, beam
             As for :meth:`State.reactions <skfem_ancf.results.State.reactions>`.
-
-        Examples
-        --------
-        The reaction of the pin of a pendulum:
-
-        >>> import numpy as np
-        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-        >>> beam = Beam(MeshBeam.init_line([0, 1], height=0.01), ElementBeamCable(5),
-        ...             StVenantKirchhoff(E=2e11, nu=0.3, density=1e4), width=0.01)
-        >>> history = Scene(beam).pin("left").gravity((0, -8)).integrate(t_end=0.01, dt=1e-3)
-        >>> history.reactions("left").force.shape
-        (11, 2)
         """
         force, moment, names = zip(*(state.reactions(boundary, beam) for state in self))
         return Reaction(np.array(force), np.array(moment),
@@ -320,8 +292,6 @@ class History(MaterialPoints, SpringForces):
     # files and pictures
 
     def _repr_html_(self):
-        from ..visuals.html import history_html
-
         return history_html(self)
 
     def to_pyvista(self, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
@@ -342,36 +312,18 @@ class History(MaterialPoints, SpringForces):
              unit: str | None = None, subdivide: tuple[int, int] = (16, 8),
              filename: StrPath | None = None, dpi: float = 200, recover: bool = True,
              scale: float | str = 1.0, loads: bool = False, supports: bool = False) -> Any:
-        """Draw the body at several times in one plot, the earlier ones paler.
+        """Draw the body at several times in one plot, the earlier ones paler; returns the Axes.
 
         Parameters
         ----------
-        field
-            The field shown as colour, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
         times
             Times, shape (n,); the nearest stored instants are drawn. The default is eight instants
             from first to last.
-        ax, thickness, undeformed, colorbar, cmap, limits, title, unit
+        field, ax, thickness, undeformed, colorbar, cmap, limits, title, unit
             As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
         subdivide, filename, dpi, recover, scale, loads, supports
             As there.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamCable(),
-        ...             StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
-        >>> history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.1, 0.01)
-        >>> history.plot("displacement", times=[0, 0.05, 0.1]).get_xlabel()
-        'x'
         """
-        from ..visuals.matplotlib import plot_state
-
         if not len(self):
             raise InputError("the history has no instants")
         first, last = self.t[0], self.t[-1]
@@ -401,11 +353,7 @@ class History(MaterialPoints, SpringForces):
         xlabel, ylabel
             Labels of the axes; the names of sensors by default.
         **line
-            Options of matplotlib's ``Axes.plot``, such as ``color=`` and ``label=``.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
+            Options of matplotlib's ``Axes.plot``, such as ``color`` and ``label``.
 
         Examples
         --------
@@ -417,28 +365,26 @@ class History(MaterialPoints, SpringForces):
         >>> scene.integrate(0.1, 0.01).plot_curve("t", ("tip", 1)).get_ylabel()
         'tip 1'
         """
-        from ..visuals.matplotlib import plot_curve
-
-        (x, one), (y, two) = (self._curve(name, z) for name, z in (("x", x), ("y", y)))
-        return plot_curve(x, y, ax, xlabel=one if xlabel is None else xlabel,
-                          ylabel=two if ylabel is None else ylabel, title=title,
+        curves, labels = list[Array](), list[str]()
+        for name, of, label in (("x", x, xlabel), ("y", y, ylabel)):
+            if not isinstance(of, (str, tuple)):
+                values, text = require_finite(name, np.asarray(of, dtype=float), (None,)), ""
+            elif of == "t":
+                values, text = self.sensors.t if len(self.sensors.t) else self.t, "t"
+            else:
+                sensor, *parts = (of,) if isinstance(of, str) else of
+                values, text = self.sensors[sensor], " ".join(map(str, (sensor, *parts)))
+                for part in parts:
+                    values = values.reshape(len(values), -1)
+                    values = values[:, require_index("component", part, values.shape[1])]
+                if values.ndim != 1:
+                    raise InputError(
+                        f"the sensor {sensor!r} reads numbers of shape {values.shape[1:]}: give a "
+                        f"pair of its name and a component, as ({sensor!r}, 1)")
+            curves.append(values)
+            labels.append(text if label is None else label)
+        return plot_curve(curves[0], curves[1], ax, xlabel=labels[0], ylabel=labels[1], title=title,
                           filename=filename, dpi=dpi, **line)
-
-    def _curve(self, name, of):
-        """The values of a quantity at all instants, and its axis label."""
-        if not isinstance(of, (str, tuple)):
-            return require_finite(name, np.asarray(of, dtype=float), (None,)), ""
-        if of == "t":
-            return self.sensors.t if len(self.sensors.t) else self.t, "t"
-        sensor, *parts = (of,) if isinstance(of, str) else of
-        values = self.sensors[sensor]
-        for part in parts:
-            values = values.reshape(len(values), -1)
-            values = values[:, require_index("component", part, values.shape[1])]
-        if values.ndim != 1:
-            raise InputError(f"the sensor {sensor!r} reads numbers of shape {values.shape[1:]}: "
-                             f"give a pair of its name and a component, as ({sensor!r}, 1)")
-        return values, " ".join(map(str, (sensor, *parts)))
 
     animate = animate
     report = report_of_history
@@ -459,9 +405,6 @@ class History(MaterialPoints, SpringForces):
         subdivide, lagrange, undeformed, recover, fields, precision
             As for :func:`skfem_ancf.io.save_vtu`.
         """
-        from ..io.vtu import PvdWriter
-        from ..core.progress import progress_bar
-
         writer = PvdWriter(filename, subdivide, lagrange, undeformed, recover, fields, precision)
         with writer, progress_bar(progress, total=len(self), desc="files") as bar:
             for state in self:

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..core.errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
-                           require_finite_scalar, require_flag, require_function, require_positive,
-                           shown, warn)
+                           require_flag, require_function, shown, warn)
 from ..core.progress import progress_bar
 from ..core.types import Array, StrPath
 from ..equations.stability import largest_displacement
 from ..equations.system import System
 from ..results.state import State
-from .base import Scheme, in_steps, same_scheme
+from .base import Scheme, in_steps
 from .checkpoint import Checkpoint
 from .history import History
-from .run import MAX_STEPS, Run, TimeStepFailed, task_of
+from .run import Run, TimeStepFailed, task_of
 from .sensors import Sensor
 
 #: Interval in steps between checks for inverted elements.
@@ -28,54 +27,27 @@ LOOKED = 16
 LARGEST = 2.0
 
 
-def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: Array | None = None,
-              v: Array | None = None, t_start: float | None = None, t_eval: ArrayLike | None = None,
-              tol: float | None = None, rtol: float = 1e-5, progress: bool | None = None,
-              start: State | None = None, breakpoints: ArrayLike = (),
-              checkpoint: StrPath | None = None, every: int | None = None,
-              until: Callable[[State], float] | None = None, check: bool = False,
-              sensors: Sequence[tuple[str, Sensor]] = ()) -> History:
-    """Integrate the equation of motion.
+def integrate(system: System, scheme: Scheme, start: State | None, u: Array | None, v: Array,
+              sensors: Sequence[tuple[str, Sensor]], progress: bool | None,
+              until: Callable[[State], float] | None, check: bool, checkpoint: StrPath | None,
+              every: int | None, t_start: float | None, **times: Any) -> History:
+    """Integrate the equation of motion, see :meth:`skfem_ancf.Scene.integrate`.
 
-    Parameters
-    ----------
-    system, scheme
-        A :class:`~skfem_ancf.equations.system.System` and a
-        :class:`~skfem_ancf.dynamics.Scheme`.
-    u, v
-        Initial displacement and velocity, shape (N,); zero by default.
-    start
-        A State instead of ``u``; an instant of a motion replaces ``v`` too. With the same scene
-        and scheme the motion continues exactly: from the last instant of a History to round-off,
-        from others to the tolerance of the iteration.
-    t_end, dt, t_start, t_eval, tol, rtol, progress, breakpoints, checkpoint, every, until, check
-        As for :meth:`skfem_ancf.Scene.integrate`, ``t_eval`` and ``breakpoints`` of shape (n,).
-    sensors
-        Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
-
-    Returns
-    -------
-    History
-
-    Raises
-    ------
-    ConvergenceError
-        If a step fails even with 1/64 of its size; ``state`` is the History up to there.
-    Interrupted
-        On Ctrl-C, a KeyboardInterrupt; ``state`` is the History up to there.
-    CheckpointError
-        If the checkpoint cannot be written at the start.
-    SupportError
-        If joints are redundant, contradictory or open at the start, or if supports would displace
-        the body suddenly.
+    ``u`` and ``v`` (N,) are the displacement of ``start``, if there is one, and the velocity of a
+    start that is no instant of a motion; ``times`` are the other arguments of :func:`task_of`.
     """
-    motion = None if start is None else start._motion
     if t_start is None:
-        t_start = 0.0 if motion is None else motion.t
-    task = task_of(t_start, t_end, dt, t_eval, tol, rtol, [
-        *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
-    if not (in_steps(scheme) and system.mass_solver.by_nodes):
-        _require_room(system)
+        t_start = 0.0 if start is None or start._motion is None else start._motion.t
+    task = task_of(t_start, **times, sampled=system.forces.sampled)
+    # a Frame that is condensed to its nodes stores no dense constraint Jacobians
+    size = 24e-9 * system.constraints.m * system.N
+    if size > LARGEST and not (in_steps(scheme) and system.mass_solver.by_nodes):
+        raise InputError(
+            f"time integration stores the derivatives of {system.constraints.m} joint equations by "
+            f"{system.N} degrees of freedom as dense matrices, {size:.3g} GB. A Frame avoids this "
+            "with 'energy-momentum' and 'generalized-alpha', if it is supported at nodes, has no "
+            "other joints, no springs between distant points and no modal damping. Otherwise use "
+            "fewer elements, or scene.modes(k)")
     if not system.constraints.passing:
         system.constraints.require_independent_joints()
     system.constraints.require_motion()
@@ -88,20 +60,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
     def begun(task, sensors=(), until=None):
         run = Run(system, scheme, task, sensors, until)
-        if start is not None and motion is not None and same_scheme(start._origin[0], scheme):
-            arrays = start._origin[1]
-            if arrays is not None and len(start.u) == system.N:
-                run.keep_size(arrays)
-            if start.system is system and t_start == start.t and not system.forces.sampled:
-                run.go_on(motion, arrays)
-                return run
-        rest = np.zeros(system.N)
-        displacement = u if u is not None else rest if start is None else start.u
-        velocity = v if motion is None else motion.v
-        if motion is None:
-            system.forces.contacts.require_clear(displacement, t_start)
-        run.begin(displacement, rest if velocity is None else velocity,
-                  system.histories.of_state(start), None if motion is None else motion.turns)
+        run.begin(start, u, v)
         return run
 
     run, file = begun(task, sensors, until), None
@@ -127,32 +86,6 @@ def _difference(history, begun, task, progress):
     except Interrupted as stopped:
         raise Interrupted(str(stopped), history) from None
     return largest_displacement(system, other.u - history.u) / system.size
-
-
-def _samples(system, t_start, t_end):
-    """Sampling times of controllers with zero-order hold."""
-    if not system.forces.sampled:
-        return []
-    start = require_finite_scalar("t_start", t_start)
-    span = require_positive("t_end - t_start", require_finite_scalar("t_end", t_end) - start)
-    found = []
-    for control in system.forces.sampled:
-        if span / control.dt > MAX_STEPS:
-            raise InputError(f"dt of {control!r} is too small for a motion of {span:g}")
-        found += (start + control.dt * np.arange(1, np.ceil(span / control.dt))).tolist()
-    return found
-
-
-def _require_room(system):
-    """Raise InputError if the dense constraint Jacobians would fill the memory."""
-    size = 24e-9 * system.constraints.m * system.N
-    if size > LARGEST:
-        raise InputError(
-            f"time integration stores the derivatives of {system.constraints.m} joint equations by "
-            f"{system.N} degrees of freedom as dense matrices, {size:.3g} GB. A Frame avoids this "
-            "with 'energy-momentum' and 'generalized-alpha', if it is supported at nodes, has no "
-            "other joints, no springs between distant points and no modal damping. Otherwise use "
-            "fewer elements, or scene.modes(k)")
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:
@@ -188,9 +121,14 @@ def _go(run, file, progress):
                 if file is not None:
                     file.update()
     except TimeStepFailed as failure:
-        raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
-                               f"{failure}; try a smaller dt{_of_samples(run)}",
-                               run.history()) from None
+        text = (f"the motion could not be continued beyond t = {run.y.t:.6g}: {failure}; try a "
+                "smaller dt")
+        if system.forces.sampled:
+            text += (f". The energy reached {max(run.integrator.energy, 0.0):.3g}. If the motion "
+                     "does not explain that, the sampled force of "
+                     f"{shown(system.forces.sampled[0])} excites vibrations: sample more often, "
+                     "add damping, or use scheme='energy-momentum'")
+        raise ConvergenceError(text, run.history()) from None
     except AncfError as error:  # from a user's function: attach the motion so far
         vars(error)["state"] = run.history()
         raise
@@ -198,13 +136,3 @@ def _go(run, file, progress):
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "
                           "state is the History up to there", run.history()) from None
     return run.history(), inverted
-
-
-def _of_samples(run):
-    """Advice for a motion driven by sampled controllers that fails, or ""."""
-    if not run.system.forces.sampled:
-        return ""
-    energy = max(run.integrator.energy, 0.0)
-    return (f". The energy reached {energy:.3g}. If the motion does not explain that, the sampled "
-            f"force of {shown(run.system.forces.sampled[0])} excites vibrations: sample more "
-            "often, add damping, or use scheme='energy-momentum'")

@@ -234,7 +234,7 @@ class Integrator:
     # steps
 
     @cached_property
-    def _course(self):
+    def _functions(self):
         """Sampling where the equation of motion holds, and at the end of a step."""
         middle = 0.5 if self.scheme.conserving else 1.0
         return TimeFunctions(self.system, np.array([middle, 1.0]), SAMPLES)
@@ -253,7 +253,7 @@ class Integrator:
         """
         s, histories = self.system, self.system.histories
         begun = y.t if start is None else start
-        given = self._course.of(begun, dt, (first, first + n), self.limit, block)
+        given = self._functions.of(begun, dt, (first, first + n), self.limit, block)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         rows, works = np.full((n, 4, s.N), np.nan), np.empty(n)

@@ -361,14 +361,14 @@ def damping_factor(rule, dt):
 
 
 @source
-def step_of(joints, rule, course, n):
+def step_of(joints, rule, block, n):
     """The :class:`Step` number n."""
-    c, g = course.joints.c, course.joints.g
+    c, g = block.joints.c, block.joints.g
     constant = joints.hk.size == 0 and joints.custom == 0
     kept = constant and g.shape[0] == 1 and n > 0
-    joints_now = JointMotion(row_of(c, n), row_of(g, n), course.joints.drives)
-    return Step(course.dt, course.times[n, 0], course.times[n, 1],
-                row_of(course.factors, n), row_of(course.ends, n), row_of(course.supports, n),
+    joints_now = JointMotion(row_of(c, n), row_of(g, n), block.joints.drives)
+    return Step(block.dt, block.times[n, 0], block.times[n, 1],
+                row_of(block.factors, n), row_of(block.ends, n), row_of(block.supports, n),
                 joints_now,
-                mass_factor(rule, course.dt), damping_factor(rule, course.dt),
+                mass_factor(rule, block.dt), damping_factor(rule, block.dt),
                 0.5 if rule.conserving > 0 else 1.0, constant, kept)

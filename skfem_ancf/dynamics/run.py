@@ -18,7 +18,7 @@ from ..core.errors import (AncfError, CheckpointError, InputError, ModelWarning,
 from ..core.types import Array
 from ..equations.system import System
 from ..results.state import State
-from .base import Motion, Scheme, in_blocks, interpolate
+from .base import Motion, Scheme, in_blocks, interpolate, same_scheme
 from .history import COLUMNS, History, state_of
 from .integrator import DEPTH, Integrator, TimeStepFailed
 from .sensors import Recorder, Sensor
@@ -74,7 +74,7 @@ class StepSize:
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span, self._averaged = t_end - t_start, scheme.order <= 2
         self._mass = sum(b.total_mass for b in system.members)
-        self._averages = self._new = np.zeros((2, system.N))
+        self.averages = self._new = np.zeros((2, system.N))
         self._origin, self._moved = np.zeros(0), 0.0
         self.cut = Lookahead(system, t_start, t_end).cut
 
@@ -83,63 +83,48 @@ class StepSize:
         return (np.sqrt(max(du @ self.system.mass.multiply(du), 0.0) / self._mass)
                 / self.system.size)
 
-    def _scale(self, old, new):
-        """The size to which errors refer, over that of the scene."""
+    def error(self, integrator: Integrator, old: Motion, new: Motion, dt: float) -> float:
+        """The error that a step adds, over what it may add."""
+        s, scheme, power = self.system, self.scheme, self.scheme.order + 1
+        de = scheme.local_error(old, new, dt) * s.constraints.free
+        for _ in range(scheme.filtered):
+            de = scheme.resolved(integrator, de)
+        lasting = scheme.lasting(integrator, de, self.span)
+        if s.constraints.m and not s.mass_solver.by_nodes:  # projected onto the joints
+            J = s.constraints.full_jacobian(new.u, new.t)
+            lasting = lasting + s.mass_solver(new.u, new.t, J)(np.zeros(s.N), -(J @ lasting))[0]
+        rate = lasting / dt**power
+        if self._averaged:
+            width = 0.5 * (scheme.error_constant * dt**2 * self.span) ** (1.0 / 3.0)
+            part = -np.expm1(-dt / width)
+            self._new = self.averages.copy()
+            for average in self._new:
+                average += part * (rate - average)
+                rate = average
+        # the size to which errors refer, over that of the scene
         if not self._origin.size:
             self._origin = old.u
         self._moved = max(self._moved, self._mean(old.u - self._origin))
         moved = max(self._moved, self._mean(new.u - self._origin))
-        return min(1.0, OF_MOTION * max(AT_REST, moved))
-
-    def error(self, integrator: Integrator, old: Motion, new: Motion, dt: float) -> float:
-        """The error that a step adds, over what it may add."""
-        de = self.scheme.local_error(old, new, dt) * self.system.constraints.free
-        for _ in range(self.scheme.filtered):
-            de = self.scheme.resolved(integrator, de)
-        power = self.scheme.order + 1
-        rate = self._free(new, self.scheme.lasting(integrator, de, self.span)) / dt**power
-        if self._averaged:
-            width = 0.5 * (self.scheme.error_constant * dt**2 * self.span) ** (1.0 / 3.0)
-            part = -np.expm1(-dt / width)
-            self._new = self._averages.copy()
-            for average in self._new:
-                average += part * (rate - average)
-                rate = average
-        return LARGEST * self.scheme.safety / (self.rtol * self._scale(old, new)) * max(
+        scale = min(1.0, OF_MOTION * max(AT_REST, moved))
+        return LARGEST * scheme.safety / (self.rtol * scale) * max(
             self._mean(rate) * dt**(power - 1) * self.span, self._mean(de) / SINGLE)
-
-    def _free(self, y, de):
-        """The increment after projection onto the joints."""
-        s = self.system
-        if not s.constraints.m or s.mass_solver.by_nodes:
-            return de
-        J = s.constraints.full_jacobian(y.u, y.t)
-        return de + s.mass_solver(y.u, y.t, J)(np.zeros(s.N), -(J @ de))[0]
-
-    def begin(self) -> None:
-        """Reset, at the start and after a breakpoint."""
-        self._averages = np.zeros_like(self._averages)
 
     def next(self, error: float, dt: float, size: float) -> tuple[float, bool]:
         """The next step size, and whether to accept the last step of size dt."""
         factor = 0.9 * max(error, 1e-300) ** (-1.0 / self.scheme.order)
         if error > REJECTED and dt > 1e-9 * self.span:
             return dt * max(0.2, min(0.8, factor)), False
-        self._averages = self._new
+        self.averages, new = self._new, dt
         if factor > WORTH or factor < 0.95:
             new = dt * min(2.0, max(0.5, factor))
-        else:
-            new = dt
         return (max(size, new) if dt < 0.99 * size and factor >= 1.0 else new), True
 
     def arrays(self) -> dict[str, Array]:
-        """Arrays for a checkpoint."""
-        return {"averages": self._averages, "origin": self._origin,
-                "moved": np.array(self._moved)}
+        return {"averages": self.averages, "origin": self._origin, "moved": np.array(self._moved)}
 
     def load(self, arrays: dict[str, Any]) -> None:
-        """Restore what :meth:`arrays` returned."""
-        self._averages, self._origin = arrays["averages"], arrays["origin"]
+        self.averages, self._origin = arrays["averages"], arrays["origin"]
         self._moved = float(arrays["moved"])
 
 
@@ -180,11 +165,19 @@ class Task:
 
 
 def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
-            breakpoints: Any) -> Task:
-    """Check the arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`."""
+            breakpoints: Any, sampled: Sequence[Any] = ()) -> Task:
+    """Check arguments of :meth:`skfem_ancf.Scene.integrate`.
+
+    ``sampled`` are controllers with zero-order hold, whose samples are ends of steps.
+    """
     t_start = require_finite_scalar("t_start", t_start)
     t_end = require_finite_scalar("t_end", t_end)
     span = require_positive("t_end - t_start", t_end - t_start)
+    breaks = [*np.atleast_1d(breakpoints)]
+    for control in sampled:
+        if span / control.dt > MAX_STEPS:
+            raise InputError(f"dt of {control!r} is too small for a motion of {span:g}")
+        breaks += (t_start + control.dt * np.arange(1, np.ceil(span / control.dt))).tolist()
     auto = isinstance(dt, str)
     if auto and dt != "auto":
         raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
@@ -212,11 +205,9 @@ def task_of(t_start: Any, t_end: Any, dt: Any, t_eval: Any, tol: Any, rtol: Any,
     rtol = require_positive("rtol", rtol)
     if rtol < MIN_RTOL:
         raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")
-    inside = []
-    if len(breakpoints):
-        breaks = np.unique(require_finite("breakpoints", breakpoints, (None,)))
-        inside = breaks[(breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)].tolist()
-    return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(inside))
+    inside = np.unique(require_finite("breakpoints", breaks, (None,)))
+    inside = inside[(inside > t_start + 1e-9 * span) & (inside < t_end - 1e-9 * span)]
+    return Task(t_start, t_end, None if auto else step, tol, rtol, t_eval, tuple(inside.tolist()))
 
 
 def integrator_of(system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
@@ -252,32 +243,44 @@ class Run:
 
     # the start
 
-    def begin(self, u: Array, v: Array, history: Array | None = None,
-              turns: Array | None = None) -> None:
-        """Start with a displacement and a velocity."""
-        t = self.task.t_start
-        self.y = self._start(u, v, self.system.histories.sampled(u, v, t, history, True))
-        if turns is None or len(turns) != self._turns.number:
-            turns = self._turns.begin(self.y.u)
-        self._follow(turns, self.y)
-        self._store_start()
+    def begin(self, start: State | None, u: Array | None, v: Array) -> None:
+        """Start from a State, or from rest: the displacement, and a velocity unless it moves.
 
-    def go_on(self, y: Motion, arrays: dict[str, Any] | None = None) -> None:
-        """Continue from an instant of another run of the same scene."""
-        self.y = replace(y, t=self.task.t_start)
-        if arrays is not None:
-            self.integrator.load(arrays)
-            self.integrator.reset()
-        self._store_start()
+        Of a motion by the same scheme the run takes the step size; with the same scene it goes on
+        exactly.
+        """
+        system, task, turns, goes_on = self.system, self.task, None, False
+        motion = None if start is None else start._motion
+        if start is not None and motion is not None:
+            (scheme, arrays), v, turns = start._origin, motion.v, motion.turns
+            if same_scheme(scheme, self.scheme):
+                if arrays is not None and len(start.u) == system.N and (
+                        self._sizes is not None and "averages" in arrays):
+                    self._size = min(float(arrays["size"]), task.span)
+                    self._sizes.load(arrays)
+                goes_on = (start.system is system and task.t_start == start.t
+                           and not system.forces.sampled)
+        if motion is not None and goes_on:
+            self.y = replace(motion, t=task.t_start)
+            if arrays is not None:
+                self.integrator.load(arrays)
+                self.integrator.reset()
+        else:
+            u = np.zeros(system.N) if u is None else u
+            if motion is None:
+                system.forces.contacts.require_clear(u, task.t_start)
+            self.y = self._begin_segment(u, v, system.histories.of_state(start), True)
+            if turns is None or len(turns) != self._turns.number:
+                turns = self._turns.begin(self.y.u)
+            self._follow(turns, self.y)
+        self.recorder.record([self.y])
+        if task.t_eval is None or task.t_eval[0] <= task.t_start:
+            self._append(self.y)
+            self._next = 1
 
-    def keep_size(self, arrays: dict[str, Any]) -> None:
-        """Begin with the automatic step size of another run."""
-        if self._sizes is not None and "averages" in arrays:
-            self._size = min(float(arrays["size"]), self.task.span)
-            self._sizes.load(arrays)
-
-    def _start(self, u, v, history):
-        """The Motion at the start of a segment."""
+    def _begin_segment(self, u, v, history, first):
+        """The Motion at the start of a segment, after due samples of controllers."""
+        history = self.system.histories.sampled(u, v, self._begun, history, first)
         step = min(self._size, self._end - self._begun)
         return self.integrator.start(u, v, self._begun, step, history=history)
 
@@ -289,24 +292,14 @@ class Run:
     # segments between breakpoints
 
     @property
-    def _begun(self):
-        return self._times[self._segment]
-
-    @property
-    def _end(self):
-        return self._times[self._segment + 1]
-
-    @property
-    def _last(self):
-        return self._segment == len(self._times) - 2
-
-    @property
     def done(self) -> bool:
         """True at the end of the motion."""
         return self.event is not None or (self._last and self.y.t >= self._end)
 
     def _limit(self):
-        """Set the number of steps of the segment, and the limit of sampling before a breakpoint."""
+        """Set the times and steps of the segment, and the limit of sampling before its end."""
+        self._begun, self._end = self._times[self._segment:self._segment + 2]
+        self._last = self._segment == len(self._times) - 2
         near = 16 * ulp(max(abs(self._begun), abs(self._end)))
         self.integrator.limit = np.inf if self._last else self._end - near
         self._count = 0 if self._sizes else max(1, ceil(
@@ -321,9 +314,8 @@ class Run:
         self._limit()
         if self._sizes is not None:
             self._size = FIRST * self.task.span
-            self._sizes.begin()
-        turned = self._start(y.u, y.v, self.system.histories.sampled(
-            y.u, y.v, self._begun, y.history, False))
+            self._sizes.averages = np.zeros_like(self._sizes.averages)
+        turned = self._begin_segment(y.u, y.v, y.history, False)
         turned.dissipated = y.dissipated
         return self._follow(y.turns, turned)
 
@@ -406,50 +398,31 @@ class Run:
 
     def _commit(self, old, new):
         """Accept a step: find events, pass breakpoints, record and store."""
+        def value(y):
+            return ask_number("until(state)", self._until, state_of(self.system, self.scheme, y))
+
         self._follow(old.turns, new)
         if self._until is not None:
-            new = self._look(old, new)
+            before = value(old) if self._value is None else self._value
+            self._value = value(new)
+            if before != 0.0 and before * self._value <= 0.0:  # the event is within the step
+                root = scipy.optimize.brentq(lambda t: value(self._between(old, new, t)),
+                                             old.t, new.t, xtol=EXACT * (new.t - old.t))
+                new = self._between(old, new, root)
+                self.event = new.t
         if self.event is None and new.t >= self._end and not self._last:
             new = self._turn(new)
-            if self._until is not None:
-                self._look_beyond(new)
+            if self._until is not None:  # a change of sign at a breakpoint is an event there
+                before, self._value = self._value, value(new)
+                if before * self._value < 0.0:
+                    self.event = new.t
         else:
             self._n += 1
         self.recorder.record([new])  # first, since users' functions may raise
         self._store(old, new)
         self.y, self.steps = new, self.steps + 1
 
-    # events
-
-    def _look(self, old, new):
-        """The end of a step, or the instant of the event within it."""
-        before = self._asked(old) if self._value is None else self._value
-        self._value = self._asked(new)
-        if before == 0.0 or before * self._value > 0.0:
-            return new
-        root = scipy.optimize.brentq(lambda t: self._asked(self._between(old, new, t)),
-                                     old.t, new.t, xtol=EXACT * (new.t - old.t))
-        new = self._between(old, new, root)
-        self.event = new.t
-        return new
-
-    def _look_beyond(self, new):
-        """A change of sign at a breakpoint is an event there."""
-        before, self._value = self._value, self._asked(new)
-        if before * self._value < 0.0:
-            self.event = new.t
-
-    def _asked(self, y):
-        return ask_number("until(state)", self._until, state_of(self.system, self.scheme, y))
-
     # storage
-
-    def _store_start(self):
-        self.recorder.record([self.y])
-        wanted = self.task.t_eval
-        if wanted is None or wanted[0] <= self.task.t_start:
-            self._append(self.y)
-            self._next = 1
 
     def _store(self, old, new):
         """Store the instants that were asked for between two Motions."""

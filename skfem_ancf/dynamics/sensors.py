@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path as FilePath
 from typing import Any
@@ -11,12 +12,13 @@ import numpy as np
 from ..actions.joints.base import Joint
 from ..beam.layout import WhichBeam
 from ..beam.points import Located
+from ..core.archive import output_file
 from ..core.errors import (CallbackError, CheckpointError, InputError, NameUnknown, ask_array,
-                           require_flag, shown)
+                           require_flag, require_path, shown)
 from ..core.immutable import Immutable
 from ..core.types import Array, StrPath
 from ..equations.system import System
-from ..io.tables import readings_to_csv, readings_to_xarray
+from ..io.tables import find_xarray
 from ..recovery.fields import FIELDS, find_field
 from ..results.state import State
 from .base import Motion
@@ -92,15 +94,12 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     return found
 
 
-def read_steps(sensor: Sensor, at: Any, steps: Sequence[Motion]) -> Array:
-    """Values of a sensor at many steps, shape (n, ...)."""
-    u = np.array([y.u for y in steps])
+def read_steps(sensor: Sensor, at: Any, steps: Sequence[Any]) -> Array:
+    """Values of a sensor of :data:`MOVING` at steps or States, shape (n, ...)."""
+    u = np.array([y.acceleration if sensor.what == "acceleration" else y.u for y in steps])
     if sensor.what == "velocity":
         return at.velocity(u, np.array([y.v for y in steps]))
-    if sensor.what == "acceleration":
-        return at.displacement(np.array([y.acceleration for y in steps]))
-    found = at.displacement(u)
-    return found + at.start if sensor.what == "position" else found
+    return at.displacement(u) + (at.start if sensor.what == "position" else 0.0)
 
 
 def read(sensor: Sensor, at: Any, state: State) -> Any:
@@ -119,19 +118,6 @@ def read(sensor: Sensor, at: Any, state: State) -> Any:
     if what in SECTION:
         return getattr(state.resultants(at, recover=sensor.recover), what)
     return state.field(find_field(what), at, recover=sensor.recover)
-
-
-def _stacked(name, values):
-    """Values at several times as one array."""
-    for value in values:
-        if np.shape(value) != np.shape(values[0]):
-            raise _varying(name, np.shape(values[0]), np.shape(value))
-    return np.array(values)
-
-
-def _varying(name, first, other):
-    return CallbackError(f"the function of the sensor {name!r} must return the same shape at all "
-                         f"times, got {first}, then {other}")
 
 
 class Readings(dict[str, "Array"]):
@@ -153,20 +139,25 @@ class Readings(dict[str, "Array"]):
         raise NameUnknown("sensor", name, self)
 
     def to_csv(self, filename: StrPath) -> FilePath:
-        """Write the readings to a CSV file, and return its path.
+        """Write the readings to a .csv file, in a folder that is made if needed; returns its path.
 
         The columns are ``t`` and the sensors; those of a vector are called ``tip 0``, ``tip 1``.
-
-        Parameters
-        ----------
-        filename
-            Ends with .csv; missing folders are created.
         """
-        return readings_to_csv(self.t, self, filename)
+        path, names, columns = require_path("filename", filename, (".csv",)), ["t"], [self.t]
+        for name, x in self.items():
+            columns.append(x.reshape(len(self.t), -1))
+            names += [name] if x.ndim == 1 else [f"{name} {k}" for k in range(columns[-1].shape[1])]
+        with output_file(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(names)
+            writer.writerows(np.column_stack(columns).tolist())
+        return path
 
     def to_xarray(self) -> Any:
         """An ``xarray.Dataset`` with a variable for each sensor, along "time"."""
-        return readings_to_xarray(self.t, self)
+        return find_xarray().Dataset(
+            {name: (("time", *(f"{name}_{k}" for k in range(1, x.ndim))), x)
+             for name, x in self.items()}, {"time": self.t})
 
     def __repr__(self) -> str:
         return f"<Readings of {list(self)} at {len(self.t)} times>"
@@ -190,14 +181,17 @@ class Recorder:
                   if not sensor.moving]
         rows = [[read(sensor, at, state) for sensor, at in others]
                 for state in map(self._state_of, steps)] if others else []
-        columns = iter(zip(*rows))
-        found = [read_steps(sensor, at, steps) if sensor.moving else _stacked(name, next(columns))
-                 for (name, sensor), at in zip(self.sensors, self._located)]
+        columns = iter(zip(*rows))  # a State reads all sensors, then it is freed
+        found = [read_steps(sensor, at, steps) if sensor.moving else next(columns)
+                 for (_, sensor), at in zip(self.sensors, self._located)]
         self._t.append(np.array([y.t for y in steps]))
-        for (name, _), before, one in zip(self.sensors, self._read, found):
-            if before and one.shape[1:] != before[0].shape[1:]:
-                raise _varying(name, before[0][0].shape, one[0].shape)
-            before.append(one)
+        for (name, _), before, values in zip(self.sensors, self._read, found):
+            shapes = [np.shape(one) for one in ([before[0][0]] if before else []) + [*values]]
+            for shape in shapes:
+                if shape != shapes[0]:
+                    raise CallbackError(f"the function of the sensor {name!r} must return the same "
+                                        f"shape at all times, got {shapes[0]}, then {shape}")
+            before.append(np.array(values))
 
     def readings(self) -> Readings:
         """The readings so far."""

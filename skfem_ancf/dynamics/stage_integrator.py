@@ -34,7 +34,7 @@ class StageIntegrator(Integrator):
         return backend.with_tables(backend.tables.copied(len(self.scheme.points)))
 
     @cached_property
-    def _course(self):
+    def _functions(self):
         return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), SAMPLES)
 
     @cached_property
@@ -49,7 +49,7 @@ class StageIntegrator(Integrator):
             block: tuple[int, int] | None = None) -> list[Motion]:
         s, w, histories = self.system, self._work, self.system.histories
         table, begun = self.scheme.table, y.t if start is None else start
-        given = self._course.of(begun, dt, (first, first + n), self.limit, block)
+        given = self._functions.of(begun, dt, (first, first + n), self.limit, block)
         w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
         ahead, memory = table.method.ahead, y.memory or {}
         if "stages" in memory:

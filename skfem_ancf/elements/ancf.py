@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -12,7 +13,7 @@ from ..core.errors import (InputError, require_integer, require_like, require_na
                            require_positive)
 from ..core.immutable import is_builtin, read_only
 from ..core.quadrature import gauss_lobatto, hermite_basis
-from ..core.types import Array, Isotropic
+from ..core.types import Array
 from ..mesh.mesh_beam import MeshBeam
 from ..mesh.mapping import SECTIONS
 from .base import DEGREES, ElementBeam, Sampling, SectionFunctions, StabilisedMode, require_degree
@@ -287,7 +288,7 @@ ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_x
                   "S_xy": 3}
 
 
-def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[str] = (),
+def choose_element(mesh: MeshBeam, material: Any, fields: str | Sequence[str] = (),
                    tolerance: float = 1e-3) -> ElementBeam:
     """The element of lowest order that represents the fields to a given accuracy.
 

@@ -27,7 +27,7 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 
 
 class BodyFields(NamedTuple):
-    """The body of a state: the arguments of a ``meshio.Mesh``.
+    """The body of a state: ``meshio.Mesh(*fields)``.
 
     ``points`` have the shape (n, 3). ``cells`` has for each beam its cell type and its cells, as
     rows of point numbers; for each rigid body its outline; for each domain its triangles or quads.
@@ -57,13 +57,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 
     Examples
     --------
-    >>> import meshio, numpy as np
-    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-    >>> from skfem_ancf.io import body_fields
-    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
-    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> meshio.Mesh(*body_fields(Scene(beam).state())).points.shape  # 4 x 8 x 4 quads
-    (165, 3)
+    ``meshio.Mesh(*body_fields(state))``
     """
     wanted, undeformed = find_fields(fields, state.beams), require_flag("undeformed", undeformed)
     found = grids(state, subdivide, lagrange, recover)
@@ -138,14 +132,7 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
 
     Examples
     --------
-    >>> import numpy as np, tempfile
-    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
-    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     print(state.save(f"{folder}/beam.vtu").name)
-    beam.vtu
+    ``state.save("beam.vtu", fields=["displacement", "S_xx"])``
     """
     path = require_path("filename", filename, SUFFIXES)
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
@@ -213,23 +200,21 @@ class PvdWriter:
     filename
         Path that ends with .pvd. Missing folders are created; the first frame replaces an older
         file.
+    state, t
+        A State, or an object with ``beams`` and ``u_of``, and its time.
     subdivide, lagrange, undeformed, recover, fields, precision
         As for :func:`~skfem_ancf.io.vtu.save_vtu`.
 
     Examples
     --------
-    >>> import numpy as np, tempfile
+    >>> import tempfile
     >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
     >>> from skfem_ancf.io import PvdWriter
-    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    >>> beam = Beam(MeshBeam.init_line([0, 1], height=0.1), ElementBeamANCF(2),
     ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     with PvdWriter(f"{folder}/load.pvd") as series:
-    ...         for t in (1.0, 2.0):
-    ...             scene = Scene(beam).clamp("left").point_force((0, -t), at=(1, 0))
-    ...             print(series.add(scene.solve_static(), t).name)
+    >>> with tempfile.TemporaryDirectory() as folder, PvdWriter(f"{folder}/load.pvd") as series:
+    ...     print(series.add(Scene(beam).state(), t=0.0).name)
     load_00000.vtu
-    load_00001.vtu
     """
 
     def __init__(self, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
@@ -251,15 +236,7 @@ class PvdWriter:
             logger.info("wrote %s: %d frames", self.path, len(self.frames))
 
     def add(self, state: Any, t: float) -> Path:
-        """Write a frame; returns its file.
-
-        Parameters
-        ----------
-        state
-            A State, or an object with ``beams`` and ``u_of``.
-        t
-            Its time, later than that of the previous frame.
-        """
+        """Write a state at a time later than that of the previous frame; returns its file."""
         from xml.sax.saxutils import quoteattr  # which imports http and ssl
 
         require_like("state", state, "State", "beams", "u_of")

@@ -13,7 +13,7 @@ from ..core.errors import (InputError, require_finite, require_finite_scalar, re
                            require_option, require_positive, require_slope, shown)
 from ..core.immutable import Immutable, is_builtin, rebuilt
 from ..core.quadrature import gauss
-from ..core.types import Array, HasShear, Law
+from ..core.types import Array, Law
 from .library import values_of
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ class Material(Immutable):
         """Ratio of lateral contraction to axial strain: nu, or nu / (1 - nu) in plane strain."""
         return self.nu / (1.0 if self.plane == "stress" else 1.0 - self.nu)
 
-    def shear_factor(self, element: HasShear) -> float:
+    def shear_factor(self, element: Any) -> float:
         """Factor k_s on the shear modulus for sections of an element."""
         require_like("element", element, "beam element", "carries_shear_parabola")
         if isinstance(self.shear_correction, float):

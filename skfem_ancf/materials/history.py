@@ -10,7 +10,7 @@ import numpy as np
 from ..core.errors import (ConvergenceError, InputError, require_integer, require_positive,
                            require_slope)
 from ..core.immutable import rebuilt
-from ..core.types import Array, HasShear, Law
+from ..core.types import Array, Law
 from .base import LinearLaw, Material, hooke
 
 #: Points across a section without a word from the user: the moment of an ideally plastic rectangle
@@ -224,7 +224,7 @@ class HistoryMaterial(Material):
         self._require_consistent()
         return True
 
-    def shear_factor(self, element: HasShear) -> float:
+    def shear_factor(self, element: Any) -> float:
         self._require_consistent()
         return super().shear_factor(element)
 

@@ -15,7 +15,7 @@ from ..beam import kinematics
 from ..beam.beam import Beam
 from ..beam.distribution import SNAP
 from ..beam.kinematics import tangents
-from ..core.errors import ModelWarning, warn
+from ..core.errors import ModelWarning, StabilityWarning, warn
 from ..core.types import Array
 from ..equations.stability import response
 from ..materials.base import LinearLaw
@@ -168,7 +168,9 @@ SHORT = 30.0
 
 
 def warn_of(state: Any) -> None:
-    """Warn (:class:`~skfem_ancf.core.errors.ModelWarning`) of each finding of ``solve_static``."""
+    """Warn of a doubtful static solution, and of what is found beyond the range of the model."""
+    if state.doubt:
+        warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
     for text in state._equations.forces.contacts.sunk(state.u, state.load):
         warn(text, ModelWarning)
     for text in _kinks(state):

@@ -133,9 +133,6 @@ class _Rounds:
                and self.scene.beams[k].mesh.curve is None)
         return element.raised() if may else None
 
-    def _small(self, error):
-        return error <= 0.1 * self.tol
-
     def done(self, errors: list[float], scene: Any) -> tuple[Refinement, ...]:
         """All refinements, with those from the current scene to another one."""
         return self._refinements + tuple(
@@ -153,7 +150,7 @@ class _Rounds:
             before = self._before.get(k)
             if before is None:
                 sure = False
-            elif (error * SMOOTH > before and not self._small(error)
+            elif (error * SMOOTH > before and error > 0.1 * self.tol
                   and error >= 0.5 * max(errors)):  # a small one may be another beam's
                 self._rough.add(k)
                 sure = sure and before <= self.tol
@@ -163,7 +160,7 @@ class _Rounds:
         """Raise degrees where that pays; halve the elements that matter in other beams."""
         beams = self.scene.beams
         split = [new.mesh.nelements > old.mesh.nelements for old, new in zip(beams, fine.beams)]
-        raised = [None if self._small(error) and k in self._before else self.raised(k)
+        raised = [None if error <= 0.1 * self.tol and k in self._before else self.raised(k)
                   for k, error in enumerate(errors)]
         self._before = {k: e for k, e in enumerate(errors) if self.raised(k) is not None}
         if all(e is not None for e in raised):
@@ -186,9 +183,10 @@ def _changed(scene, marked, elements):
 def frequency_errors(scene: Any, modes: Modes) -> Array:
     """Relative errors (k,) of frequencies at rest by the mesh of the beams; NaN if not known.
 
-    Their change as all elements are halved, times 4/3: the sum of all further changes for elements
-    of second order. It is a quarter too large for elements of fourth order. The shapes are carried
-    over to the halved elements and improved there by two steps of subspace iteration.
+    A ModelWarning says where they are large. They are the change as all elements are halved, times
+    4/3: the sum of all further changes for elements of second order. It is a quarter too large for
+    elements of fourth order. The shapes are carried over to the halved elements and improved there
+    by two steps of subspace iteration.
 
     References
     ----------
@@ -211,20 +209,15 @@ def frequency_errors(scene: Any, modes: Modes) -> Array:
         logger.info("no estimate of the error of frequencies: %s", error)
         return nothing
     rigid = better <= ROUND_OFF * np.sqrt(scene.system.scales.bending_eigenvalue)
-    return np.where(rigid, np.nan, 4.0 / 3.0 * np.abs(
+    errors = np.where(rigid, np.nan, 4.0 / 3.0 * np.abs(
         modes.frequencies / np.where(rigid, 1.0, better) - 1.0))
-
-
-def warn_of_frequencies(errors: Array, scene: Any) -> None:
-    """Give a ModelWarning for estimated errors (k,) above :data:`ROUGH`."""
-    bad = np.flatnonzero(errors > ROUGH)
-    if len(bad):
-        element = next((b.element for b in scene.beams), None)
+    if len(bad := np.flatnonzero(errors > ROUGH)):
         warn(f"the mesh is coarse for {len(bad)} of {len(errors)} frequencies: number {bad[0]} is "
              f"about {100 * errors[bad[0]]:.2g} % off, as halved elements show (modes.errors has "
              "all). Halve the elements, scene.replace(mesh=beam.mesh.refined()), or take elements "
-             f"of higher order along the axis than {element!r}, as ElementBeamANCFCubic(2) or "
-             "ElementBeamCable(5) (docs/choose.md)", ModelWarning)
+             f"of higher order along the axis than {scene.beams[0].element!r}, as "
+             "ElementBeamANCFCubic(2) or ElementBeamCable(5) (docs/choose.md)", ModelWarning)
+    return errors
 
 
 def _too_few(n, estimate, tol, state):

@@ -69,7 +69,13 @@ class Entry(NamedTuple):
 
 
 class Model(NearMisses):
-    """Beams, rigid bodies, and items: the description of a :class:`Scene`."""
+    """Beams, rigid bodies, and items: the description of a :class:`Scene`.
+
+    Other Parameters
+    ----------------
+    name
+        Name of the joint in messages.
+    """
 
     def __init__(self, *beams: Any) -> None:
         if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
@@ -187,19 +193,8 @@ class Model(NearMisses):
         Parameters
         ----------
         item
-            An :class:`~skfem_ancf.Item`. The scene binds a copy to its beams, again for every other
-            mesh, as in ``solve_static(adapt=...)``.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from skfem_ancf import Beam, Clamp, ElementBeamANCF, MeshBeam, PointForce, Scene
-        >>> from skfem_ancf import StVenantKirchhoff
-        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01),
-        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3), width=0.01))
-        >>> state = scene.add(Clamp("left")).add(PointForce((0, -1e-3), at=(1, 0))).solve_static()
-        >>> state.converged
-        True
+            An :class:`~skfem_ancf.Item`, as ``PointForce((0, -1e-3), at=(1, 0))``. The scene binds
+            a copy to its beams, again for every other mesh, as in ``solve_static(adapt=...)``.
         """
         self._put(item)
         return self
@@ -213,14 +208,6 @@ class Model(NearMisses):
         ----------
         force, length
             As "N" and "mm", with stresses in MPa; other units give a compound, as "lbf/in²".
-
-        Examples
-        --------
-        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-        >>> scene = Scene(Beam(MeshBeam.init_line([0, 500, 1000], height=10), ElementBeamANCF(2),
-        ...                    StVenantKirchhoff(E=2.1e5, nu=0.3), width=10)).units("N", "mm")
-        >>> state = scene.clamp("left").point_force((0, -5), at=(1000, 0)).solve_static()
-        >>> ax = state.plot("S_xx")                                 # $S_{xx}$ (MPa)
         """
         for name, value in (("force", force), ("length", length)):
             if not require_text(name, value) or value in OTHER[name]:
@@ -300,8 +287,6 @@ class Model(NearMisses):
             them: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, (beam, "right"), a
             point that only one of them has, ("ground", (x, y)), or a RigidBody for its centre of
             mass.
-        name
-            Name of the joint in messages.
 
         Examples
         --------
@@ -327,8 +312,6 @@ class Model(NearMisses):
             As for :meth:`hinge`; (beam, "right") is the axis at that end. For a
             :class:`~skfem_ancf.Domain` a boundary, as (domain, "right"), which is bonded to the end
             or side of a beam, as (beam, "left"), or to a rigid body.
-        name
-            Name of the joint in messages.
         apart
             Allow a distance between the points in the reference configuration, which the weld
             closes.
@@ -351,8 +334,6 @@ class Model(NearMisses):
         angle
             Keep the angle between the section at the point and the axis or the line: the slider
             transmits a moment.
-        name
-            Name of the joint in messages.
         """
         return self.joint(slider(self.layout, at, on, direction, angle, name))
 

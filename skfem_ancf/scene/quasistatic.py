@@ -201,7 +201,7 @@ class StepHistory(History):
     @property
     def jumps(self) -> Array:
         """Times of equilibria reached by a jump, shape (n,)."""
-        return self.t[[way.startswith(JUMPED) for way in self.found_by]]
+        return self.t[[one.startswith(JUMPED) for one in self.found_by]]
 
     def during(self, step: str) -> Array:
         """Indices of the instants of a step, its start and end included."""
@@ -263,7 +263,7 @@ class Instant(NamedTuple):
 
     t: float
     result: StaticResult
-    way: str  # how it was found: the name of a strategy
+    found_by: str  # the name of a strategy
     rate: float | None = None  # largest displacement of a node over the last increment of time
     velocity: Array | None = None  # change of displacements over that time, of a loose bundle
 
@@ -286,14 +286,14 @@ def _begin(system, t, start, u, rules, stable):
     result = None
     if search.stabilised_by_loads:
         try:
-            result, way = search.at_rest(), AT_REST
+            result, found_by = search.at_rest(), AT_REST
         except LoadStepFailed:
             logger.debug("t = %.6g: not at rest", t)
     if result is None:
         result = search.find()
-        way = result.attempts[-1].strategy
+        found_by = result.attempts[-1].strategy
     result.rubbed = 0.0 if motion is None else motion.dissipated
-    return Instant(t, result, way)
+    return Instant(t, result, found_by)
 
 
 def follow(system: System, ends: Array, increments: int, begin: Instant, rules: Rules,
@@ -327,18 +327,18 @@ def follow(system: System, ends: Array, increments: int, begin: Instant, rules: 
             target = grid[grid.searchsorted(begin.t, side="right")]
             parts = np.ceil((target - begin.t) / size - 1e-3)
             t = target if parts <= 1.0 else begin.t + (target - begin.t) / parts
-            if begin.way == AT_REST:
+            if begin.found_by == AT_REST:
                 least = max(least, CUTS_AT_REST * most)
             smallest = stalled or size <= least
             try:
                 found = _next(system, begin, t, rules, stable, smallest, drag)
             except (LoadStepFailed, ConvergenceError) as failure:
-                if smallest and (begin.way != AT_REST or size < 2.0 * LAST_AT_REST * most):
+                if smallest and (begin.found_by != AT_REST or size < 2.0 * LAST_AT_REST * most):
                     raise
                 logger.info("t = %.6g failed (%s), increment cut", t, failure)
                 size *= CUT
                 continue
-            jumps = jumps + 1 if found.way.startswith(JUMPED) else 0
+            jumps = jumps + 1 if found.found_by.startswith(JUMPED) else 0
             if jumps > JUMPS:
                 raise LoadStepFailed(f"at t = {t:.6g} even the smallest increments do not lead "
                                      "from one equilibrium to the next")
@@ -384,16 +384,16 @@ def _next(system: System, last: Instant, t: float, rules: Rules, stable: bool,
             continue
         if method == "descent":
             result.rubbed += last.result.rubbed
-        way = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
-        return Instant(t, result, way, moved / (t - last.t))
+        found_by = FOLLOWED if moved <= far else f"{JUMPED} by {method}"
+        return Instant(t, result, found_by, moved / (t - last.t))
     if not smallest:
         raise failed
     logger.info("t = %.6g: %s, looking for another equilibrium", t, failed)
     result = search.find()
     result.rubbed += last.result.rubbed
     moved = largest_displacement(system, result.u - last.result.u)
-    way = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
-    return Instant(t, result, way, moved / (t - last.t))
+    found_by = FOLLOWED if moved <= far else f"{JUMPED} by {result.attempts[-1].strategy}"
+    return Instant(t, result, found_by, moved / (t - last.t))
 
 
 def _loose(system: System, last: Instant, t: float, drag: Array, start: StaticResult,
@@ -481,5 +481,5 @@ class _Record:
             self.system, self.scheme, columns, (None, None), self._recorder.readings(),
             event=None, steps=max(0, len(results) - 1), substeps=0, rejected=0,
             iterations=sum(x.iterations for x in results), factorizations=0, plan=self.plan,
-            found_by=[x.way for x in self._instants],
+            found_by=[x.found_by for x in self._instants],
             iterations_at=np.array([x.iterations for x in results], dtype=int))

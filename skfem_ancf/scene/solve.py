@@ -15,16 +15,14 @@ from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import Layout
 from ..beam.masses import projected
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown,
-                           StabilityWarning, SupportError, ask_field, require_finite,
-                           require_option, warn)
+from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, SupportError,
+                           ask_field, require_finite, require_option)
 from ..core.types import Array
 from ..dynamics.choice import choose_scheme
 from ..dynamics.integrator import OF_STEP
 from ..equations.matrices import linear_external_force, linear_force
 from ..equations.system import System
 from ..materials.damping import Damping
-from ..results.checks import warn_of
 from ..results.state import State
 from ..solvers import eigen
 from ..solvers.iteration import ITERATIONS
@@ -46,17 +44,14 @@ def difference(a: Beam, b: Beam) -> str | None:
     """Why degrees of freedom of a beam do not fit that of the scene; None if they do."""
     if a is b or (a.mesh is b.mesh and a.element is b.element):
         return None
-    if repr(a.element) != repr(b.element) or not _same(a.element.doflocs, b.element.doflocs):
+    if repr(a.element) != repr(b.element) or not np.array_equal(a.element.doflocs,
+                                                                b.element.doflocs):
         return f"its element is {a.element!r}, that of the scene {b.element!r}"
     for name, what in _GEOMETRY.items():
         x, y = getattr(a.mesh, name), getattr(b.mesh, name)
-        if not _same(x, y):
+        if not (x is y or x is not None and y is not None and np.array_equal(x, y)):
             return what.format(x, y)
     return None
-
-
-def _same(a: Any, b: Any) -> bool:
-    return a is b or (a is not None and b is not None and np.array_equal(a, b))
 
 
 def displacement(system: System, state: State, name: str = "start") -> Array:
@@ -158,7 +153,7 @@ def solve_linear(system: System) -> State:
 
 def solve_static(system: System, u: Array | None, memory: Array | None,
                  find: Callable[..., StaticResult]) -> State:
-    """The equilibrium under full load, without the warnings of :func:`warn_about`.
+    """The equilibrium under full load, without warnings.
 
     ``find`` is :func:`skfem_ancf.solvers.solve_static` with its options.
     """
@@ -183,13 +178,6 @@ def _state(system, result):
     return State(system, result.u, result.load, result.force, result.converged, result.iterations,
                  result.message, result.steps, result.multipliers, doubt=result.doubt,
                  memory=result.memory, turns=result.turns)
-
-
-def warn_about(state: State) -> None:
-    """Warn of a doubtful static solution."""
-    if state.doubt:
-        warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
-    warn_of(state)
 
 
 # what a solution uses, and why
@@ -220,7 +208,24 @@ def make_plan(system: System, kind: str) -> Plan:
         found[f"{name} of {beam.mesh.nelements} x {beam.element!r}{across}, {strain}"] += 1
     plan = Plan(elements="; ".join(f"{n} {name}" for name, n in found.items())
                 or "there are no beams")
-    plan["linear solver"] = _linear_solver(system, dynamic)
+    solver, m = system.solver, system.constraints.m
+    if dynamic and system.mass_solver.by_nodes:
+        text = ("lines condensed to displacements and rotations of nodes, sparse LDL^T of these, "
+                "for steps and for the mass with its impulses; by 'energy-momentum', "
+                "'generalized-alpha' and its kin")
+    elif not dynamic and solver.condensed is not None:
+        text = (f"lines condensed to {solver.condensed.size} displacements and rotations of nodes, "
+                "sparse LDL^T of these: no multiplier is unknown")
+    elif not dynamic and solver.coupled and (
+            not system.constraints.few or system.forces.far or not system.symmetric):
+        text = "sparse LU on the null space of the joints"
+    else:
+        text = (f"banded {'Cholesky' if system.symmetric else 'LU'}, half bandwidth "
+                f"{system.K.width}{'' if system.symmetric else ': a force has no potential'}")
+        if m:
+            text += f", with a Schur complement for the {m} equations of joints"
+            text += "" if dynamic else "; sparse LU with these if joints prevent rigid motions"
+    plan["linear solver"] = text
     if kind == "linear":
         plan["compiled loop"] = "no: one solve"
     else:
@@ -232,22 +237,3 @@ def make_plan(system: System, kind: str) -> Plan:
         scheme, reason = choose_scheme(system)
         plan["scheme"] = f'scheme="auto" takes {scheme!r}: {reason}'
     return plan
-
-
-def _linear_solver(s, dynamic):
-    if dynamic and s.mass_solver.by_nodes:
-        return ("lines condensed to displacements and rotations of nodes, sparse LDL^T of these, "
-                "for steps and for the mass with its impulses; by 'energy-momentum', "
-                "'generalized-alpha' and its kin")
-    if not dynamic and s.solver.condensed is not None:
-        return (f"lines condensed to {s.solver.condensed.size} displacements and rotations of "
-                "nodes, sparse LDL^T of these: no multiplier is unknown")
-    if not dynamic and s.solver.coupled and (
-            not s.constraints.few or s.forces.far or not s.symmetric):
-        return "sparse LU on the null space of the joints"
-    solver = f"banded {'Cholesky' if s.symmetric else 'LU'}, half bandwidth {s.K.width}"
-    solver += "" if s.symmetric else ": a force has no potential"
-    if s.constraints.m:
-        solver += f", with a Schur complement for the {s.constraints.m} equations of joints"
-        solver += "" if dynamic else "; sparse LU with these if joints prevent rigid motions"
-    return solver
