@@ -290,12 +290,13 @@ class Beam(Immutable):
     @cached_property
     def sizes(self) -> Array:
         """Typical changes of the DOFs when the beam moves by its size, shape (N,)."""
-        length, h = float(self.mesh.lengths.sum()) / self.mesh.nelements, self.mesh.height
+        length, h = float(self.mesh.lengths.sum()) / len(self.mesh.lengths), self.mesh.height
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
         out = np.empty((self.N // self.nd, len(node), 2))
         out[:] = np.array(node)[:, None]
-        return read_only(out.ravel())
+        out.flags.writeable = False
+        return out.reshape(-1)
 
     def rigid_motions(self) -> Array:
         """Two translations and the rotation about :attr:`origin`, (N, 3)."""

@@ -104,7 +104,7 @@ class Histories:
 
     def get(self) -> Array | None:
         """A copy of the history; None if nothing has happened."""
-        if (self.values == self.rest).all():
+        if not self.values.size or (self.values == self.rest).all():
             return None
         return self.values.copy()
 

@@ -30,6 +30,11 @@ def custom_evaluate(handle, strain, out):
     out[:] = np.nan  # never called: such scenes run in NumPy
 
 
+@lru_cache(64)
+def _words_of(pattern):
+    return Words(compiled_pattern(pattern))
+
+
 @cache
 def law(function: Any) -> int:
     """The address of a material law; laws outside of the package are not cached on disk."""
@@ -81,11 +86,6 @@ def _flat_body(body, words):
     found = [Words(_compiled(t)) for t in body.packs]
     words += found
     return FlatBody(np.array([x.address for x in found], dtype=np.int64), body.table)
-
-
-@lru_cache(64)
-def _words_of(pattern):
-    return Words(compiled_pattern(pattern))
 
 
 def _compiled(t):

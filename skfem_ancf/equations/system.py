@@ -539,7 +539,7 @@ class System:
 
 
 def _holds(load):
-    return load.first_order and not load.constant
+    return not load.constant and load.first_order
 
 
 def _extent(bodies):

@@ -767,9 +767,9 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     bounding box of all nodes, but at least the longest line (a curled line may be straightened) and
     at most the total length of all lines.
     """
-    total = float(sum(mesh.lengths.sum() for mesh in meshes))
     if len(meshes) == 1 and meshes[0].is_chain:
-        return total
+        return float(meshes[0].lengths.sum())
+    total = float(sum(mesh.lengths.sum() for mesh in meshes))
     longest = max([float(mesh.chain_lengths.max()) for mesh in meshes])
     low = np.min([mesh.p.min(axis=1) for mesh in meshes], axis=0)
     high = np.max([mesh.p.max(axis=1) for mesh in meshes], axis=0)

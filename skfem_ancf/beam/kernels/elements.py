@@ -33,7 +33,7 @@ SAME = 1e-13
 def scaled(G: Array) -> tuple[Array, Array, Array]:
     """One G, and R (k, rows) and D (k, m) with ``G[e] = R[e] G D[e]``; or all G, and ones."""
     k, rows, m = G.shape
-    R, D = np.ones((k, rows)), np.ones((k, m))
+    R, D = 1.0 + np.zeros((k, rows)), 1.0 + np.zeros((k, m))
     if k == 1:
         return G, R, D
     used = G[0].any(axis=0)
