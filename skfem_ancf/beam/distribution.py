@@ -37,20 +37,14 @@ BOTTOM, TOP, AXIS, BODY = range(4)
 
 @dataclass(frozen=True)
 class Sampled:
-    """A force density given by values at points of elements, with polynomials between them.
+    """A force density given by values at points of elements, with polynomials between them."""
 
-    It acts on ``where`` (BOTTOM, TOP, AXIS or BODY) of ``elements`` (n,). ``values`` at the points
-    ``xi`` (p,) are force per xi, (2, ..., n, p); for a body, with points ``eta`` (q,) across, force
-    per volume, (2, ..., n, p, q). ``parts`` (2, n) are begin and end of parts of elements, in
-    order, between which the points lie; None for whole elements.
-    """
-
-    where: int
-    elements: Array
-    xi: Array
-    values: Array
-    eta: Array | None = None
-    parts: Array | None = None
+    where: int  # BOTTOM, TOP, AXIS or BODY
+    elements: Array  # (n,)
+    xi: Array  # points along them, (p,)
+    values: Array  # force per xi, (2, ..., n, p); for a body per volume, (2, ..., n, p, q)
+    eta: Array | None = None  # for a body points across, (q,)
+    parts: Array | None = None  # begin and end of parts of elements in order, (2, n), or all
 
     def times(self, factor: Any) -> Sampled:
         """The density times a factor or several, shape (...)."""

@@ -51,21 +51,14 @@ class BeamPoints:
                  e: Array, X: Array) -> None:
         self.beam, self.number, self.slice, self.index = beam, number, dofs, index
         self.n, self.e, self.X = len(e), e, X
-
-    @property
-    def at(self) -> Array:
-        """Points of the reference cell in the shape (2, n, 1)."""
-        return self.X[:, :, None]
+        #: Points of the reference cell in the shape (2, n, 1).
+        self.at = X[:, :, None]
+        #: A point is off the axis of a cable, where positions are nonlinear.
+        self.off_axis = not beam.has_sections and bool((np.abs(X[1] - 0.5) > ON_AXIS).any())
 
     @cached_property
     def start(self) -> Array:
-        """Positions in the reference configuration, (2, n)."""
         return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
-
-    @property
-    def off_axis(self) -> bool:
-        """True if a point is off the axis of a cable, where positions are nonlinear."""
-        return not self.beam.has_sections and bool((np.abs(self.X[1] - 0.5) > ON_AXIS).any())
 
     @property
     def dofs(self) -> Array:
@@ -147,13 +140,11 @@ class BodyPoints:
         self._frame = body.local(start)
 
     def displacement(self, u: Array) -> Array:
-        """Displacements (..., 2, n) for DOFs ``u`` (..., N) of the scene."""
         x, y, c, s = np.moveaxis(u[..., self.slice, None], -2, 0)
         a, b = self._frame
         return np.stack([x + a * c - b * s, y + a * s + b * c], axis=-2)
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n) for DOFs and their rates, (..., N)."""
         return self.displacement(v)
 
     @property
@@ -184,12 +175,10 @@ class Located:
         return self.gather([part.displacement(u) for part in self.parts])
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2), or (..., 2, n) of several, for DOFs and their rates."""
         return self.gather([part.velocity(u, v) for part in self.parts])
 
     @cached_property
     def start(self) -> Array:
-        """Positions in the reference configuration."""
         return self.gather([part.start for part in self.parts])
 
 
@@ -275,7 +264,6 @@ class Points:
         raise InputError(f"{where}lines {numbers}: choose one, as line={numbers[0]}")
 
     def _of_body(self, points, beam):
-        """Located for a named body, or None."""
         if isinstance(points, RigidBody):
             points, beam = points.position, points
         elif beam is None and (self.beams or len(self.bodies) > 1):

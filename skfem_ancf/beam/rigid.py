@@ -85,9 +85,32 @@ class RigidBody(Immutable):
         self.position = require_finite("position", position, (2,))
         self.angle = require_finite_scalar("angle", angle)
         self.name = require_label("name", name)
-        self.outline = _square(self.mass, self.inertia) if outline is None else _polygon(outline)
+        if outline is None:
+            half = 0.5 * np.sqrt(6.0 * self.inertia / self.mass)
+            points = half * np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]])
+        else:
+            points = require_finite("outline", outline)
+            if points.ndim == 2 and points.shape[1] == 2:  # n >= 3, so that (2, n) differs
+                points = points.T
+            if points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not np.any(points):
+                raise InputError("an outline is a polygon of at least three corners, relative to "
+                                 "the centre of mass: a list of points, or an array of shape "
+                                 f"(n, 2), got {shown(outline)}")
+        self.outline = points
         c, s = np.cos(self.angle), np.sin(self.angle)
         self.q0 = np.array([*self.position, c, s])
+        #: :attr:`q0` with the position relative to :attr:`origin`.
+        self.q0_local = np.array([0.0, 0.0, c, s])
+        #: Names of the DOFs.
+        self.dofnames = list(NAMES)
+        #: Initial centre of mass, shape (2,).
+        self.origin = self.position
+        #: The mass.
+        self.total_mass = self.mass
+        #: Largest distance of the outline from the centre of mass.
+        self.size = float(np.max(np.hypot(*points)))
+        #: Typical changes of the DOFs when the body moves by its size, (4,).
+        self.sizes = np.array([self.size, self.size, 1.0, 1.0])
         self._frame = read_only(np.array([[c, -s], [s, c]]))
 
     def __repr__(self):
@@ -100,36 +123,6 @@ class RigidBody(Immutable):
         return rebuilt(self, changes)
 
     # the interface of a beam
-
-    @property
-    def dofnames(self) -> list[str]:
-        """Names of the DOFs."""
-        return list(NAMES)
-
-    @property
-    def q0_local(self) -> Array:
-        """:attr:`q0` with the position relative to :attr:`origin`."""
-        return np.append(np.zeros(2), self.q0[2:])
-
-    @property
-    def origin(self) -> Array:
-        """Initial centre of mass, shape (2,)."""
-        return self.position
-
-    @property
-    def size(self) -> float:
-        """Largest distance of the outline from the centre of mass."""
-        return float(np.max(np.hypot(*self.outline)))
-
-    @property
-    def sizes(self) -> Array:
-        """Typical changes of the DOFs when the body moves by its size, (4,)."""
-        return np.array([self.size, self.size, 1.0, 1.0])
-
-    @property
-    def total_mass(self) -> float:
-        """The mass."""
-        return self.mass
 
     def mass_entries(self) -> tuple[Array, Array, Array]:
         """Rows, columns and values (4,) of the mass matrix."""
@@ -231,19 +224,3 @@ class RigidBody(Immutable):
 def on_body(place: Any, beam: Any) -> tuple[Any, Any]:
     """Place and beam; a RigidBody given as place becomes the beam."""
     return (None, place) if isinstance(place, RigidBody) else (place, beam)
-
-
-def _square(mass, inertia):
-    half = 0.5 * np.sqrt(6.0 * inertia / mass)
-    return half * np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]])
-
-
-def _polygon(outline):
-    points = require_finite("outline", outline)
-    if points.ndim == 2 and points.shape[1] == 2:  # n >= 3, so that (2, n) differs
-        points = points.T
-    if points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not np.any(points):
-        raise InputError("an outline is a polygon of at least three corners, relative to the "
-                         "centre of mass: a list of points, or an array of shape (n, 2), got "
-                         f"{shown(outline)}")
-    return points

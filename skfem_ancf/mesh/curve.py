@@ -125,8 +125,10 @@ class Curve:
 
     def turning(self, s: Array) -> Array:
         """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
-        at, *rule = _stencil(s, *self.ends)
-        return _turning(*_each(self._moving, s, at), *rule)
+        at, weights, step = _stencil(s, *self.ends)
+        d, near = _each(self._moving, s, at)
+        x, y = np.einsum("is,jis->js", weights, near / np.hypot(*near)) / step
+        return np.array([-y, x]) / np.hypot(*d)
 
     def lengths(self, a: Array, b: Array) -> Array:
         """Arc lengths from parameters ``a`` to ``b``, all of shape (n,)."""
@@ -142,9 +144,8 @@ class Curve:
         beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
         gauss, w = _gauss_points(a, step)
         fine = np.append(a[:, None] + step[:, None] * FINE, s[-1])
-        near, *rule = _stencil(s, *self.ends)
         p, p_beside = _each(self, s, beside)
-        here, d_near, d_gauss, d_fine = _each(self._moving, s, near, gauss, fine)
+        here, d_gauss, d_fine = _each(self._moving, s, gauss, fine)
         lengths = np.hypot(*d_gauss) @ w * step
         gap = np.hypot(*(d_gauss @ w * step - np.diff(p))) / lengths
         k = int(np.argmax(gap))
@@ -169,7 +170,7 @@ class Curve:
         v = np.hypot(*d_fine)
         pieces = (v[:-2:2] + 4.0 * v[1::2] + v[2::2]) * np.repeat(step / 96.0, 16)  # Simpson's rule
         bent = np.abs(_angles(d_fine[:, :-2:2], d_fine[:, 2::2])) / pieces
-        return p.copy(), here / np.hypot(*here), lengths, _turning(here, d_near, *rule), bent
+        return p.copy(), here / np.hypot(*here), lengths, self.turning(s), bent
 
     def moved(self, A: Array, shift: Array) -> Curve:
         """The curve ``A r(s) + shift``."""
@@ -182,7 +183,6 @@ def _moved(function, A, shift, s):
 
 
 def _complex_step(r, s):
-    """The derivative by the complex step."""
     return np.imag(np.asarray(_components(r(s + 1e-30j), s))) / 1e-30
 
 
@@ -214,12 +214,6 @@ def _each(function, *parameters):
 
 def _angles(a, b):
     return np.arctan2(a[0] * b[1] - a[1] * b[0], np.sum(a * b, axis=0))
-
-
-def _turning(d, near, weights, step):
-    """Turning of a curve from its derivative at parameters (n,) and at their stencils (7, n)."""
-    x, y = np.einsum("is,jis->js", weights, near / np.hypot(*near)) / step
-    return np.array([-y, x]) / np.hypot(*d)
 
 
 def _stencil(s, s0, s1):

@@ -139,7 +139,6 @@ def graph_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
 
 
 def _mesh_of(mesh, unit):
-    """A meshio mesh, or the one in a file."""
     import meshio
 
     if isinstance(mesh, (str, Path)):

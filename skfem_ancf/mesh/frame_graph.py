@@ -92,8 +92,7 @@ def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
 
 
 class Axes:
-    """The axes of chains: the curves ``arcs`` by number; others straight from ``start`` along
-    ``chord``.
+    """The axes of chains, as a :class:`Curve`: ``arcs`` by number; others straight along ``chord``.
     """
 
     def __init__(self, arcs: Mapping[int, Curve], start: Array, chord: Array) -> None:
@@ -105,7 +104,6 @@ class Axes:
                                       if np.any(chain == k)]
 
     def nodes(self, s: Array) -> tuple[Array, Array]:
-        """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
         chain, s, parts = self._parts(s)
         chord = self.chord[:, chain]
         p, tangent = self.start[:, chain] + s * chord, chord / np.hypot(*chord)
@@ -114,7 +112,6 @@ class Axes:
         return p, tangent
 
     def turning(self, s: Array) -> Array:
-        """Derivative of the unit normal by arc length at parameters ``s``, shape (2, n)."""
         _, s, parts = self._parts(s)
         out = np.zeros((2, len(s)))
         for arc, here in parts:
@@ -122,7 +119,6 @@ class Axes:
         return out
 
     def lengths(self, a: Array, b: Array) -> Array:
-        """Arc lengths from parameters ``a`` to ``b`` on the same chains, all of shape (n,)."""
         chain, x, parts = self._parts(a)
         y = b - 2 * chain
         out = (y - x) * np.hypot(*self.chord[:, chain])
@@ -131,7 +127,6 @@ class Axes:
         return out
 
     def moved(self, A: Array, shift: Array) -> Axes:
-        """The axes ``A r(s) + shift``."""
         return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
                     A @ self.start + shift[:, None], A @ self.chord)
 
@@ -189,7 +184,6 @@ class FrameGraph:
                                 f"{self.tol:.3g}, within which points are one node")
 
     def _require_points(self):
-        """Check that lines join existing, different points."""
         n, (a, b) = self.points.shape[1], self.lines
         bad = np.flatnonzero((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n))
         if len(bad):
@@ -204,7 +198,6 @@ class FrameGraph:
                             "line: remove it, or join it to another point")
 
     def _require_lines(self):
-        """Check for duplicate lines."""
         key = np.sort(self.lines[:, self.distinct], axis=0)
         _, first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)
         first = first[np.ravel(which)]
@@ -234,7 +227,6 @@ class FrameGraph:
                  ModelWarning)
 
     def _merge(self, tol):
-        """Merge points within a tolerance into one node."""
         n, places = self.points.shape[1], self.points
         length = np.hypot(*(places[:, self.lines[1]] - places[:, self.lines[0]]))
         self.tol = require_not_negative("tol", tol, False) if tol is not None else float(min(
@@ -277,7 +269,6 @@ class FrameGraph:
 
     @property
     def size(self) -> float:
-        """Largest extent of the points."""
         return float(np.max(np.ptp(self.points, axis=1)))
 
     def nodes_at(self, place: Any) -> Array:
@@ -389,7 +380,6 @@ def _pairs(what, values):
 
 
 def _named(kind, what, given, n):
-    """Check numbers by name."""
     out = {}
     for name, numbers in mapping_of(f"{kind}s of {what}", given).items():
         if require_label(f"a {kind} of {what}", name) is None:

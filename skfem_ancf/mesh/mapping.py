@@ -30,7 +30,6 @@ FITS = 0.02
 
 
 def scaled(function: Callable[[Array], Any], factor: float, s: Array) -> Array:
-    """``factor`` times a function of parameters (n,)."""
     return factor * np.asarray(function(s))
 
 
@@ -151,13 +150,18 @@ class MappingBeam(Mapping):
     def __init__(self, mesh: Any) -> None:
         self.mesh = mesh
         self.dim = 2
+        n = 1 + SECTIONS.index(mesh.sections)
+        self._orders = max(2, n), n
+        #: Coefficients (4, ne) of powers of xi in the height over the largest; None if constant.
+        self.heights = None
+        #: Degree of the height in xi: 0 if it is constant.
+        self.height_degree = 0
+        if mesh.heights is not None:
+            self.heights = c = powers(mesh.heights) / mesh.height
+            c[np.abs(c) <= NOTHING] = 0.0  # for a linear height
+            self.height_degree = int(np.max(np.nonzero(np.any(c, axis=1))))
 
     # coefficients
-
-    @property
-    def _orders(self):
-        n = 1 + SECTIONS.index(self.mesh.sections)
-        return max(2, n), n
 
     @cached_property
     def _all_coefficients(self):
@@ -183,15 +187,6 @@ class MappingBeam(Mapping):
 
     # heights
 
-    @cached_property
-    def heights(self) -> Array | None:
-        """Coefficients (4, ne) of powers of xi in the height over the largest; None if constant."""
-        if self.mesh.heights is None:
-            return None
-        c = powers(self.mesh.heights) / self.mesh.height
-        c[np.abs(c) <= NOTHING] = 0.0  # for a linear height
-        return c
-
     def _relative(self, xi, tind):
         """Height over the largest height, and its derivative, (ne, np); 1 and 0 if constant."""
         if self.heights is None:
@@ -203,13 +198,6 @@ class MappingBeam(Mapping):
         """Height of the section and its derivative by xi; numbers if it is constant."""
         g, rate = self._relative(xi, tind)
         return self.mesh.height * g, self.mesh.height * rate
-
-    @cached_property
-    def height_degree(self) -> int:
-        """Degree of the height in xi: 0 if it is constant."""
-        if self.heights is None:
-            return 0
-        return int(np.max(np.nonzero(np.any(self.heights, axis=1))))
 
     def offset(self, X: Array, tind: Array | None = None) -> Any:
         """Distance Y of reference points from the axis."""
@@ -283,7 +271,6 @@ class MappingBeam(Mapping):
 
     @cached_property
     def inverse(self) -> Inverse:
-        """The map from points of the body to reference points."""
         if self.mesh.is_straight:
             return InverseOfLines(self.mesh, self.heights)
         start, axis, director = self._all_coefficients

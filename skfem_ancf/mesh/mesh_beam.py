@@ -472,7 +472,7 @@ class MeshBeam(NumberedMesh):
     # refinement
 
     def _uniform(self):  # scikit-fem's finder of elements on surfaces calls it
-        return self._adaptive(np.arange(self.nelements))
+        return halved(self, np.arange(self.nelements))
 
     def refined(self, times_or_ix: Any = 1) -> MeshBeam:
         """A finer mesh with the same named boundaries and subdomains; new nodes are on the curve.
@@ -488,7 +488,7 @@ class MeshBeam(NumberedMesh):
                 "the number of refinements", times_or_ix, 0, max(most, 0),
                 f"a mesh of {MAX_ELEMENTS} elements at most"))
         require_unmasked("times_or_ix", times_or_ix)
-        return self._adaptive(times_or_ix)
+        return halved(self, np.unique(self.normalize_elements(times_or_ix)))
 
     def graded(self, at: Any = ("left",), size: float | None = None,
                growth: float = 0.5) -> MeshBeam:
@@ -540,9 +540,6 @@ class MeshBeam(NumberedMesh):
             if len(marked) == 0:
                 return mesh
             mesh = mesh.refined(marked)
-
-    def _adaptive(self, ix):
-        return halved(self, np.unique(self.normalize_elements(ix)))
 
     def restrict(self, elements: Any, return_mapping: bool = False, skip_boundaries: bool = False,
                  skip_subdomains: bool = False) -> Any:

@@ -25,9 +25,8 @@ FARTHEST = float(np.finfo(float).max)
 #: Tolerance and largest number of Newton iterations.
 CLOSE, ITERATIONS = 1e-7, 30
 
-#: Samples of each element in the search tree, steps to neighbours from the nearest sample, and
-#: further candidates for a point that is in none of these elements.
-SAMPLES, WALK, CANDIDATES = 4, 3, 6
+#: Samples of each element in the search tree.
+SAMPLES = 4
 
 
 def with_slope(coefficients: Array, xi: Any) -> tuple[Any, Any]:
@@ -119,58 +118,78 @@ class Finder:
         #: Tolerance of equal distances from axes.
         self.equal = 1e-8 * mesh.height
 
-    @cached_property
-    def _neighbours(self):
-        """The previous and the next element in the chain, (2, nelements); -1 at its ends."""
-        left, right = self.mesh.t
-        joined, e = right[:-1] == left[1:], np.arange(self.mesh.nelements)
-        out = np.empty((2, len(e)), int)
-        out[0, :1] = out[1, -1:] = -1
-        out[0, 1:], out[1, :-1] = np.where(joined, e[:-1], -1), np.where(joined, e[1:], -1)
-        return out
-
     def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
         """Elements (n,), reference points (2, n), relative distances outside of them (zero, or
         infinite far away) for points (2, n) of a ``chain`` or of all, and whether chains are
         equally near.
         """
+        n = x.shape[1]
         noise = 1e-9 + 8 * EPS * (
             self.size + np.abs(x).max(initial=0.0)) / self.mesh.height
-        tied = np.zeros(x.shape[1], dtype=bool)
         with np.errstate(all="ignore"):
-            if chain is not None:
-                some = np.flatnonzero(self.mesh.chains == chain)[None]
-                e, X, outside = self._best(x, some, noise)
-                return e, np.clip(X, 0.0, 1.0), outside, tied
-            if self.is_chain:
-                return *self._find(x, noise), tied
-            e, X, outside = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape), np.full(
-                x.shape[1], np.inf)
-            points, elements = [], []  # pairs of points and elements that may contain them
-            for some, tree, radius in self._circles:
-                near = tree.query_ball_point(x.T, radius, return_sorted=False)
-                many = np.fromiter(map(len, near), dtype=int, count=len(near))
-                points.append(np.repeat(np.arange(x.shape[1]), many))
-                elements.append(some[np.concatenate([*near, []]).astype(int)])
-            k, some = np.concatenate(points), np.concatenate(elements)
-            Y = self.mapping.inverse(x[:, k, None], some)[..., 0]
-            inside = self._outside(Y, noise) == 0.0
-            k, some, Y = k[inside], some[inside], np.clip(Y[:, inside], 0.0, 1.0)
-            # among all elements that contain a point choose that with the nearest axis
-            off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
-            np.minimum.at(least, k, off)
-            near = off <= least[k] + self.equal
-            k, some, Y = k[near], some[near], Y[:, near]
-            order = np.lexsort((some, k))
-            at, first = np.unique(k[order], return_index=True)
-            first = order[first]
-            e[at], X[:, at], outside[at] = some[first], Y[:, first], 0.0
-            chains = self.mesh.chains
-            np.logical_or.at(tied, k, chains[some] != chains[e[k]])
-            left = np.flatnonzero(outside)
-            if len(left):
-                e[left], X[:, left], outside[left] = self._find(x[:, left], noise)
+            if self._line is not None:
+                d, first, start = self._line
+                along, across = d @ (x - first)
+                # a point of the section between two elements is one of the left
+                e = (start + noise * self.mesh.lengths)[1:].searchsorted(along)
+                xi = (along - start[e]) / self.mesh.lengths[e]
+                h = self.mesh.height if self.mesh.heights is None else (
+                    self.mapping.height(xi[:, None], e)[0][:, 0])
+                X = np.array([xi, 0.5 + across / h])
+                outside = self._outside(X, noise)
+                outside[outside > 1.0] = np.inf
+                return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
+            if chain is not None or not self.is_chain:
+                return self._best(x, noise, *self._pairs(x, chain))
+            # the axis is nearest in the element of the nearest sample, or in the next one
+            near = self._tree.query(x.T)[1]
+            beside = near // SAMPLES + np.where(near % SAMPLES < SAMPLES // 2, -1, 1)
+            found = self._best(x, noise, np.tile(np.arange(n), 2), np.append(
+                near // SAMPLES, np.clip(beside, 0, self.mesh.nelements - 1)))
+            left = np.flatnonzero(found[2])
+            if len(left):  # on a face, or in a coil that is higher than the nearest one
+                for old, new in zip(found, self._best(x[:, left], noise, *self._pairs(x[:, left]))):
+                    old[..., left] = new
+        return found
+
+    def _best(self, x, noise, k, some):
+        """The elements of :meth:`find` from pairs of points k and elements, (m,) each."""
+        e, X = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape)
+        outside, least = np.full((2, x.shape[1]), np.inf)
+        Y = self.mapping.inverse(x[:, k, None], some)[..., 0]
+        gap, Y = self._outside(Y, noise), np.minimum(np.maximum(Y, 0.0), 1.0)
+        np.minimum.at(outside, k, gap)
+        on = gap <= outside[k]
+        k, some, Y = k[on], some[on], Y[:, on]
+        # of several elements that contain a point that with the nearest axis, and of two the left
+        off = self.from_axis(some, Y)
+        np.minimum.at(least, k, off)
+        on = off <= least[k] + self.equal
+        k, some, Y = k[on], some[on], Y[:, on]
+        order = np.lexsort((some, k))[::-1]
+        e[k[order]], X[:, k[order]] = some[order], Y[:, order]  # the last one stays
+        tied, chains = np.zeros(x.shape[1], dtype=bool), self.mesh.chains
+        np.logical_or.at(tied, k, chains[some] != chains[e[k]])
         return e, X, outside, tied
+
+    def _pairs(self, x, chain=None):
+        """Pairs of points (2, n) and elements whose bounding circles contain them, (k,) each."""
+        middle, radius = self._circles
+        level, tree = np.floor(np.log2(radius)).astype(int), scipy.spatial.cKDTree(x.T)
+        points, elements = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        on = np.full(len(level), True) if chain is None else self.mesh.chains == chain
+        for k in np.unique(level[on]):
+            some = np.flatnonzero(on & (level == k))
+            found = tree.sparse_distance_matrix(scipy.spatial.cKDTree(middle[:, some].T),
+                                                radius[some].max(), output_type="ndarray")
+            points.append(found["i"])
+            elements.append(some[found["j"]])
+        return np.concatenate(points), np.concatenate(elements)
+
+    @cached_property
+    def _tree(self):
+        samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
+        return scipy.spatial.cKDTree(self.mapping.F(samples).reshape(2, -1).T)
 
     def inside(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array]:
         """As :meth:`find`, but raises MeshError for points outside the body, or the chain."""
@@ -201,55 +220,9 @@ class Finder:
 
     @cached_property
     def _circles(self):
-        """Groups of elements of similar size: a tree of their centres and bounding circles."""
+        """Centres (2, nelements) and radii (nelements,) of bounding circles."""
         middle = self.mapping.F(np.array([[0.5], [0.5]])).reshape(2, -1)
-        radius = 0.51 * (self.mesh.lengths + self.mesh.height)
-        level = np.floor(np.log2(radius)).astype(int)
-        out = []
-        for k in np.unique(level):
-            some = np.flatnonzero(level == k)
-            out.append((some, scipy.spatial.cKDTree(middle[:, some].T), float(radius[some].max())))
-        return out
-
-    def _find(self, x, noise):
-        if self._line is not None:  # a single straight line
-            d, first, start = self._line
-            along, across = d @ (x - first)
-            # a point of the section between two elements is one of the left
-            e = (start + noise * self.mesh.lengths)[1:].searchsorted(along)
-            xi = (along - start[e]) / self.mesh.lengths[e]
-            h = self.mesh.height if self.mesh.heights is None else (
-                self.mapping.height(xi[:, None], e)[0][:, 0])
-            X = np.array([xi, 0.5 + across / h])
-            outside = self._outside(X, noise)
-            outside[outside > 1.0] = np.inf
-            return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
-        # the nearest element, or its neighbour where the point is beyond the common node
-        distance, near = self._tree.query(x.T)
-        e, todo = near // SAMPLES, np.flatnonzero(distance <= self._far)
-        X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
-        steps = 0
-        while len(todo):
-            X[:, todo] = self.mapping.inverse(x[:, todo, None], e[todo])[..., 0]
-            outside[todo] = self._outside(X[:, todo], noise)
-            # a point of the section between two elements is one of the left
-            before, after = self._neighbours[:, e[todo]]
-            other = np.where(X[0, todo] <= noise, before,
-                             np.where(X[0, todo] > 1.0 + noise, after, -1))
-            on, steps = (other >= 0) & (steps < WALK), steps + 1
-            todo = todo[on]
-            e[todo] = other[on]
-        left = ((outside > 0) & np.isfinite(outside)).nonzero()[0]
-        if len(left):
-            k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
-            near = self._tree.query(x[:, left].T, k=k)[1].reshape(len(left), k)
-            e[left], X[:, left], outside[left] = self._best(
-                x[:, left], np.sort(near // SAMPLES, axis=1), noise)
-            for i in left[outside[left] > self.allowed]:  # rare: neighbouring coils are nearer
-                all_of_them = np.arange(self.mesh.nelements)[None]
-                e[i], X[:, i], outside[i] = (part[..., 0] for part in self._best(
-                    x[:, i:i + 1], all_of_them, noise))
-        return e, np.minimum(np.maximum(X, 0.0), 1.0), outside
+        return middle, 0.51 * (self.mesh.lengths + self.mesh.height)
 
     @staticmethod
     def _outside(X, noise):
@@ -259,24 +232,11 @@ class Finder:
         return out
 
     @cached_property
-    def _samples(self):
-        samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
-        return self.mapping.F(samples).reshape(2, -1)
-
-    @cached_property
-    def _far(self):
-        """Points farther from all samples than this are outside all elements."""
-        return 0.75 * self.mesh.height + float(np.max(self.mesh.lengths))
-
-    @cached_property
     def box(self) -> tuple[float, float, float, float]:
         """A bounding box of the body: least and largest x, least and largest y."""
-        (x0, y0), (x1, y1) = (f(self._samples, axis=1).tolist() for f in (np.min, np.max))
-        return x0 - self._far, x1 + self._far, y0 - self._far, y1 + self._far
-
-    @cached_property
-    def _tree(self):
-        return scipy.spatial.cKDTree(self._samples.T)
+        middle, radius = self._circles
+        (x0, y0), (x1, y1) = np.min(middle - radius, axis=1), np.max(middle + radius, axis=1)
+        return float(x0), float(x1), float(y0), float(y1)
 
     @cached_property
     def _line(self):
@@ -288,16 +248,6 @@ class Finder:
             return None
         d = np.array([mesh.p_X[:, 0], mesh.p_Y[:, 0]])
         return d, first, d[0] @ (mesh.p[:, :-1] - first)
-
-    def _best(self, x, candidates, noise):
-        """The best of the candidates (n, k) for each point."""
-        n, k = x.shape[1], candidates.shape[1]
-        candidates = np.broadcast_to(candidates, (n, k))
-        X = self.mapping.inverse(np.repeat(x, k, axis=1)[:, :, None], candidates.ravel())
-        X = X[..., 0].reshape(2, n, k)
-        outside = self._outside(X.reshape(2, -1), noise).reshape(n, k)
-        rows, which = np.arange(n), np.argmin(outside, axis=1)
-        return candidates[rows, which], X[:, rows, which], outside[rows, which]
 
     @cached_property
     def extent(self) -> str:

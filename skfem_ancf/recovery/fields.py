@@ -156,6 +156,8 @@ class Values(Mapping):
                  eigen: Sequence[tuple[Any, Any]] = (), beam: Beam | None = None) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = beam or part.beam, len(part.e)
+        #: The member is a cable.
+        self.cable = not self.beam.has_sections
         #: Linear about the reference configuration.
         self._small = np.iscomplexobj(u) and not u.real.any()
         self._known: dict[str, Array] = {}
@@ -190,17 +192,11 @@ class Values(Mapping):
 
     @property
     def _strain(self):
-        """Strain of the elements."""
         return self._part.strain(self._u)
 
     @property
     def _remembers(self):
         return remembers(self.beam)
-
-    @property
-    def cable(self) -> bool:
-        """The member is a cable."""
-        return not self.beam.has_sections
 
     @cached_property
     def S(self) -> Array:
@@ -209,7 +205,6 @@ class Values(Mapping):
 
     @property
     def _stress(self):
-        """Stress of the elements."""
         part, u = self._part, self._u[self._part.slice]
         eigen = sum(load.stress_at(u, part.at, part.e, factor)[..., 0]
                     for factor, load in self._eigen)
@@ -293,7 +288,6 @@ class Values(Mapping):
 
     @property
     def _gradient(self):
-        """Deformation gradient of the elements."""
         part = self._part
         return np.add(*kinematics.gradients(
             self.beam, self._u[part.slice], part.at, part.e))[..., 0]
@@ -393,9 +387,10 @@ def _von_mises(v):
     return np.sqrt(0.5 * ((a - b)**2 + (b - z)**2 + (z - a)**2) + 3.0 * c * c)
 
 
-def _tresca(v):
+def _extremes(v):
+    """The largest and the least principal Cauchy stress, with that out of the plane."""
     high, low = v.principal_stress[0]
-    return np.maximum(high, v.sigma_zz) - np.minimum(low, v.sigma_zz)
+    return np.maximum(high, v.sigma_zz), np.minimum(low, v.sigma_zz)
 
 
 def _utilisation(v):
@@ -406,9 +401,8 @@ def _utilisation(v):
             return np.full(v.n, np.nan)
         if not isinstance(strength, tuple):
             return _von_mises(v) / strength
-        high, low = v.principal_stress[0]
-        return np.maximum(np.maximum(high, v.sigma_zz) / strength[0],
-                          -np.minimum(low, v.sigma_zz) / strength[1])
+        high, low = _extremes(v)
+        return np.maximum(high / strength[0], -low / strength[1])
 
     return v.of_materials(of)
 
@@ -437,7 +431,7 @@ def _table():
         yield Field(f"sigma_{c}", lambda v, k=k: v.sigma[k],
                     rf"Cauchy stress $\sigma_{{{c}}}$, global axes", area, frame="global")
     yield Field("von_mises", _von_mises, "von Mises stress", area, False)
-    yield Field("tresca", _tresca, "Tresca stress", area, False)
+    yield Field("tresca", lambda v: np.subtract(*_extremes(v)), "Tresca stress", area, False)
     for k in (0, 1):
         yield Field(f"eps_{k + 1}", lambda v, k=k: v.principal[0][k],
                     rf"principal strain $\varepsilon_{k + 1}$", one)
@@ -551,10 +545,9 @@ class DomainValues(Values):
     :func:`~skfem_ancf.core.linear.step` of them; components are in global axes.
     """
 
-    cable = False
-
     def __init__(self, domain: Domain, x: Array, u: Array, gradient: Array) -> None:
         self.beam: Any = domain
+        self.cable = False
         self._start, self._u, self._H = x, u, gradient
         self._find, self._eigen, self._known, self.n = None, (), {}, x.shape[1]
         self._small = np.iscomplexobj(u) and not gradient.real.any()

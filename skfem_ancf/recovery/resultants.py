@@ -139,7 +139,6 @@ class Resultants:
 
 
 def over_time(instants: list[Resultants]) -> Resultants:
-    """Join the Resultants of several instants."""
     first = instants[0]
     values: dict[str, Any] = {f.name: np.array([getattr(r, f.name) for r in instants])
                               for f in fields(first)}
@@ -204,7 +203,6 @@ def resultants(beam: Beam, u: Array, recovery: Recovery | None = None,
 
 
 def _on_axis(xi):
-    """Points on the axis, (2, n, 1)."""
     return np.array([xi, 0.5 + 0.0 * xi])[:, :, None]
 
 

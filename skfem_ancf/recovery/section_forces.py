@@ -50,7 +50,6 @@ class NotRecovered(AncfError):
 
     @property
     def why(self) -> str:
-        """The message."""
         return str(self)
 
 
@@ -91,12 +90,10 @@ class Interval(NamedTuple):
 
     @property
     def eta(self) -> Array:
-        """Eta of the nodes."""
         s = 0.5 - 0.5 * np.cos(np.pi * self.nodes) if self.curved else self.nodes
         return self.low + (self.high - self.low) * s
 
     def local(self, eta: Array) -> Array:
-        """s of points eta."""
         s = (eta - self.low) / (self.high - self.low)
         return np.arccos(np.clip(1.0 - 2.0 * s, -1.0, 1.0)) / np.pi if self.curved else s
 
@@ -154,10 +151,9 @@ class Intervals:
             for i, ((_, _, b), mean) in zip(self._intervals, pieces)])
         self._low, self._high = np.array([(i.low, i.high) for i in self._intervals]).T
         self.moves = self._measures[0].moves
-        self.from_bottom, self.whole = self._integrals(self.eta), np.zeros(ends[-1])
-        for i, columns in zip(self._intervals, self._columns):
-            self.whole[columns] = i.integrals(np.ones(1))
-        self.bottom, self.top = self.weights(np.array([self._low[0], self._high[-1]]))
+        faces = np.array([self._low[0], self._high[-1]])
+        self.from_bottom, (_, self.whole) = self._integrals(self.eta), self._integrals(faces)
+        self.bottom, self.top = self.weights(faces)
 
     def _which(self, eta):
         """The interval of each point; the upper one at an interface."""
@@ -236,7 +232,6 @@ class Sections:
 
     @property
     def volume(self) -> Array:
-        """The determinant of :attr:`J`."""
         return cross(self.J[:, 0], self.J[:, 1])
 
     @cached_property
@@ -461,7 +456,6 @@ class SectionForces:
     # where they jump
 
     def _cut(self, loads, stations):
-        """Find the cuts."""
         mesh, across = self.beam.mesh, self.beam.across
         ne = mesh.nelements
         stations = list(stations) + [s for _, load in loads for s in load.stations]
@@ -560,7 +554,6 @@ def _traction(beam, traction, X, e):
 
 
 def _snapped(stations):
-    """Axial coordinates, snapped to nodes."""
     stations = np.asarray(stations, dtype=float)
     near = np.round(stations)
     return np.where(np.abs(stations - near) < SNAP, near, stations)

@@ -156,7 +156,6 @@ def shape_of(name: str) -> Shape:
 
 
 def _width(h, times, sides, eta):
-    """Width at heights eta h."""
     y, x = h * np.asarray(eta), []
     for side in sides:
         row = np.searchsorted(side[:, 0], y, "right") - 1

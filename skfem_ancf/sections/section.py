@@ -64,7 +64,6 @@ class Measure(Immutable):
         return self
 
     def at(self, height: float) -> Measure:
-        """The measure at one height."""
         return self
 
     @property
@@ -96,7 +95,6 @@ class Measure(Immutable):
         return size * at.factor(times, whole) if times else size
 
     def width(self, at: Any) -> Any:
-        """Width at points of the layer."""
         return self.breadth(at) / at.layer.part
 
     def outline(self, at: Any) -> Any:

@@ -22,7 +22,6 @@ from ..places import Vector, products
 
 
 def rotation(angle: float) -> Array:
-    """The rotation matrix."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
 
@@ -170,7 +169,6 @@ class ComposedJoint(Joint):
     parts: Sequence[Equation] = ()
 
     def parts_at(self, t: float) -> Sequence[Equation]:
-        """The equations at a time."""
         return self.parts
 
     def value(self, u: Array, t: float) -> Array:

@@ -50,7 +50,6 @@ class Settlements:
         return Settlements(numbers, [f for f, _ in kept], [at for _, at in kept])
 
     def moves(self, k: int) -> bool:
-        """True if a node is displaced in component k."""
         return bool(np.any(self.numbers[:, k])) or any(at == k for _, at in self.at)
 
     def by(self, nodes: Array, k: int, times: Array) -> Array:
@@ -106,7 +105,6 @@ class Nodes(Joint):
 
     @property
     def moving(self) -> bool:  # type: ignore[override]
-        """True if a node has a prescribed displacement."""
         return any(self.settlements.moves(k) for k in range(len(COMPONENTS)))
 
     @property
@@ -136,7 +134,6 @@ class Nodes(Joint):
         return out
 
     def holding(self, fixed: Array, settlements: Settlements) -> Nodes:
-        """A copy with other supports."""
         return self._with(fixed=fixed, settlements=settlements, functions=settlements.functions)
 
     def bind(self, layout: Layout) -> None:

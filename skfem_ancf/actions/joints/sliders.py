@@ -182,7 +182,6 @@ class Axis:
         return s
 
     def places(self, u: Array, dofs: Array) -> Array:
-        """Nodal coordinates at a displacement."""
         return self._start[dofs - self.first] + u[dofs]
 
     def length(self, s: float) -> float:
@@ -430,7 +429,6 @@ class Sleeve(Joint):
 
     @array_cache(KNOWN)
     def _span(self, u0: Array, u1: Array) -> Span:
-        """The :class:`~skfem_ancf.actions.joints.sliders.Span` between two displacements."""
         ends = u0, u1
         s = [self._parameter(u) for u in ends]
         dofs, weights, quotients = self.axis.between(*s)
