@@ -76,6 +76,7 @@ HEADINGS = {
     "gradient": "gradients", "quasi-static": "solving", "linear theory": "solving",
     "mechanism": "solving", "locking": "formulations", "own element": "own",
     "curved beam": "recipes", "arc length": "solving", "dynamics": "motion", "drop": "faq",
+    "notebook": "faq", "Pyodide": "faq", "JupyterLite": "faq",
     "pulley": "obstacles",
     "own material": "own"}
 
