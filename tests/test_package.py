@@ -211,7 +211,8 @@ scene = Scene(beam).clamp("left").gravity((0, -9.81))
 assert scene.solve_static().stress((0.5, 0.005))[0] > 0.0
 scene.modes(2), scene.integrate(0.01, 1e-3), scene.solve_static().save("beam.vtu")
 if len(sys.argv) > 1:
-    scene.solve_static().report("beam.html"), scene.integrate(0.01, 1e-3).animate("beam.gif", fps=10)
+    scene.solve_static().report("beam.html")
+    scene.integrate(0.01, 1e-3).animate("beam.gif", fps=10)
 for module in list(sys.modules.values()):
     path = getattr(module, "__file__", None) or ""
     if "site-packages" in path and not path.endswith(".py"):

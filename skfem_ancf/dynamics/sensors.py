@@ -27,6 +27,8 @@ from .base import Motion
 MOVING = ("position", "displacement", "velocity", "acceleration")
 #: Quantities of a section.
 SECTION = ("N", "Q", "M", "force", "curvature", "shear", "angle")
+#: Quantities of contact.
+CONTACT = ("contact", "contact_pressure")
 
 
 class Sensor(Immutable):
@@ -37,13 +39,16 @@ class Sensor(Immutable):
     what
         "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress" or
         another name of :data:`skfem_ancf.recovery.fields.FIELDS` at points; "N", "Q", "M", "force",
-        "curvature", "shear" or "angle" of sections; "joint_force"; or a function of the State that
-        returns a number or an array.
+        "curvature", "shear" or "angle" of sections; "joint_force"; "contact", the sum of contact
+        forces, or "contact_pressure", the largest; or a function of the State that returns a number
+        or an array.
     at
         Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; the joint
-        for "joint_force"; None for a function.
+        for "joint_force"; the obstacle or contact, its item or number, None for all; None for a
+        function.
     beam
-        The beam, its name or number; searched for by default.
+        The beam, its name or number; searched for by default. Of contact the member on whose
+        surface it is, of contact of members one of both.
     recover
         Use recovered fields and section forces, about a millisecond per step and beam; by default
         those of the elements.
@@ -60,14 +65,14 @@ class Sensor(Immutable):
                 raise InputError("a sensor that is a function of the State takes no points: leave "
                                  f"out at=, got {shown(at)}")
             return
-        known = (*MOVING, *SECTION, "joint_force", *FIELDS)
+        known = (*MOVING, *SECTION, *CONTACT, "joint_force", *FIELDS)
         if not isinstance(what, str) or what not in known:
             raise NameUnknown("quantity of a sensor", what, known)
         if what == "joint_force":
             if not isinstance(at, Joint):
                 raise InputError('a sensor of "joint_force" needs at=joint, one of scene.joints, '
                                  f"got {shown(at)}")
-        elif at is None:
+        elif at is None and what not in CONTACT:
             raise InputError(f"a sensor of {what!r} needs points of the body: give at=")
 
     @property
@@ -82,7 +87,7 @@ class Sensor(Immutable):
 
 def locate(sensor: Sensor, system: System) -> Located | None:
     """The material points of a sensor in a scene, or None."""
-    if callable(sensor.what) or sensor.what == "joint_force":
+    if callable(sensor.what) or sensor.what in ("joint_force", *CONTACT):
         return None
     found = system.points.find(sensor.at, sensor.beam, sensor.line, sensor.what not in MOVING)
     if sensor.what in SECTION and len(found.parts) != 1:
@@ -109,6 +114,9 @@ def read(sensor: Sensor, at: Any, state: State) -> Any:
         return ask_array("the function of a sensor", None, what, state)
     if what == "joint_force":
         return state.joint_force(sensor.at)
+    if what in CONTACT:
+        found = state.contact(sensor.at, sensor.beam)
+        return found.total if what == "contact" else np.max(found.pressure, initial=0.0)
     if what == "acceleration":
         return at.displacement(state.acceleration)
     if what in MOVING:

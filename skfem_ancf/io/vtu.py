@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..actions.obstacles.outlines import around, obstacles_of, outlines
+from ..actions.obstacles.contact import may_touch, touching
+from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
                            require_option, require_path, require_text)
 from ..core.types import StrPath
-from ..recovery.fields import find_fields, unit_of, units_of
+from ..recovery.fields import FIELDS, find_fields, unit_of, units_of
 from ..recovery.grids import COMPONENTS, body_of, facts_of, grids, in_space
 
 
@@ -100,7 +101,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     their numbers. A rigid body is the polygon of its outline, numbered after the beams, with NaN
     for strain and stress. A domain has its cells, halved, with strain and stress in global axes;
     the stress of user-defined forms is NaN. Outlines of obstacles are lines in a second file,
-    ``name_obstacles``, with numbers ``obstacle``.
+    ``name_obstacles``, with numbers ``obstacle``. Where members touch obstacles or each other,
+    ``name_contact`` has the contact points with ``force``, ``pressure``, ``gap`` and ``sticking``.
 
     Parameters
     ----------
@@ -135,6 +137,11 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     ``state.save("beam.vtu", fields=["displacement", "S_xx"])``
     """
     path = require_path("filename", filename, SUFFIXES)
+    return _save(state, path, subdivide, lagrange, undeformed, recover, fields, precision)[0]
+
+
+def _save(state, path, subdivide, lagrange, undeformed, recover, fields, precision):
+    """Write the file of :func:`save_vtu` and those beside it; returns all."""
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
     body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
     scale = units_of(state)
@@ -142,13 +149,24 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              for field in find_fields(fields, state.beams) if scale}
     _write(path, body, dtype, units)
     logger.info("wrote %s: %d points", path, len(body.points))
+    written = [path]
     if walls := outlines(state, around(body.points[:, :2].T)):
         points = in_space(np.concatenate(walls).reshape(-1, 2).T)
         numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
-        _write(path.with_name(f"{path.stem}_obstacles{path.suffix}"), BodyFields(
+        written.append(path.with_name(f"{path.stem}_obstacles{path.suffix}"))
+        _write(written[-1], BodyFields(
             points, [("line", np.arange(len(points)).reshape(-1, 2))], {},
             {"obstacle": [numbers]}, {}), dtype)
-    return path
+    if (found := None if undeformed else touching(state)) is not None:
+        written.append(path.with_name(f"{path.stem}_contact{path.suffix}"))
+        _write(written[-1], BodyFields(
+            in_space(found.points), [("vertex", np.arange(len(found))[:, None])],
+            found.arrays, {}, {}), dtype, {} if not scale else {
+                "force": scale[0], "gap": scale[1],
+                "pressure": unit_of(FIELDS["von_mises"], scale)})
+    elif may_touch(state):  # of an older file
+        path.with_name(f"{path.stem}_contact{path.suffix}").unlink(missing_ok=True)
+    return written
 
 
 def _write(path, body, dtype, units=()):
@@ -192,8 +210,8 @@ class PvdWriter:
     """Writes one .vtu file for each frame, and a .pvd file that lists them with their times.
 
     Both are complete after every :meth:`add`, so that ParaView can follow a run. Frames are called
-    ``stem_00000.vtu`` and so on, in the folder of the .pvd; outlines of obstacles are a second
-    part.
+    ``stem_00000.vtu`` and so on, in the folder of the .pvd; outlines of obstacles and contact
+    points are further parts.
 
     Parameters
     ----------
@@ -226,7 +244,7 @@ class PvdWriter:
             subdivide=subdivide, lagrange=lagrange, undeformed=undeformed, recover=recover,
             fields=fields, precision=precision)
         find_fields(fields)
-        self.frames: list[tuple[float, str]] = []  # (time, name of the file)
+        self.frames: list[tuple[float, list[str]]] = []  # time, names of files
 
     def __enter__(self) -> Any:
         return self
@@ -245,12 +263,10 @@ class PvdWriter:
             raise InputError(f"the times of the frames must increase: {t!r} after "
                              f"{self.frames[-1][0]!r}")
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
-        frame = save_vtu(state, self.path.with_name(name), **self.options)
-        self.frames.append((t, name))
-        endings = (".vtu", "_obstacles.vtu")[:1 + bool(obstacles_of(state))]
-        rows = [f'<DataSet timestep="{t!r}" part="{k}" file='
-                f'{quoteattr(name.replace(".vtu", ending))}/>'
-                for t, name in self.frames for k, ending in enumerate(endings)]
+        frame, *others = _save(state, self.path.with_name(name), **self.options)
+        self.frames.append((t, [name, *(other.name for other in others)]))
+        rows = [f'<DataSet timestep="{t!r}" part="{k}" file={quoteattr(name)}/>'
+                for t, names in self.frames for k, name in enumerate(names)]
         with output_file(self.path) as temporary:
             temporary.write_text("\n".join(
                 ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',

@@ -203,8 +203,6 @@ class _Page:
         unit = "" if self.units is None else {
             "length": length, "force": force, "moment": f"{force} {length}",
             "stress": PRESSURES.get(self.units, f"{force}/{length}²"), "": ""}[kind]
-        if unit == "Pa" and abs(value) >= 1e5:
-            value, unit = (1e-9 * value, "GPa") if abs(value) >= 1e10 else (1e-6 * value, "MPa")
         return (rounded(value + 0.0, unit),)
 
     def parts(self) -> list[str]:

@@ -8,20 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..actions.obstacles.contact import touching
 from ..actions.obstacles.outlines import AROUND, around
 from ..beam.layout import WhichBeam
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text)
 from ..core.types import StrPath
-from ..recovery.fields import units_of
-from .scenery import BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, layers_of
-from .symbols import Sketch, symbols_of
+from ..recovery.fields import FIELDS, unit_of, units_of
+from .scenery import (BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, layers_of,
+                      rounded)
+from .symbols import LOAD, Sketch, symbols_of
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400
 #: Opacity of the first of several states.
 FADED = 0.2
+#: Length of the line of the largest pressure of contact relative to the picture.
+CONTACT = 0.08
 #: Height over width below which the colour bar is below a picture.
 FLAT = 0.35
 
@@ -35,7 +39,8 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
                title: str | None = None, unit: str | None = None,
                subdivide: tuple[int, int] = (16, 8), filename: StrPath | None = None,
                dpi: float = 200, recover: bool = True, scale: float | str = 1.0,
-               loads: bool = False, supports: bool = False, fade: bool = False) -> Any:
+               loads: bool = False, supports: bool = False, fade: bool = False,
+               contact: bool = False) -> Any:
     """Draw the deformed body of a state, coloured by a field; returns the Axes.
 
     Parameters
@@ -83,6 +88,9 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
         its load factor or time.
     fade
         Of several states draw the earlier ones paler, with the outlines of all on top.
+    contact
+        Draw the contact of the last state, which is to scale then: a line at each contact point, as
+        long as its pressure, with a full dot where friction holds; and the largest pressure.
 
     Examples
     --------
@@ -98,7 +106,7 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
     colorbar, unit = require_flag("colorbar", colorbar), require_text("unit", unit)
     filename, dpi = page(ax, title, filename, dpi)
     loads, supports = require_flag("loads", loads), require_flag("supports", supports)
-    fade = require_flag("fade", fade)
+    fade, contact = require_flag("fade", fade), require_flag("contact", contact)
     symbols = symbols_of(states[-1], loads, supports)
     scenery = Scenery(states, field, thickness, undeformed, limits, subdivide, recover, scale)
     drawn, values = scenery.field, scenery.found
@@ -116,6 +124,8 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
         scenery.undeformed = False
     if symbols:
         sketch(ax, scenery, states[-1]).draw(symbols)
+    if contact:
+        _draw_contact(ax, scenery, states[-1])
     frame(ax, scenery, bool(symbols))
     dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note, scenery.length)
     if colorbar and image is not None:
@@ -123,6 +133,32 @@ def plot_state(state: Any, field: Any = None, ax: Any = None, *,
         colour_bar(ax, image, _EXTEND[ends], scenery.label(drawn.symbol, unit))
     save(ax, filename, dpi=dpi, bbox_inches="tight")
     return ax
+
+
+def _draw_contact(ax, scenery, state):
+    """Pressures and sticking of a state at its contact points, and the largest pressure."""
+    from matplotlib.collections import LineCollection
+
+    if (found := touching(state)) is None:
+        return
+    if scenery.note:
+        raise InputError(f"contact is drawn to scale, and here are {scenery.note}: leave out scale="
+                         " and thickness=")
+    x, size = found.points, float(np.max(np.ptp(scenery.every[:, :2], axis=0)))
+    most = int(np.argmax(found.pressure))
+    way = found.force / np.maximum(np.hypot(*found.force), 1e-300)
+    tails = x - CONTACT * size * found.pressure / found.pressure[most] * way
+    ax.add_collection(LineCollection(np.array([x, tails]).transpose(2, 0, 1), colors=LOAD,
+                                     linewidths=0.8, zorder=4, gid="contact"))
+    for stuck in (False, True):
+        ax.plot(*x[:, found.sticking == stuck], "o", ms=3, mec=LOAD, mew=0.8, ls="", zorder=4.5,
+                mfc=LOAD if stuck else "white", gid="sticking" if stuck else "contact point")
+    unit = unit_of(FIELDS["von_mises"], units_of(state))
+    ax.update_datalim(np.hstack([tails, tails - 0.05 * size * way]).T)
+    ax.annotate("p = " + rounded(found.pressure[most], "" if unit == "force / area" else unit),
+                tails[:, most], tuple(-4 * way[:, most]), textcoords="offset points", fontsize=8,
+                color=LOAD, gid="contact pressure", ha="center",
+                va="top" if way[1, most] > 0 else "bottom")
 
 
 def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool = True,

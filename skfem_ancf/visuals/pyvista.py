@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..actions.obstacles.contact import may_touch, touching
 from ..actions.obstacles.outlines import around, outlines
 from ..core.archive import output_file
 from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_like,
@@ -96,7 +97,8 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
     Returns
     -------
     pyvista.UnstructuredGrid, or pyvista.MultiBlock
-        Of one beam, or of several and of the outlines of rigid bodies and obstacles by name.
+        Of one beam, or of several and of the outlines of rigid bodies and obstacles by name; of a
+        scene with contact "contact" has the contact points.
 
     Raises
     ------
@@ -109,6 +111,7 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
     box = around(np.concatenate([grid.points(undeformed)[:, :2] for grid in found]).T)
     walls = outlines(state, box)
     names = [grid.name for grid in found] + [f"obstacle {k}" for k in range(len(walls))]
+    names += ["contact"] * may_touch(state)
     blocks = [None] * len(names) if out is None else _blocks_of(out, names)
     bodies = [_fill(block, grid, body_of(grid, wanted, undeformed, fields is None), facts)
               for block, grid in zip(blocks, found)]
@@ -116,6 +119,13 @@ def to_pyvista(state: Any, fields: Any = None, subdivide: tuple[int, int] = (8, 
         bodies.append(_lines(wall))
         if block is not None:
             block.copy_from(bodies[-1])
+    if may_touch(state):
+        touch = None if undeformed else touching(state)
+        bodies.append(pv.PolyData() if touch is None else pv.PolyData(in_space(touch.points)))
+        for name, values in ({} if touch is None else touch.arrays).items():
+            bodies[-1].point_data[name] = values
+        if blocks[-1] is not None:
+            blocks[-1].copy_from(bodies[-1])
     if out is None:
         out = pv.MultiBlock(dict(zip(names, bodies))) if len(names) > 1 else bodies[0]
     return out

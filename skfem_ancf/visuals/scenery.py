@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..actions.obstacles.contact import may_touch
 from ..actions.obstacles.outlines import AROUND, around, outlines
 from ..core.errors import (AncfError, InputError, require_finite_scalar, require_flag,
                            require_positive, require_unmasked, shown)
@@ -171,13 +172,6 @@ def _default(states):
     return "S_xx" if stressed else "displacement"
 
 
-def _touches(state):
-    """True with obstacles or contact of members: thicker sections would enter each other."""
-    forces = getattr(getattr(state, "system", None), "forces", None)
-    return forces is not None and bool(forces.contacts.obstacles or any(
-        hasattr(element, "look") for element, _ in forces.changing))
-
-
 class Scenery:
     """States of the same beams with one thickness factor and one range of colours.
 
@@ -206,8 +200,8 @@ class Scenery:
             self.frames[-1] += [solid for _, solid in others if solid is not None]
             self.rigid.append([grid for grid, solid in others if solid is None])
         self.beams = [body for frame in self.frames for body in frame]
-        if isinstance(thickness, str) and thickness == "auto" and any(map(_touches, states)):
-            thickness = 1.0
+        if isinstance(thickness, str) and thickness == "auto" and any(map(may_touch, states)):
+            thickness = 1.0  # thicker sections would enter each other
         self.factor = _thickness(thickness, [b for b in self.beams if isinstance(b, _Body)])
         self.found = np.concatenate([np.zeros(0), *(b.values for b in self.beams)])
         if self.found.size and not np.any(np.isfinite(self.found)):
@@ -325,7 +319,9 @@ def unit_of_resultant(name: str, units: tuple[str, str] | None) -> str:
 
 
 def rounded(value: float, unit: str) -> str:
-    """A number with four digits and its unit, of newtons in N, kN or MN."""
+    """A number with four digits and its unit: N, kN or MN, and Pa, MPa or GPa."""
+    if unit == "Pa" and abs(value) >= 1e5:
+        value, unit = (1e-9 * value, "GPa") if abs(value) >= 1e10 else (1e-6 * value, "MPa")
     if re.match(r"N\b", unit) and abs(value) >= 1e4:
         power = 2 if abs(value) >= 1e7 else 1
         value, unit = value / 1000.0**power, "kM"[power - 1] + unit

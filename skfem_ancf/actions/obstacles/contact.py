@@ -52,12 +52,31 @@ class Contact:
         """Largest penetration; zero without contact."""
         return max(0.0, -self.nearest)
 
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Values at the points by name, forces with a third component of zero, for files."""
+        return {"force": np.pad(self.force.T, ((0, 0), (0, 1))), "pressure": self.pressure,
+                "gap": self.gap, "sticking": self.sticking.astype(float)}
+
     def __len__(self) -> int:
         return self.points.shape[1]
 
     def __repr__(self) -> str:
         return (f"<Contact at {len(self)} points, penetration {self.penetration:.3g}, nearest "
                 f"{self.nearest:.3g}>")
+
+
+def may_touch(state: Any) -> bool:
+    """True for a scene with obstacles, or with contact of its members."""
+    forces = getattr(getattr(state, "system", None), "forces", None)
+    return forces is not None and bool(forces.contacts.obstacles or any(
+        hasattr(element, "look") for element, _ in forces.changing))
+
+
+def touching(state: Any) -> Contact | None:
+    """Contact of a state; None where nothing touches, and in linear theory."""
+    found = contact_of(state) if may_touch(state) and state.base is None else ()
+    return found or None
 
 
 def contact_of(state: Any, which: Any = None, on: Any = None) -> Contact:

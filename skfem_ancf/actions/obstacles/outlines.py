@@ -61,16 +61,10 @@ def around(points: Array, part: float = AROUND) -> Array:
     return np.array([low - margin, high + margin]).T
 
 
-def obstacles_of(state: Any) -> list[Any]:
-    """Obstacles of a state's scene; none without a system."""
-    system = getattr(state, "system", None)
-    return [] if system is None else list(system.forces.contacts.obstacles)
-
-
 def outlines(state: Any, box: Array) -> list[Array]:
     """Outlines of the obstacles at a state, as straight segments."""
-    out = []
-    for one in obstacles_of(state):
+    out, system = list[Array](), getattr(state, "system", None)
+    for one in () if system is None else system.forces.contacts.obstacles:
         points, pieces = one.outline(box, state._time)
         out.append(points.T[pieces])
     return out
