@@ -12,8 +12,11 @@ from skfem.helpers import ddot, sym_grad
 
 from skfem_ancf import (Beam, BodyContact, Domain, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.actions.obstacles import Line
 from skfem_ancf.actions.bound import recalled
+from skfem_ancf.actions.contact import kernels
+from skfem_ancf.actions.contact.tables import is_clear
+from skfem_ancf.actions.obstacles import Circle, Line
+from skfem_ancf.actions.pairs.search import Search
 from skfem_ancf.beam.layout import Layout
 
 ELEMENTS = (ElementBeamANCF(2), ElementBeamANCFCubic(1), ElementBeamCable(3), ElementBeamCable(5))
@@ -318,3 +321,48 @@ def test_what_does_not_fit_is_said():
     apart = Scene(line(1.0, 4, 0.01), line(1.0, 4, 0.01, (0.0, -0.1))).clamp("left", 0)
     with pytest.raises(InputError, match="use 'energy-momentum'"):
         apart.clamp("left", 1).contact("all").integrate(1e-3, 1e-3, scheme="radau")
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_nothing_touches_within_the_margin(element):
+    """Surfaces are looked at again only when a point may have moved far; before, none touches."""
+    h, rng = 0.02, np.random.default_rng(1)
+    scene = Scene(*(line(0.5, 4, h, (0.0, 2.0 * k * h), element) for k in range(3))).contact("all")
+    system = scene.obstacle(Line((0.0, -1.5 * h), (0.1, 1.0))).system
+    forces, N = system.forces, system.N
+    apart = [s for beam, s in zip(system.beams, system.slices)]
+    for table in (forces.clear, forces.contacts.tables.clear):
+        margin, weights = table[0], np.maximum(table[-N:], 1e-3)
+        assert 0.3 * h < margin < 0.5 * h  # 0.4 of the gap
+        towards = np.zeros(N)  # translations are the shortest way
+        for s, way in zip(apart, (1.0, -1.0, 1.0)):
+            towards[s.start + 1:s.stop:system.beams[0].nd] = way * h
+        for sign in (towards, *rng.choice([-1.0, 1.0], (20, N))):
+            u = sign / np.abs(weights * sign).max() * margin if sign is towards else (
+                margin * sign / weights)
+            assert is_clear(table, 0.999 * u, 0.0) and not is_clear(table, 1.001 * u, 0.0)
+            least = forces._least_gap(0.999 * u) if table is forces.clear else min(
+                gap.min() for _, _, gap in forces.contacts.look(0.999 * u, 0.0))
+            assert least > 0.0
+
+
+def test_what_does_not_touch_is_seldom_looked_at(monkeypatch):
+    """A step evaluates forces at least three times."""
+    looks = {"_touching": 0, "search": 0}
+
+    def counted(place, name):
+        function = getattr(place, name)
+
+        def run(*args):
+            looks[name] += 1
+            return function(*args)
+
+        monkeypatch.setattr(place, name, run)
+
+    counted(Search, "_touching")
+    counted(kernels, "search")
+    scene = Scene(*(line(1.0, 16, 0.02, (0.0, 0.12 * k), ELEMENTS[0]) for k in (0, 1)))
+    scene = scene.clamp("left", 0).clamp("left", 1).gravity((0, -9.81)).contact("all")
+    scene.obstacle(Circle((0.5, -1.0), 0.9)).integrate(0.1, 1e-3)
+    assert all(n < 60 for n in looks.values()), looks
+    assert looks["_touching"] > 0

@@ -15,7 +15,7 @@ from ..beam.distribution import Facets
 from ..beam.layout import Layout
 from ..core.errors import (InputError, require_finite, require_slope, shown,
                            warnings_as_errors)
-from ..core.immutable import is_builtin
+from ..core.immutable import cached_property, is_builtin
 from ..core.types import Array
 from .places import Vector
 
@@ -202,6 +202,11 @@ class BoundForce(Bound):
     changing = False
     #: Steps and increments change its history, if it has one; else only samples do.
     evolves = True
+
+    @cached_property
+    def all_dofs(self) -> Array:
+        """Those of its links, of a changing one (2 n,)."""
+        return np.concatenate([link.dofs.ravel() for link in self.links])
 
     def force(self, x: Array, v: Array, t: float) -> Array:
         """Force on each point, (n, 2); on section directions the conjugate force."""
@@ -409,7 +414,7 @@ def positions(element: Any, u: Array) -> Array:
     """Positions (n, 2) of the links of a bound element at displacements (N,)."""
     if not element.changing:
         return np.array([link(u) for link in element.links])
-    return u[[link.dofs[:, 0] for link in element.links]]
+    return u[element.all_dofs].reshape(-1, 2)
 
 
 def recalled(element: Any) -> Any:

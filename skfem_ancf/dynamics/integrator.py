@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.tables import constraint, joint_directions
 from ..core.band import BandMatrix, CoupledBand
 from ..core.callbacks import handle_of
@@ -307,12 +308,15 @@ class Integrator:
 
     def _first_passed(self, y, rows, done, dt):
         """The number of steps before the first one that leads through a body."""
-        before = y.u
-        for k, u in enumerate(rows[:done, 0]):
-            if text := self.system.forces.passed((before, y.t + k * dt), (u, y.t + k * dt + dt)):
-                self._lost = text
-                return k
-            before = u
+        u, passed = np.concatenate([[y.u], rows[:done, 0]]), self.system.forces.passed
+        fast = self.system.forces.moves_far(u)
+        fast[-1] = True  # what slow steps lead through stays there
+        texts = (passed(*((u[j], y.t + j * dt) for j in (k, k + 1))) for k in np.flatnonzero(fast))
+        if any(texts):
+            for k in range(done):
+                if text := passed(*((u[j], y.t + j * dt) for j in (k, k + 1))):
+                    self._lost = text
+                    return k
         return done
 
     @property
@@ -430,6 +434,7 @@ class Integrator:
         if self.system.forces.changing and not self._nodes:
             i, j, values = (np.array(arrays[name]) for name in KEPT)
             self.system.forces.kept = i, j, values
+            self.system.forces.clear[HAS_ENTRIES] = float(len(i) > 0)
             if self.ready:
                 factors(self._matrices, self._state).factorize_all()
         if self._nodes:

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ..actions.forces.kernels import (AT_ONCE, add_elastic_force, add_element_tangent,
-                                      contact_along, contact_work)
+                                      contact_along, contact_work, nothing_touches)
 from ..actions.tables import (MATERIALS, add_joint_force, add_load_stiffness, carry_eigenstrains,
                               constraint, external_force)
 from ..beam.strain_energy import (add_viscous_force, body_force, body_linearised, body_mean,
@@ -155,6 +155,8 @@ def hold_back(e, t, loose, u, R, du, dm):
     turn.
     """
     work, two, scratch = dot(R, du), np.empty(2), np.zeros(u.size)
+    if loose == 0.0 and nothing_touches(e.forces, u) and nothing_touches(e.forces, u + du):
+        return
     contact_along(e.forces, t, u, du, two)
     if not work > 0.0:
         return

@@ -135,8 +135,7 @@ class Histories:
         """The history after an increment in statics from u0 to u, and what it dissipates."""
         if not self.values.size:
             return None, 0.0
-        lost = self.forces.settle(u, t) + sum(
-            item.settle(u0, u, t) for item in self.forces.remembering)
+        lost = self.forces.settle(u0, u, t)
         for beam, s in self._beams:
             for e in self.kernel(beam).elements:
                 if isinstance(e, ElementsWithHistory):

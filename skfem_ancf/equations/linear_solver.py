@@ -52,6 +52,8 @@ class LinearSolver:
         #: True if the matrix is more than a band: multipliers, or force elements between distant
         #: nodes.
         self.coupled = bool(system.constraints.joints) or system.forces.far
+        #: True if it is only while changing elements do something.
+        self.at_times = not (system.constraints.joints or system.forces.distant)
 
     def after(self, system: Any) -> LinearSolver:
         """A copy for a system with another history; matrices and factors are shared."""
@@ -206,6 +208,10 @@ class LinearSolver:
         if isinstance(self._last.joined, Alone):
             return self._system.K.determinant_sign()
         return -1 if self.inertia().negative % 2 else 1
+
+    def keep_band(self) -> None:
+        """Take the factors of the band for those of the whole."""
+        self._last.joined = Alone(self._system)
 
     def forget(self) -> None:
         """Discard all factors."""

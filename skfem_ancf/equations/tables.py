@@ -202,11 +202,11 @@ class Tables:
         loads = plain.loads._replace(eigenstrained=self._remembered(system))
         if histories.of_beams.history.size:
             body = body.after(histories.of_beams)
-        if system.forces.custom:
+        if plain.forces.custom:
             tables._user_defined = None
         forces = plain.forces._replace(
-            contacts=system.forces.contacts.tables,
-            custom=tables.handle if system.forces.custom else 0)
+            contacts=system.forces.contacts.tables, clear=system.forces.clear,
+            custom=tables.handle if plain.forces.custom else 0)
         tables.plain = plain._replace(
             body=body, viscous=body if plain.viscous is plain.body else plain.viscous,
             copies=body, loads=loads, forces=forces, history=histories.values,
@@ -226,7 +226,8 @@ class Tables:
 
     def _forces(self):
         s = self.system
-        return s.forces.tables(s.K.position, s.symmetric, self.handle if s.forces.custom else 0)
+        return s.forces.tables(s.K.position, s.symmetric,
+                               self.handle if s.forces.custom or s.forces.changing else 0)
 
     @property
     def calls_back(self) -> bool:

@@ -274,7 +274,7 @@ class Increment:
         if clock is not None:
             factors = first = self.load * tables.factors(np.array([clock]))[0]
         when = np.nan if clock is None else clock
-        definite = solver is system.solver and system.symmetric and not solver.coupled
+        definite = solver is system.solver and system.symmetric and solver.at_times
         target = Target(self.load, when, self.time, moving, solver.handle, definite)
         return target, Start(u, multipliers, gap, moved, drag), np.array([factors, first])
 

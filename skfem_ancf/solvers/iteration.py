@@ -6,6 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
 from ..core.band import dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
@@ -75,6 +76,7 @@ def find_equilibrium(backend: Backend, target: Target, rules: Rules, solver: Any
                                 factors, joints)
     if definite:
         backend.keep_factors()
+        solver.keep_band()
     return Iterate(status, x[U], m[0], x[FORCE], record[0, :n].tolist(), record[1, :k].tolist())
 
 
@@ -116,6 +118,8 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if moving:
             _move(e, target, g, moved, u, R, phi)
         if by_band:
+            if e.forces.changing > 0 and not is_clear(e.forces.clear, u, 0.0):
+                return INDEFINITE, k + 1, k, False
             if solve_definite(e.K, e.factors, e.fixed, R, du) == 0:
                 return INDEFINITE, k + 1, k, False
             good = True

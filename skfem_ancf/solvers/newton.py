@@ -156,7 +156,7 @@ class Search:
         memory = system.histories.begin(np.zeros(system.N) if u is None else u,
                                         times[u is not None], memory is None)
         self._start, self._times, self._memory = u, times, memory
-        if contacts.keeps:
+        if contacts.keeps and not (contacts.obstacles and u is not None and contacts.untouched(u)):
             _ = self.route  # with the contact history of the start
 
     @cached_property

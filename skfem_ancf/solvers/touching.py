@@ -121,7 +121,7 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
     ways = [_at_once, _soon] if close else [_released, _from_soft, _directly]
     if dragged:  # which already stabilises the iteration
         ways = [_directly]
-    flags = lies_near(contacts, *start)
+    flags = lies_near(contacts, *start) if _released in ways else None
     for way in ways:
         if way is _released and flags is None:
             continue
@@ -191,7 +191,7 @@ class _Climb:
         ``rough``: ``found`` is one that is only a start.
         """
         contacts = self.contacts
-        for _ in range(TIMES):
+        for _ in range(0 if contacts.untouched(found[0]) else TIMES):
             u, yields = found[0], np.zeros(len(contacts.groups))
             if any(group.firmest > 1.0 for _, group in contacts.groups):
                 yields = contacts.yielding(u, self.t, self.respond(found))

@@ -14,16 +14,18 @@ from ...core.band import Band
 from ...core.callbacks import handle_of
 from ...core.errors import InputError, shown
 from ...core.types import Array
-from .active_set import project
+from .active_set import BEYOND, project
 from .crossing import CrossingGuard, middle_of
 from .gap import TINY, places
 from .kernels import (DEPTH, LAST, PRESSURE, PUSH, RATES, ROWS, add_friction, of_contacts,
-                      of_pair, push, resist, states, way)
+                      of_pair, push, resist, states, untouched, way)
 from .laws import mean_pressure, pressure_slope
 from .poses import carried, taken_back
+from .tables import SEEN as SEEN_AT
 from .tables import (ANCHORED, ANCHORS, AUGMENT, CUSTOM, DAMPING, FORCE, GAP, HEADER, LARGEST, NOW,
-                     POSE, POSES, PRESSURES, RATE, SETTLE, STIFFNESS, TANGENT, TOLERANCE, TURNS,
-                     ContactTables, Pair, Question, pair_of, transition)
+                     POSE, POSES, PRESSURES, RADIUS, RATE, SETTLE, STIFFNESS, TANGENT, TOLERANCE,
+                     TURNS, ContactTables, Pair, Question, clear_table, pair_of, set_clear,
+                     transition, weights_of_motion)
 
 
 #: Penetration relative to the height that causes hardening, and the one for which a stiffness is
@@ -51,7 +53,7 @@ BY_POINTS = ("its steps do not update multipliers: a stopped body would rebound 
              "5.6 times as fast with 1, 2 or 3 Gauss points, 4.3 times with Radau points")
 #: For scenes without obstacles.
 NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(LARGEST),
-                            0, 0)
+                            0, 0, 0, np.zeros(0))
 
 
 class Group(NamedTuple):
@@ -100,7 +102,7 @@ class Contacts:
         True if there are history data.
     """
 
-    def __init__(self, elements: Sequence[Any], springs: Sequence[Array] = ()) -> None:
+    def __init__(self, elements: Sequence[Any], N: int, springs: Sequence[Array] = ()) -> None:
         self.obstacles = [element for element in elements if element.groups]
         groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
         self.origin = np.zeros(2)
@@ -113,7 +115,7 @@ class Contacts:
         self.custom = any(one.shape.kind == CUSTOM for one in self.obstacles)
         self.anchored = any(one.friction > 0.0 for one in self.obstacles)
         self.augmented = any(one.method == "augmented" for one in self.obstacles)
-        tables = self._tables() if groups else NO_CONTACTS
+        tables = self._tables(N) if groups else NO_CONTACTS
         if springs:
             tables = tables._replace(
                 floats=np.concatenate([tables.floats, *springs]),
@@ -121,8 +123,11 @@ class Contacts:
         self.tables, self._springs, self.keeps = tables, len(springs), bool(groups or springs)
         self._answers: Any = None
         self.put(0.0, 0.0, self.tables.poses)
+        if self.tables.clear.size:
+            u = np.zeros(N)
+            set_clear(self.tables.clear, u, min(gap.min() for _, _, gap in self.look(u, 0.0)))
 
-    def _tables(self):
+    def _tables(self, N):
         n = len(self.groups)
         headers, ints, floats = np.zeros((n, HEADER), dtype=np.int64), [], []
         memory, at, after = LARGEST + 2 * n, 0, HEADER * n
@@ -139,7 +144,20 @@ class Contacts:
             n, np.concatenate([headers.ravel(), *ints]).astype(np.int64), np.concatenate(floats),
             np.zeros(POSES * len(self.obstacles)), np.zeros(memory),
             int(self.moving or self.custom), handle_of(self),
-            ANCHORS * self.anchored + PRESSURES * self.augmented)
+            ANCHORS * self.anchored + PRESSURES * self.augmented,
+            np.zeros(0) if self.moving or self.custom or self.augmented else self._clear(N))
+
+    def _clear(self, N):
+        """The table of :func:`~skfem_ancf.actions.contact.tables.is_clear`."""
+        out = np.zeros(N)
+        for _, group in self.groups:
+            a = np.abs(group.weights)
+            if len(group.slopes):
+                a = a + 2.0 * np.abs(group.slopes * group.offsets) / np.hypot(*group.starts[2:])
+            pairs = np.sqrt(2.0) * weights_of_motion(
+                a.T, group.first[:, None] // 2 + np.arange(len(a)), -(-N // 2))
+            out = np.maximum(out, np.repeat(pairs, 2)[:N])
+        return clear_table(out, BEYOND * max(group.numbers[RADIUS] for _, group in self.groups))
 
     def pair(self, k: int) -> Pair:
         """Views of the tables of group k."""
@@ -200,7 +218,8 @@ class Contacts:
         """A copy with other history data (n,)."""
         _ = self.sweep if self.obstacles else None  # one, whatever the history
         other = copy(self)
-        other.tables, other._answers = self.tables._replace(memory=memory), self  # as handle
+        other.tables = self.tables._replace(memory=memory, clear=self.tables.clear.copy())
+        other._answers = self  # as handle
         return other
 
     def stick(self) -> None:
@@ -254,7 +273,7 @@ class Contacts:
             memory[ANCHORED] = 0.0
             for change, force in zip((-CHANGE, CHANGE), out):
                 self.firmness[k] = firm * (1.0 + change) - 1.0
-                of_pair(pair, Question(FORCE, t, 0.0, 0.0, 0, 0), u, u, force)
+                of_pair(pair, Question(FORCE, t, 0.0, 0.0, 0, 0), u, u, force, np.empty(1))
         finally:
             memory[ANCHORED], self.firmness[k] = sticks, firm - 1.0
         return ((out[0] - out[1]) / (2.0 * CHANGE), push * pressure_slope(a, width) * a,
@@ -307,7 +326,7 @@ class Contacts:
         ``u`` (N,) is the displacement there. Unless it is zero the start may be in contact, and is
         refused from a penetration of its height on; obstacles that move may push it.
         """
-        if not self.obstacles:
+        if not self.obstacles or (self._starts_clear and self.untouched(u)):
             return
         given = bool(np.any(u))
         cut = 1.0 if given else CUT
@@ -327,6 +346,14 @@ class Contacts:
                 place = (landmarks[:, inside] + self.origin).tolist()
                 raise InputError(f"{one!r} cuts the body at the start: its point {shown(place)} is "
                                  "inside of it")
+
+    @cached_property
+    def _starts_clear(self):
+        """True if no obstacle is inside a body, or touches one, in the reference configuration."""
+        seen = self.look(np.zeros((len(self.tables.clear) - SEEN_AT) // 2), 0.0) if (
+            self.tables.clear.size) else ()
+        return bool(seen) and all(_inside(group, x, self._landmarks(which, 0.0), 0.0) is None
+                                  for (which, group), x, _ in seen)
 
     def _landmarks(self, which, t):
         """Points of an obstacle that no beam may contain (2, k), relative to the origin."""
@@ -419,7 +446,8 @@ class Contacts:
     def potential(self, u: Array, t: float) -> float:
         """Penalty energy; zero for the augmented Lagrangian."""
         total = 0.0
-        for k, ((which, group), _, gap) in enumerate(self.look(u, t)):
+        for k, ((which, group), _, gap) in enumerate(
+                () if self.untouched(u) else self.look(u, t)):
             if self.obstacles[which].method == "augmented":
                 continue
             firmness, width = self.firmness[k], transition(self.pair(k))
@@ -442,6 +470,10 @@ class Contacts:
 
     # tunnelling and deep penetration
 
+    def untouched(self, u: Array) -> bool:
+        """True if it is known that nothing touches at u."""
+        return bool(untouched(self.tables, FORCE, u))
+
     @cached_property
     def sweeps(self) -> bool:
         """True if bodies could pass through an obstacle within a step."""
@@ -454,7 +486,7 @@ class Contacts:
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Text about the obstacle that a body has passed through between two states, or ""."""
-        if not self.obstacles:
+        if not self.obstacles or all(self.untouched(u) for u, _ in (a, b)):
             return None
         done, text = self.sweep.first(np.array([a[0], b[0]]), None, np.array([a[1], b[1]]))
         if not done:
@@ -467,7 +499,7 @@ class Contacts:
     def sunk(self, u: Array, t: float) -> list[str]:
         """Text about bodies deep inside obstacles of default stiffness, or ""."""
         out: list[str] = []
-        seen = self.look(np.array(u), t) if self.groups else []
+        seen = self.look(np.array(u), t) if self.groups and not self.untouched(u) else []
         for firmness, ((which, group), _, gap) in zip(self.firmness, seen):
             one, deep, h = self.obstacles[which], -float(gap.min()), group.height
             if one.penalty is None and deep > SUNK * h:

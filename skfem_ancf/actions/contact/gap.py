@@ -9,9 +9,8 @@ import numpy as np
 
 from ...core.callbacks import custom_distance
 from ...core.source import F1, F2, I1, apart, indices, source
-from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIR, PAIRS, RADIUS, SIDE, START
+from .tables import CUSTOM, KIND, NUMBERS, OBSTACLE, OFFSET, PAIR, PAIRS, RADIUS, SIDE, START, TINY
 
-TINY = 1e-200
 #: The least square of a slope: sections have none, and levers of no length.
 SHORT = 1e-30
 #: Number of parameters of a circle.

@@ -14,19 +14,23 @@ from typing import Annotated
 
 import numpy as np
 
+from ...core.band import smallest
 from ...core.source import F1, F2, I1, MADE, apart, indices, source
 from ..tables import add_each
 from .active_set import near_points, project, search, stride, touching
 from .gap import SHORT, TINY, carried, distances, levers, places, surface
 from .laws import (damping_loss, mean_pressure, mean_pressure_slope, pressure_slope,
                    return_mapping, slip_of)
-from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, AREA, AUGMENT, BEGIN, BILATERAL,
-                     DAMPED_TANGENT, DAMPING, END, FORCE, FRICTION, GAP, LARGEST, MULTIPLIER, NOW,
-                     OFFSET, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING, STIFFNESS, TOLERANCE,
-                     PAIR, ContactTables, Question, hardening, pair_of, transition)
+from .tables import (ALONG, ANCHOR_X, ANCHOR_Y, ANCHORED, ANCHORS, AREA, AUGMENT, BEGIN, BILATERAL,
+                     DAMPED_TANGENT, DAMPING, END, FOLLOWED, FORCE, FRICTION, GAP, LARGEST,
+                     MULTIPLIER, NOW, OFFSET, PAIR, RADIUS, RATE, RESISTING, SETTLE, SLIP, STICKING,
+                     STIFFNESS, TOLERANCE, ContactTables, Question, hardening, is_clear, pair_of,
+                     set_clear, transition)
 
 #: Displacement relative to an element below which a mean is evaluated in the middle.
 CLOSE = 1e-5
+#: The gap where nothing is.
+FAR = 1e300
 #: Anchors of slipped points are inside of the limit by these parts of it and of an element, so that
 #: they stick at the start of the next step whatever the last digit.
 INSIDE, NOWHERE = 1e-9, 1e-14
@@ -42,13 +46,30 @@ NX, NY = FOUND + 1, FOUND + 2
 @apart("contacts", ContactTables, Annotated[Question, MADE], F1, F1, F1)
 def of_contacts(tables, asked, u, v, out):
     """Add the answer of all pairs to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
-    for k in range(tables.number):
-        of_pair(pair_of(tables, k), asked, u, v, out)
+    n, least, end = tables.number, np.empty(tables.number), v if asked.span > 0.0 else u
+    if asked.what != ALONG and untouched(tables, asked.what, u) and (
+            asked.span == 0.0 or untouched(tables, asked.what, end)):
+        return
+    for k in range(n):
+        of_pair(pair_of(tables, k), asked, u, v, out, least[k:k + 1])
+    if asked.what == FORCE and tables.clear.size > 0:
+        set_clear(tables.clear, end, smallest(least))
 
 
 @source
-def of_pair(pair, asked, u, v, out):
-    """Add the answer of the active points of a pair."""
+def untouched(tables, what, u):
+    """True if no point can touch at u, nor is to be followed by its anchor."""
+    less, memory = 0.0, tables.memory
+    if memory[BILATERAL] > 0.0:
+        return False
+    if what == SETTLE and tables.lasting & ANCHORS:
+        less = tables.clear[FOLLOWED] if memory[RATE] > 0.0 and tables.clear.size > 0 else FAR
+    return is_clear(tables.clear, u, less)
+
+
+@source
+def of_pair(pair, asked, u, v, out, least):
+    """Add the answer of the active points of a pair; of a FORCE set also the least gap."""
     what, same = asked.what, asked.span == 0.0
     if what == ALONG:
         out[1] = max(out[1], stride(pair, v))
@@ -56,11 +77,19 @@ def of_pair(pair, asked, u, v, out):
     if resists and pair.numbers[DAMPING] == 0.0:
         return
     begin = search(pair, NOW if same else BEGIN, u)
-    at = near_points(pair, what, begin, begin if same else search(pair, END, v))
+    end = begin if same else search(pair, END, v)
+    at = near_points(pair, what, begin, end)
+    if what == FORCE:
+        beyond = np.empty(end.size)
+        for e in indices(end.size):
+            beyond[e] = end[e] + FAR * (end[e] <= 0.0)
+        least[0] = smallest(beyond)
     if at.size == 0:
         return
     a = project(pair, NOW if same else BEGIN, u, at)
     b = a if same else project(pair, END, v, at)
+    if what == FORCE:
+        least[0] = min(least[0], smallest(b[GAP]))
     if what < SETTLE:
         some = touching(pair, a, b, at)
         at, a, b = at[some], a[:, some], b[:, some]

@@ -8,7 +8,8 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...core.source import F1, F2, I1, MADE, shaped, source
+from ...core.band import largest
+from ...core.source import F1, F2, I1, MADE, indices, shaped, source
 
 #: Shapes of obstacles: circles and lines are polygons.
 OUTLINE, CUSTOM = range(2)
@@ -40,6 +41,7 @@ NOW, BEGIN, END = map(np.int64, range(3))
 ANCHORED, RATE, BILATERAL, LARGEST = range(4)
 #: Flags of history data: anchors, angles of torsional springs, multipliers.
 ANCHORS, TURNS, PRESSURES = 1, 2, 4
+TINY = 1e-200
 #: The row of projections of points that is the gap, behind place and slope and the surface.
 GAP = 6
 
@@ -70,7 +72,8 @@ class ContactTables(NamedTuple):
     ``ints`` and ``floats`` are headers of pairs, DOFs, and parameters of points and shapes;
     ``poses`` those of obstacles at the last time; ``memory`` history data. ``moving`` tells whether
     poses depend on time, ``custom`` is the handle for poses and user-defined shapes, ``lasting``
-    the sum of flags of history data: ANCHORS, TURNS, PRESSURES.
+    the sum of flags of history data: ANCHORS, TURNS, PRESSURES. ``clear`` says where nothing
+    touches, see :func:`is_clear`; it is empty if obstacles move, or have multipliers.
     """
 
     number: int
@@ -80,7 +83,8 @@ class ContactTables(NamedTuple):
     memory: F1
     moving: int
     custom: int
-    lasting: int = 0
+    lasting: int
+    clear: F1
 
 
 class Pair(NamedTuple):
@@ -132,6 +136,46 @@ def pair_of(tables, k):
         shaped(tables.poses[pose:pose + POSES], (3, POSE)),
         shaped(tables.memory[h[MEMORY]:h[MEMORY] + 4 * n], (4, n)),
         tables.memory)
+
+
+#: How far points may move from displacements at which nothing touches; 1 if the tangent of the last
+#: step has entries of contact; how far anchors of friction follow points; from SEEN on the
+#: displacements (N,), then weights (N,): a point moves by no more than the largest weighted change.
+MARGIN, HAS_ENTRIES, FOLLOWED, SEEN = range(4)
+#: Part of a gap that is the margin: two surfaces may approach each other.
+SAFE = 0.4
+
+
+@source
+def is_clear(clear, u, less):
+    """True if nothing can touch at u (N,), with a margin that is smaller by ``less``."""
+    n = u.size
+    if clear.size == 0 or not clear[MARGIN] > less:
+        return False
+    moved, seen, weights = np.empty(n), clear[SEEN:SEEN + n], clear[SEEN + n:]
+    for i in indices(n):
+        moved[i] = weights[i] * (u[i] - seen[i])
+    return largest(moved) < clear[MARGIN] - less
+
+
+@source
+def set_clear(clear, u, gap):
+    """Note that the least gap at u is ``gap``."""
+    clear[MARGIN], seen = SAFE * gap, clear[SEEN:SEEN + u.size]
+    for i in indices(u.size):
+        seen[i] = u[i]
+
+
+def clear_table(weights: np.ndarray, followed: float = 0.0) -> np.ndarray:
+    """A table without a margin."""
+    return np.concatenate([[0.0, 0.0, followed], 0.0 * weights, weights])
+
+
+def weights_of_motion(weights: np.ndarray, dofs: np.ndarray, n: int) -> np.ndarray:
+    """Weights (n,) of pairs of DOFs from those in the motion of points, (P, B) each."""
+    largest = np.zeros(n)
+    np.maximum.at(largest, dofs, weights)
+    return largest * np.max(np.sum(weights / np.maximum(largest[dofs], TINY), axis=1))
 
 
 @source

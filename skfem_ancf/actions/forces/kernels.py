@@ -15,9 +15,9 @@ from ...beam.kernels.moments import mean_turning
 from ...core.callbacks import custom_elements, custom_poses
 from ...core.source import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_products
-from ..contact.kernels import of_contacts
-from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
-                              TURNS, ContactTables, Question)
+from ..contact.kernels import of_contacts, untouched
+from ..contact.tables import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, HAS_ENTRIES, RATE, SETTLE,
+                              TANGENT, TURNS, ContactTables, Question, is_clear)
 from ..contact.tables import RESISTING as RUBBING
 
 #: Kinds of elements.
@@ -65,8 +65,9 @@ class ForceTables(NamedTuple):
         Positions between the rows of elements that couple distant DOFs.
     custom, contacts
         Handle of user-defined elements, 0 for none; the obstacles.
-    changing
-        Number of user-defined elements whose stiffness changes its pattern.
+    changing, clear
+        Number of user-defined elements whose stiffness changes its pattern; where they do nothing,
+        see :func:`~skfem_ancf.actions.contact.tables.is_clear`.
     """
 
     start: F1
@@ -84,7 +85,8 @@ class ForceTables(NamedTuple):
     row_of: I1
     custom: int
     contacts: ContactTables
-    changing: int = 0
+    changing: int
+    clear: F1
 
 
 @source
@@ -109,10 +111,11 @@ def _of(kinds, kind, y, w, rows, out):
             _part(kinds, kind, VECTORS, w), _part(kinds, kind, rows, out))
 
 
-#: Values of ``what``; from PUSHING on of elements whose stiffness changes its pattern: their force,
-#: its derivative along a correction, the entries of the tangent of a step.
+#: Values of ``what``; from PUSHING on of elements whose stiffness changes its pattern: their force
+#: without and due to velocities, its derivative along a correction, the entries of the tangent of a
+#: step, and their history at its end.
 ELASTIC, RESISTING, DERIVATIVES, TURNED, SETTLED = range(5)
-PUSHING, ALONG_PUSHING, ENTRIES = range(5, 8)
+PUSHING, PUSHED_BACK, ALONG_PUSHING, ENTRIES, ACCEPTING = range(5, 10)
 
 
 @source
@@ -151,6 +154,12 @@ def _add_force(tables, what, t, span, u, v, start, f):
 
 
 @source
+def at_rest(tables, u0, u1):
+    """True if no changing element does anything at both displacements."""
+    return is_clear(tables.clear, u0, 0.0) and is_clear(tables.clear, u1, 0.0)
+
+
+@source
 def add_elastic_force(tables, t, span, u0, u1, f):
     """Add the mean force at zero velocity with exact work from u0 to u1.
 
@@ -158,6 +167,8 @@ def add_elastic_force(tables, t, span, u0, u1, f):
     """
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
+    if tables.changing > 0 and not at_rest(tables, u0, u1):
+        custom_elements(tables.custom, np.int64(PUSHING), t, span, u0, u1, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
@@ -167,6 +178,8 @@ def add_resisting_force(tables, t, u, v, f):
     """Add the velocity-dependent part of the force."""
     if tables.start.size > 0:
         _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
+    if tables.changing > 0 and not at_rest(tables, u, u):
+        custom_elements(tables.custom, np.int64(PUSHED_BACK), t, 0.0, u, v, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
@@ -205,12 +218,19 @@ def add_friction_tangent(tables, t, factor, u, v, A):
 
 
 @source
+def nothing_touches(tables, u):
+    """True if it is known that no obstacle touches at u, and that changing elements do nothing."""
+    return (tables.contacts.number == 0 or untouched(tables.contacts, FORCE, u)) and (
+        tables.changing == 0 or is_clear(tables.clear, u, 0.0))
+
+
+@source
 def contact_work(tables, t, u, du, f):
     """Product of the contact force at u and du; f is workspace, zero on return."""
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(FORCE, t), u, u, f)
     if tables.changing > 0:
-        custom_elements(tables.custom, np.int64(PUSHING), t, 0.0, u, du, f)
+        custom_elements(tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
     work = dot(f, du)
     clear(f)
     return work
@@ -255,13 +275,22 @@ def settle_elements(tables, t, u0, u1, v, out):
 
     What they dissipate is added to out, (1,).
     """
-    if tables.custom > 0:
+    if tables.custom > 0 and tables.start.size > 0:
         n = tables.start.size
         y, w = np.empty(n), np.empty(2 * n)
         vectors_of(tables, u0, 1.0, y)
         vectors_of(tables, u1, 1.0, w[:n])
         vectors_of(tables, v, 0.0, w[n:])
         custom_elements(tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
+    if tables.changing > 0 and not at_rest(tables, u0, u1):
+        n = u0.size
+        w = np.empty(2 * n)
+        for i in indices(n):
+            w[i] = u1[i]
+        rates = w[n:]
+        for i in indices(n):
+            rates[i] = v[i]
+        custom_elements(tables.custom, np.int64(ACCEPTING), t, 0.0, u0, w, out)
 
 
 @source
@@ -306,7 +335,7 @@ def add_element_damping(tables, t, u, v, A):
 @source
 def keep_entries(tables, t, factor, u0, u1):
     """Keep the derivatives of changing elements, times a factor, beside the band of a step."""
-    if tables.changing > 0:
+    if tables.changing > 0 and (tables.clear[HAS_ENTRIES] > 0.0 or not at_rest(tables, u0, u1)):
         custom_elements(tables.custom, np.int64(ENTRIES), t, factor, u0, u1, u0)
 
 

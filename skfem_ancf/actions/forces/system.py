@@ -13,12 +13,14 @@ from ...beam.domain import Domain
 from ...core.types import Array
 from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts
+from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..places import Vector
 from ..bound import BoundForce, Remembering, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
-from .kernels import (ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHING, RESISTING, TORSION,
-                      ForceTables, element_stiffness, potential, run_kinds, vectors_of)
+from .kernels import (ACCEPTING, ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHED_BACK, PUSHING,
+                      RESISTING, TORSION, ForceTables, element_stiffness, potential, run_kinds,
+                      vectors_of)
 from .springs import TorsionalSpring
 
 
@@ -65,9 +67,10 @@ class Forces:
     them; ``remembering`` are those with a memory.
 
     ``far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given, with
-    places that differ by more than 1. ``symmetric``: all derivatives are symmetric. ``resists``:
-    there are velocity-dependent forces. ``masses`` contribute to the mass matrix; ``contacts`` are
-    the obstacles.
+    places that differ by more than 1; ``distant`` if one always does. ``symmetric``: all
+    derivatives are symmetric. ``resists``: there are velocity-dependent forces. ``masses``
+    contribute to the mass matrix; ``contacts`` are the obstacles. ``clear`` is a table of
+    :func:`~skfem_ancf.actions.contact.tables.is_clear` of the ``changing`` ones.
     """
 
     #: The vectors are ``start + B u``: the start, and the rows, DOFs and weights of B.
@@ -86,14 +89,17 @@ class Forces:
                          for e in elements]
         self._N, self._bandwidth = N, bandwidth
         parts: list[KernelElement] = []
-        self.custom = []
+        self.custom, self.changing = [], []
         for element in self.elements:
             found = element.parts()
-            if found is None:
-                self.custom.append(recalled(element))
-            else:
+            if found is not None:
                 parts += found
-        self.remembering = [e for e in self.custom if isinstance(e, Remembering)]
+            elif element.changing:
+                self.changing.append((recalled(element), element.all_dofs))
+            else:
+                self.custom.append(recalled(element))
+        self.remembering = [e for e in (*self.custom, *(e for e, _ in self.changing))
+                            if isinstance(e, Remembering)]
         order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
         self.parts = [parts[k] for k in order]
         self._place = np.argsort(order) if order else np.zeros(0, np.int64)
@@ -109,10 +115,9 @@ class Forces:
         self._slices = []
         for element in self.custom:
             m = 2 * len(element.links)
-            a, b = np.divmod(np.arange(0 if element.changing else m * m), m) if (
-                element.entries is None) else element.entries
+            dense = element.entries is None
+            a, b = np.divmod(np.arange(m * m), m) if dense else element.entries
             numbers = at + np.arange(len(a))
-            dense = element.entries is None and not element.changing
             self._blocks.append(numbers.reshape(m, m) if dense else numbers)
             self._slices.append((slice(row, row + m), slice(at, at + len(a))))
             blocks.append((element.links, row + np.arange(m), a, b, numbers))
@@ -120,20 +125,26 @@ class Forces:
         self.rows, self.size = row, at
         if blocks:
             self._couple(blocks, places)
-        #: Elements whose stiffness changes its pattern, and their DOFs.
-        self.changing = [(e, np.concatenate([link.dofs.ravel() for link in e.links]))
-                         for e in self.custom if e.changing]
+        weights = np.zeros(N)
+        for element, dofs in self.changing:
+            if hasattr(element, "least_gap"):
+                weights[dofs] = np.maximum(weights[dofs], element.weights)
+        self.clear, u = clear_table(weights), np.zeros(N)
+        if self.changing:
+            set_clear(self.clear, u, self._least_gap(u))
         #: Entries of the last tangent of a step: rows, columns and values.
         self.kept = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        self.far = bool(self._far.any() or self.changing)
+        self.distant = bool(self._far.any())
+        self.far = self.distant or bool(self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
         # those of user-defined laws first, then in the order of the parts
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
                                key=lambda e: -1 if e in self.custom else self.rows_of(e)[0])
-        self.contacts = Contacts(self.elements, [e.key for e in self._springs])
+        self.contacts = Contacts(self.elements, N, [e.key for e in self._springs])
         damping = ({0: c, 1: b, 2: b, 3: a or b}[part.kind] for part in self.parts
                    for a, b, c in [part.numbers[:3]])
-        self.resists = (any(e.resists for e in self.custom) or any(c > 0.0 for c in damping)
+        self.resists = (any(e.resists for e in (*self.custom, *(e for e, _ in self.changing)))
+                        or any(c > 0.0 for c in damping)
                         or any(one.damping > 0.0 for one in self.contacts.obstacles))
 
     def _couple(self, blocks, places):
@@ -175,6 +186,7 @@ class Forces:
         of = dict(zip(map(id, self.remembering), new))
         other.remembering, other.custom = new, [of.get(id(e), e) for e in self.custom]
         other.changing = [(of.get(id(e), e), at) for e, at in self.changing]
+        other.clear = self.clear.copy()
         if memory.size:
             other.contacts = self.contacts.after(memory)
         return other
@@ -193,7 +205,8 @@ class Forces:
             np.ascontiguousarray(numbers.T).ravel(), self.size,
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
             self._between[0], self._between[1],
-            handle if self.custom else 0, self.contacts.tables, len(self.changing))
+            handle if self.custom or self.changing else 0, self.contacts.tables,
+            len(self.changing), self.clear)
 
     def acting_rows(self) -> Array:
         """Derivatives of positions of concentrated elements, shape (k, N)."""
@@ -226,7 +239,8 @@ class Forces:
         self.recall()
         return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential_at(y[rows].reshape(-1, 2), t) or 0.0
-            for element, (rows, _) in zip(self.custom, self._slices))
+            for element, (rows, _) in zip(self.custom, self._slices)) + sum(
+            element.potential_at(u[at].reshape(-1, 2), t) or 0.0 for element, at in self.changing)
 
     @property
     def sampled(self) -> list[Any]:
@@ -272,10 +286,16 @@ class Forces:
         return np.array([one.angle_of(np.array([link(u) for link in one.links]))
                          for one in self._springs])
 
-    def settle(self, u: Array, t: float) -> float:
-        """Update the history data at the end of an increment; returns the work of friction."""
+    def settle(self, u0: Array, u: Array, t: float) -> float:
+        """Update the history data at the end of an increment from u0 to u; returns lost work."""
         self.follow(u)
-        return self.contacts.settle(u, t)
+        return self.contacts.settle(u, t) + sum(
+            item.settle(u0, u, t) for item in self._at_work(u0, u))
+
+    def _at_work(self, *displacements):
+        """The elements with a memory, without changing ones that do nothing at displacements."""
+        idle = all(is_clear(self.clear, u, 0.0) for u in displacements)
+        return [item for item in self.remembering if not (idle and item.changing)]
 
     def follow(self, u: Array) -> None:
         """Keep the angles of torsional springs at u."""
@@ -312,6 +332,8 @@ class Forces:
         Plus a factor times the resistance.
         """
         found = [(NONE, NONE, np.zeros(0))]
+        if is_clear(self.clear, u0, 0.0) and is_clear(self.clear, u1, 0.0):
+            return found[0]
         for element, at in self.changing:
             x, y = (u[at].reshape(-1, 2) for u in (u0, u1))
             w = 0.0 * x if v is None else v[at].reshape(-1, 2)
@@ -324,16 +346,23 @@ class Forces:
 
     def corrected(self, u: Array, t: float) -> bool:
         """Change histories with which an increment is to be repeated; True if there are any."""
-        return sum(element.correct(u, t) for element in self.remembering) > 0
+        return sum(element.correct(u, t) for element in self._at_work(u)) > 0
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Why a step must not lead from a displacement and time to others, or None."""
         if text := self.contacts.passed(a, b):
             return text
-        for element, at in self.changing:
+        for element, at in self.changing if not all(is_clear(self.clear, u, 0.0) for u, _ in (
+                a, b)) else ():
             if text := element.passed(*(u[at].reshape(-1, 2) for u in (a[0], b[0])), b[1]):
                 return text
         return None
+
+    def moves_far(self, u: Array) -> Array:
+        """True for steps between displacements (n + 1, N) that may lead through a changing element,
+        (n,), however it is touched before and after."""
+        way = np.max(np.abs(np.diff(u, axis=0)) * self.clear[SEEN + self._N:], axis=1)
+        return way >= min(getattr(element, "near", 0.0) for element, _ in self.changing)
 
     def looks(self, u: Array, t: float) -> Iterator[tuple[Any, Any]]:
         """Elements of bodies that touch each other, with what their ``look`` returns."""
@@ -345,17 +374,30 @@ class Forces:
         """Evaluate changing elements at displacements, for :meth:`add_custom`."""
         if what == ENTRIES:
             i, j, values = self.changing_entries(t, u, u if np.array_equal(u, w) else w)
-            self.kept = i, j, factor * values
+            self.kept, self.clear[HAS_ENTRIES] = (i, j, factor * values), float(len(i) > 0)
             return
         if what == ALONG_PUSHING:
             i, j, values = self.changing_entries(t, u, u)
             out[0] += values @ (w[i] * w[j])
         for element, at in self.changing:
-            x = u[at].reshape(-1, 2)
+            x, y = (z[at].reshape(-1, 2) for z in (u, w))
             if what == PUSHING:
-                out[at] -= np.ravel(element.force(x, 0.0 * x, t))
-            else:
-                out[1] = max(out[1], element.stride(x, x + w[at].reshape(-1, 2)))
+                same, span = np.array_equal(x, y), [factor] * isinstance(element, Remembering)
+                out[at] -= np.ravel(element.force(x, 0.0 * x, t) if same else
+                                    element.mean_force(x, y, t, *span))
+            elif what == PUSHED_BACK and element.resists:
+                out[at] -= np.ravel(element.force(x, y, t) - element.force(x, 0.0 * y, t))
+            elif what == ALONG_PUSHING:
+                out[1] = max(out[1], element.stride(x, x + y))
+            elif what == ACCEPTING and isinstance(element, Remembering):
+                out[0] += element.accept(x, y, w[len(u):][at].reshape(-1, 2), t)
+        if what == PUSHING:
+            set_clear(self.clear, w, self._least_gap(w))
+
+    def _least_gap(self, u):
+        """The least gap of changing elements; 0 for unknown."""
+        return min(element.least_gap(u[at].reshape(-1, 2)) if hasattr(element, "least_gap") else 0.0
+                   for element, at in self.changing)
 
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
@@ -388,7 +430,7 @@ class Forces:
                 if isinstance(element, Remembering):
                     v = b[len(a):][rows].reshape(-1, 2)
                     out[0] += element.accept(x, y, v, t)
-            elif not element.changing:
+            else:
                 found = np.array(element.stiffness(x, y, t))
                 if element.resists and factor != 0.0:
                     found = found + factor * np.asarray(element.resistance(x, y, t))
@@ -398,4 +440,5 @@ class Forces:
 _X, _I = np.zeros(0), np.zeros(0, np.int64)
 #: For scenes without force elements.
 NO_FORCES = constant(ForceTables(
-    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS))
+    _X, _I, _I, _X, 0, np.zeros(KINDS + 1, np.int64), _X, 0, _I, _I, _X, _I, _I, 0, NO_CONTACTS, 0,
+    _X))

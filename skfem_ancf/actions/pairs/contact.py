@@ -33,6 +33,9 @@ SOFTER, SOFTEST, PRESSED = 0.1, 1e-4, 0.3
 CUT = 0.02
 #: Iterations for the place of a mean force; change of a gap in heights below which none is needed.
 MEANS, CLOSE = 8, 1e-9
+#: Part of the height by which a point may move in a step with no look at what it leads through: the
+#: pressure of the next one acts.
+NEAR = 0.25
 #: Part of the height by which a point may move in an interval of a line search.
 STRIDE = 0.5
 
@@ -149,6 +152,8 @@ class BodyContact(ForceElement):
         solids = [(k, _inside(layout.members[k], origin)) for k in used if k not in beams]
         self.search, self.origin = Search(surfaces, allowed, solids), origin
         self.width = WIDTH * self.search.height
+        self.weights = np.repeat(np.sqrt(2.0) * self.search.weights, 2)
+        self.near = NEAR * self.search.height
         self._begin(layout)
         return [Vector(np.zeros(2), 2 * k + np.arange(2)[:, None], 1.0) for k in self.dofs]
 
@@ -337,7 +342,7 @@ class BodyContact(ForceElement):
 
     def _friction(self, met, z, history):
         """The :class:`Rubbing` of pairs at the end z of a step; none of those that have parted."""
-        S, (p, e, zeta, gap) = self.search.surfaces, met.end
+        S, (p, e, zeta, gap) = self.search.surfaces, met.end[:4]
         f, n = S.facets, len(p)
         T, bend = (S.along(e, zeta, order, z) for order in (1, 2))
         normal = f.sides[e] * 1j * T / np.abs(T)
@@ -357,7 +362,7 @@ class BodyContact(ForceElement):
         """The history at the end z of an increment."""
         if not self.friction:
             return history
-        rub, (p, e, zeta, _) = self._friction(met, z, history), met.end
+        rub, (p, e, zeta, _) = self._friction(met, z, history), met.end[:4]
         new = np.append(history[:1], np.zeros(len(history) - 1))
         curves, anchors = new[1:].reshape(2, -1)
         curves[p] = self.search.surfaces.facets.curves[e] + 1.0
@@ -399,6 +404,13 @@ class BodyContact(ForceElement):
             place[found.p] = self.search.place(found.e, found.zeta)
             anchor[:] = place - (place - anchor) / factor
         return new
+
+    def least_gap(self, x: Array) -> float:
+        """The least gap at x; 0 if anything touches.
+
+        Points move by at most the largest change of x times ``weights``.
+        """
+        return self.search.touching(_complex(x, x)[0]).clear
 
     def stride(self, x: Array, y: Array) -> float:
         S = self.search.surfaces

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from ...core.types import Array
+from ..contact.tables import weights_of_motion
 from .gap import Surfaces, cross, dot
 
 #: Distance of seeds along facets, largest number on a facet, and the distance for which a list of
@@ -21,6 +22,8 @@ APART = 3.0
 JOINED, FINE = 1e-3, 8
 #: Sine of the angle of parallel segments.
 PARALLEL = 1e-6
+#: How much further points between those of a rule may move.
+BETWEEN = 1.1
 #: Number of states of which pairs are kept.
 KEPT = 3
 #: Parts of an element in which crossing axes are searched.
@@ -42,20 +45,20 @@ class Candidates(NamedTuple):
     zeta: Array
     seeds: tuple[Array, Array]
     x: Array
-    z: Array
     skin: float
 
 
 class Touching(NamedTuple):
-    """Pairs of points and facets in contact, (n,) each: their closest points and gaps."""
+    """Pairs of points and facets in contact, (n,) each: their closest points and gaps.
+
+    ``clear`` is the least gap of all if there are none.
+    """
 
     p: Array
     e: Array
     zeta: Array
     gap: Array
-
-
-NONE = Touching(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
+    clear: float
 
 
 class Search:
@@ -70,11 +73,10 @@ class Search:
         self.surfaces, self.allowed, self.begins = surfaces, allowed, np.inf
         f, self._known = surfaces.facets, None
         self._last: list[tuple[Array, Touching]] = []
-        # motion of a point by each of its B degrees of freedom; slopes may shrink to a half
-        (N, _), (D, _) = surfaces.points
-        self._moves = np.zeros(int(f.dofs.max()) + 1)
-        np.maximum.at(self._moves, surfaces.dofs, N.shape[1] * (
-            np.abs(N) + 2.0 * np.abs(surfaces.shift / self._speeds())[:, None] * np.abs(D)))
+        (N, _), (D, slope) = surfaces.points
+        self.weights = BETWEEN * weights_of_motion(
+            np.abs(N) + 2.0 * np.abs(surfaces.shift / slope)[:, None] * np.abs(D), surfaces.dofs,
+            int(f.dofs.max()) + 1)
         self.height = h = float(np.min(f.heights))
         m = int(np.clip(np.ceil(np.max(f.lengths) / (SEEDS * h)), 1, MOST))
         self._seed_zeta = (2.0 * np.arange(m) + 1.0) / m - 1.0
@@ -110,15 +112,13 @@ class Search:
         first = np.append(True, (np.diff(p) != 0) | (np.diff(e[k]) != 0))[:len(p)]
         p, k = p[first], k[first]
         return Candidates(p, e[k], zeta[k], self.surfaces.curve(e[k], zeta[k], 0), x,
-                          z.copy(), skin)
+                          skin)
 
     def touching(self, z: Array) -> Touching:
         """The pairs with a gap below the one at which the pressure begins.
 
         The last ones are kept: forces and stiffnesses ask for the same states in turn.
         """
-        if self._nothing_near(z):
-            return NONE
         for at, found in self._last:
             if np.array_equal(at, z):
                 return found
@@ -130,43 +130,34 @@ class Search:
         """Forget the last states."""
         self._last = []
 
-    def _nothing_near(self, z):
-        """True if nothing was near at the last search, and no point can have come near since.
-
-        By a bound on motion from the degrees of freedom alone.
-        """
-        known = self._known
-        return known is not None and not len(known.p) and np.max(
-            self._moves * np.abs(z - known.z)) < 0.5 * known.skin
-
     def _touching(self, z):
         known, x, n = self.candidates(z)
-        if not len(known.p):
-            return Touching(known.p, known.e, known.zeta, known.zeta)
+        beyond = known.skin + self.height - 2.0 * float(np.max(np.abs(x - known.x)))
         weights, start = known.seeds
         y = start + np.einsum("nb,nb->n", weights, z[self.surfaces.facets.dofs[known.e]])
-        near = np.abs(x[known.p] - y) < self._near[known.e] + self.height
-        p, e = known.p[near], known.e[near]
+        far = np.abs(x[known.p] - y) - self._near[known.e] - self.height
+        near = far < 0.0
+        beyond = np.min(far[~near] + self.height, initial=beyond)
+        p, e, f = known.p[near], known.e[near], self.surfaces.facets
         if not len(p):
-            return Touching(p, e, np.zeros(0), np.zeros(0))
+            return Touching(p, e, np.zeros(0), np.zeros(0), beyond)
         zeta, there = self.surfaces.project(x[p], e, known.zeta[near], z)
-        p, e, zeta = p[there], e[there], zeta[there]
+        zeta = np.where(there, zeta, np.clip(zeta, -1.0, 1.0))
         c, T = (self.surfaces.along(e, zeta, order, z) for order in (0, 1))
-        f = self.surfaces.facets
         normal = f.sides[e] * 1j * T / np.abs(T)
         gap = dot(normal, x[p] - c) - f.offsets[e]
+        gap[~there] = np.abs(x[p] - c)[~there] - f.offsets[e[~there]]
         begins = np.broadcast_to(self.begins, x.shape)[p]
-        fits = (gap < begins) & (gap > -DEEPEST * self.height) & (dot(normal, n[p]) < OPPOSED)
-        fits &= ~self._together(p, e, zeta, 0.0 * f.lengths)
+        apart = ~self._together(p, e, zeta, 0.0 * f.lengths)
+        left = np.where(gap < begins, -DEEPEST * self.height - gap, gap - begins)
+        beyond = np.min(left[apart], initial=beyond)
+        fits = there & apart & (gap < begins) & (gap > -DEEPEST * self.height) & (
+            dot(normal, n[p]) < OPPOSED)
         p, e, zeta, gap = p[fits], e[fits], zeta[fits], gap[fits]
         away = np.abs(gap) + np.maximum(np.abs(zeta) - 1.0, 0.0) * f.lengths[e]
         order = np.lexsort((away, p))
         best = order[np.append(True, np.diff(p[order]) != 0)[:len(p)]]
-        return Touching(p[best], e[best], zeta[best], gap[best])
-
-    def _speeds(self):
-        """Lengths of the slopes of all points in the reference configuration, (P,)."""
-        return np.abs(self.surfaces.points[1][1])
+        return Touching(p[best], e[best], zeta[best], gap[best], beyond)
 
     def place(self, e: Array, zeta: Array) -> Array:
         """Where points of facets are along their curve."""
