@@ -123,7 +123,7 @@ def test_two_beams_on_a_spring_keep_their_momenta():
     scene = Scene(a, b).spring(30.0, ((0, (0.5, 0)), (1, (0.8, 0.4))), length=0.2, damping=0.3)
     scene.initial_velocity(lambda x: np.array([0.0 * x[0], 1.0 * x[0]]), beam=1)
     history = scene.integrate(0.3, 2e-3)
-    assert scene.system.forces.far and history.dissipated[-1] > 1e-3
+    assert scene.system.forces.couples_far and history.dissipated[-1] > 1e-3
     assert np.ptp(history.total_energy + history.dissipated) < 1e-12
     assert np.abs(history.momentum - history.momentum[0]).max() < 1e-12
     assert np.ptp(history.angular_momentum) < 1e-12
@@ -163,7 +163,7 @@ def test_bodies_on_a_spring_by_collocation(damping):
         found = [history.position(x, body)[-1] for x, body in zip(places, bodies)]
         errors.append(np.abs(np.ravel(found) - known).max())
         assert history.substeps == 0 and history.iterations < 3 * 17 * n
-    assert scene.system.forces.far and errors[1] < 1e-5
+    assert scene.system.forces.couples_far and errors[1] < 1e-5
     assert np.log2(errors[0] / errors[1]) == pytest.approx(5, abs=0.5)
 
 

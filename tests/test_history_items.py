@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, Item, MeshBeam,
                         RigidBody, Scene, StVenantKirchhoff, sweep)
@@ -220,6 +221,24 @@ def test_a_mass_on_a_maxwell_element_moves_as_its_equation_says(scheme):
     assert np.ptp(total) < (1e-10 if scheme == "energy-momentum" else 2e-3) * total[0]
     lost = total[0] - 0.5 * m * exact[1] ** 2 - 0.5 * exact[2] ** 2 / k
     assert_allclose(history.dissipated, lost, atol=1e-3 * total[0])
+
+
+def test_buckling_and_modes_have_the_stiffness_at_once():
+    """A column that a Maxwell element holds sideways: tan x = x - x^3 E I / (k L^3)."""
+    E, h, k = 2e9, 0.01, 20.0
+    EI = E * h**4 / 12.0
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 7), height=h), ElementBeamCable(5),
+                StVenantKirchhoff(E, 0.3, 1000.0), width=h)
+    scene = Scene(beam).clamp("left").point_force((-1.0, 0.0), at=TIP).add(Maxwell(k, 0.05))
+    x = brentq(lambda x: np.sin(x) - (x - x**3 * EI / k) * np.cos(x), 1.6, 4.4)
+    assert 2.0 < x < 4.0  # between free and fixed
+    assert_allclose(scene.buckling(1).factors[0], EI * x**2, rtol=1e-3)
+    # after a while the force has relaxed; a new disturbance still meets k
+    state = scene.run(1.0, increments=2).state(-1)
+    omega = scene.modes(1, state).frequencies[0]
+    plain = Scene(beam).clamp("left").point_force((-1.0, 0.0), at=TIP).spring(k, (TIP, (1.0, 1e6)))
+    known = plain.modes(1, plain.solve_static()).frequencies[0]
+    assert_allclose(omega, known, rtol=1e-3)
 
 
 def test_an_integral_controller_reaches_its_target():

@@ -430,7 +430,13 @@ def try_force(bound: Any, sizes: Any = None) -> None:
     require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
     own = not is_builtin(getattr(bound, "item", bound))
     if bound.changing:
-        _require_pairs(bound)
+        K = bound.stiffness(x, zero, 0.0)
+        if not sparse.issparse(K) or K.shape != (2 * n, 2 * n):
+            raise InputError(f"the stiffness of {bound!r}, with changing = True, must be a sparse "
+                             f"matrix of shape {(2 * n, 2 * n)}, got {shown(K)}")
+        if any(link.dofs.shape != (2, 1) or np.any(link.weights != 1.0) for link in bound.links):
+            raise InputError(f"{bound!r} has changing = True: each of its links must be a pair of "
+                             "degrees of freedom, as Vector(np.zeros(2), [[0], [1]], 1.0)")
         if not own:
             return
     else:
@@ -453,18 +459,6 @@ def try_force(bound: Any, sizes: Any = None) -> None:
 def _matrix(K, n):
     """A derivative as a matrix (n, n)."""
     return K if sparse.issparse(K) else np.reshape(K, (n, n))
-
-
-def _require_pairs(bound):
-    """Raise InputError unless the links of a changing element are pairs of DOFs."""
-    x, n = np.array([x.start for x in bound.links]), len(bound.links)
-    K = bound.stiffness(x, 0.0 * x, 0.0)
-    if not sparse.issparse(K) or K.shape != (2 * n, 2 * n):
-        raise InputError(f"the stiffness of {bound!r}, with changing = True, must be a sparse "
-                         f"matrix of shape {(2 * n, 2 * n)}, got {shown(K)}")
-    if any(link.dofs.shape != (2, 1) or np.any(link.weights != 1.0) for link in bound.links):
-        raise InputError(f"{bound!r} has changing = True: each of its links must be a pair of "
-                         "degrees of freedom, as Vector(np.zeros(2), [[0], [1]], 1.0)")
 
 
 def _require_derivatives(bound, x, u, d):
@@ -559,15 +553,11 @@ class UserForce(BoundForce):
         self._mass = None if not hasattr(item, "mass") else _entries(
             f"mass() of {item!r}", item.mass(), layout.N)
         if self._forced:
-            self.changing = self._is_sparse(layout)
+            if hasattr(item, "stiffness"):
+                zero = np.zeros(layout.N)
+                past = (item.start(), 0.0) if hasattr(item, "start") else ()
+                self.changing = sparse.issparse(item.stiffness(zero, zero, 0.0, *past))
             try_force(self, layout.sizes[self._dofs].reshape(-1, 2))
-
-    def _is_sparse(self, layout):
-        if not hasattr(self.item, "stiffness"):
-            return False
-        zero = np.zeros(layout.N)
-        past = (self.item.start(), 0.0) if hasattr(self.item, "start") else ()
-        return sparse.issparse(self.item.stiffness(zero, zero, 0.0, *past))
 
     def _whole(self, x):
         out = np.zeros(self._N, dtype=np.asarray(x).dtype)

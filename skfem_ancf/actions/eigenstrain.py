@@ -53,11 +53,6 @@ def energy_difference(beam: Beam, u: Array, eigen: Sequence[Array], factor: floa
     return total
 
 
-def kernel_argument(e: Any, E0: Array, stresses: Array) -> Array:
-    """The kernel's argument for an eigenstrain: strains at the points, or linear stresses."""
-    return stresses if e.t.law.kind == LINEAR else e.at_points(E0)
-
-
 def sampled(beam: Beam, integral: Any, eigen: Any) -> Array:
     """An eigenstrain where a term samples the strain, (ns, nelements)."""
     term, layer, out = integral.term, integral.layer, []
@@ -206,8 +201,10 @@ class EigenStrain(Load):
             return bound
         bound._strains = [sampled(beam, one, self) for one in kernel.integrals]
         bound._stresses = list(map(stresses_of, kernel.elements, bound._strains))
-        bound.eigen_stresses = list(map(
-            kernel_argument, kernel.elements, bound._strains, bound._stresses))
+        # nonlinear laws have the strains at the points in place of stresses
+        bound.eigen_stresses = [
+            stress if e.t.law.kind == LINEAR else e.at_points(E0)
+            for e, E0, stress in zip(kernel.elements, bound._strains, bound._stresses)]
         bound.grows = any(t.law.kind in (POINTWISE, CUSTOM) for t in kernel.tables)
         bound._size = bound.at_rest if bound.grows else 1.0
         return bound

@@ -478,7 +478,7 @@ def _coupled(A, system):
 def _damping(system):
     """The low-rank rows beside the band, and the Dampers of a system."""
     modes, M = system.modal_damping.rows, system.mass
-    rows = np.concatenate([modes, system.forces.far_rows()])
+    rows = np.concatenate([modes, system.forces.border_rows])
     k = len(rows)
     D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))
     return (LowRankRows(rows, np.zeros((k, k)), np.zeros(rows.shape), np.zeros((k, k))),

@@ -60,12 +60,6 @@ class Group(NamedTuple):
         """DOFs of each member, shape (M, (elements + 1) nd)."""
         return self.first[:, None] + np.arange((self.elements + 1) * self.nd)
 
-    @property
-    def end_places(self) -> Array:
-        """DOFs of the first and last nodes, shape (M, 2 nd)."""
-        return self.first[:, None] + np.append(*np.arange(self.nd) + [
-            [0], [self.elements * self.nd]])
-
 
 def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
     """Group the members of all beams, whose DOFs are the slices."""
@@ -495,7 +489,8 @@ class _Part:
         """All displacements x (N, k) from those of the ends (M, 6, k), after :meth:`reduce`."""
         nd, places = self.group.nd, self._places
         ends = self._forces.transpose(0, 2, 1) @ v + self._flexibility @ self._known[-1]
-        x[self.group.end_places] = ends
+        n = self.group.elements * nd
+        x[places[:, [*range(nd), *range(n, n + nd)]]] = ends
         around = ends.copy()
         for k in range(self.group.elements - 1, 0, -1):
             around[:, nd:] = self._known[k - 1] - self._inner[k - 1][2] @ around

@@ -84,13 +84,6 @@ class Constraints:
         self.fixed, self.given = np.array(fixed, np.int64), np.array(values, float)
         self.all_joints, self.joints, self._held = list(joints), [], np.zeros(len(fixed))
         self._fixing: list[Any] = []
-        self._moving: list[Any] = []
-        if joints:
-            self._eliminate_joints(joints)
-        self.mask = self.free.astype(float)
-        self.m = sum([len(joint.equations) for joint in self.joints])
-
-    def _eliminate_joints(self, joints):
         zero, fixed, held, first = np.zeros(self.N), [self.fixed], [self._held], len(self.fixed)
         for joint in joints:
             found = _fixes(joint, zero) if joint.constant else None
@@ -115,6 +108,8 @@ class Constraints:
             self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
             self.given = np.concatenate([self.given, np.zeros(first - len(self.given))])
         self._moving = [item for item in self._fixing if item[0].moving]
+        self.mask = self.free.astype(float)
+        self.m = sum([len(joint.equations) for joint in self.joints])
 
     def _leave_out(self):
         """Remove redundant equations of joints, with a warning."""
@@ -203,9 +198,11 @@ class Constraints:
         """Phi, shape (m,)."""
         if not self.tabled:
             return np.concatenate([np.zeros(0), *(joint.value(u, t) for joint in self.joints)])
-        rows, columns, values = self._slopes_at(t)
+        (rows, columns, values), offset = self._slopes_at(t), self._still[0]
+        if self.drives:
+            offset = np.concatenate([x.offset(np.array([t]), self.N)[0] for x in self.joints])
         k, i, j, v = self.seconds
-        return (self._offset(t) + np.bincount(rows, values * u[columns], self.m)
+        return (offset + np.bincount(rows, values * u[columns], self.m)
                 + 0.5 * np.bincount(k, v * u[i] * u[j], self.m))
 
     def add_moving(self, slopes: bool, u: Array, v: Array, t: float, out: Array) -> None:
@@ -254,11 +251,6 @@ class Constraints:
         """Phi in the reference configuration, and whether its Jacobian there is constant."""
         offset = [joint.offset(np.zeros(1), self.N)[0] for joint in self.joints]
         return np.concatenate([np.zeros(0), *offset]), not any(j.turning for j in self.joints)
-
-    def _offset(self, t):
-        if not self.drives:
-            return self._still[0]
-        return np.concatenate([joint.offset(np.array([t]), self.N)[0] for joint in self.joints])
 
     def _slopes_at(self, t):
         if self._still[1]:

@@ -51,7 +51,7 @@ class LinearSolver:
         self._pattern, self._last = Pattern(), Last()
         #: True if the matrix is more than a band: multipliers, or force elements between distant
         #: nodes.
-        self.coupled = bool(system.constraints.joints) or system.forces.far
+        self.coupled = bool(system.constraints.joints) or system.forces.couples_far
         #: True if it is only while changing elements do something.
         self.at_times = not (system.constraints.joints or system.forces.distant)
 
@@ -66,7 +66,7 @@ class LinearSolver:
     def condensed(self) -> Condensed | None:
         """The condensed form of a frame, or None."""
         s = self._system
-        if not s.constraints.condensable or not s.symmetric or s.forces.far:
+        if not s.constraints.condensable or not s.symmetric or s.forces.couples_far:
             return None
         return Condensed(s, s.K)
 
@@ -77,7 +77,7 @@ class LinearSolver:
     def _far_entries(self):
         """Entries of force elements outside of the band, at free DOFs."""
         s = self._system
-        i, j, w, place = s.forces.far_entries()
+        i, j, w, place = s.forces.border_entries
         u, t = self._at
         if len(i):
             w = w * s.forces.stiffness(s.backend.tables.plain.forces, t, u, 0.0 * u, 0.0)[place]
@@ -90,7 +90,7 @@ class LinearSolver:
     def multiply(self, v: Array) -> Array:
         """The assembled tangent times v (N,), before :meth:`factorize`."""
         out = self._system.K.multiply(v)
-        if self._system.forces.far:
+        if self._system.forces.couples_far:
             i, j, values = self._far_entries()
             out = out + np.bincount(i, values * v[j], self._system.N)
         return out

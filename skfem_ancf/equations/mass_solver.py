@@ -43,7 +43,7 @@ class MassSolver:
     def by_nodes(self) -> bool:
         """True if time integration condenses a frame to its nodes."""
         s = self._system
-        return (s.constraints.condensable and not s.forces.far and s.constraints.m > MANY
+        return (s.constraints.condensable and not s.forces.couples_far and s.constraints.m > MANY
                 and not len(s.damping.modal))
 
     @cached_property

@@ -76,23 +76,17 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
     try:
         system.assemble(u, load)
         system.solver.factorize(u, load if t is None else t, multipliers)
-        return verdict_of_factors(system)
+        negative, singular = system.solver.inertia()
+        rubs = system.forces.contacts.anchored
+        who = "friction or loads have" if rubs else "the loads have"
+        if system.symmetric or _is_symmetric(system):
+            return Verdict("unstable" if negative else "singular" if singular else "stable",
+                           negative)
+        if system.solver.determinant_sign() < 0 or negative and _diverges(system):
+            return Verdict("unstable", negative, f"by divergence: {who} no potential")
     except NO_FACTORS:
         return Verdict("singular", 0)
-
-
-def verdict_of_factors(system: Any) -> Verdict:
-    """The :class:`Verdict` from the factorised tangent."""
-    negative, singular = system.solver.inertia()
-    rubs = system.forces.contacts.anchored
-    who = "friction or loads have" if rubs else "the loads have"
-    if system.symmetric or _is_symmetric(system):
-        return Verdict("unstable" if negative else "singular" if singular else "stable", negative)
-    if system.solver.determinant_sign() < 0:
-        return Verdict("unstable", negative, f"by divergence: {who} no potential")
     if negative:
-        if _diverges(system):
-            return Verdict("unstable", negative, f"by divergence: {who} no potential")
         return Verdict("undecided", negative, f"{who} no potential, and only the symmetric "
                        "part of the tangent is indefinite: see scene.modes")
     return Verdict("singular" if singular else "stable", 0, RUBS if rubs else FOLLOWS)

@@ -188,8 +188,10 @@ class System:
         self._index = {id(member): k for k, member in enumerate(self.members)}
         self.size = max([0.0, *(domain.size for domain in domains)])
         if beams or bodies:
-            self.size = max(self.size, _extent(self.bodies) if not beams else beams[0].size
-                            if len(beams) == 1 else reach([b.mesh for b in self.beams]))
+            corners = [body.outline_at(np.zeros(body.N)) for body in bodies if not beams]
+            self.size = max(self.size, beams[0].size if len(beams) == 1 else
+                            reach([b.mesh for b in self.beams]) if beams else
+                            float(np.max(np.ptp(np.concatenate(corners, axis=1), axis=1))))
         directors = [UnitDirector(body, self.of(body).start) for body in self.bodies
                      if len(np.intersect1d(fixed, self.of(body).start + np.arange(2, 4))) < 2]
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
@@ -540,9 +542,3 @@ class System:
 
 def _holds(load):
     return not load.constant and load.first_order
-
-
-def _extent(bodies):
-    """The largest extent of rigid bodies."""
-    corners = np.concatenate([body.outline_at(np.zeros(body.N)) for body in bodies], axis=1)
-    return float(np.max(np.ptp(corners, axis=1)))

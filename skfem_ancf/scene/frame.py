@@ -334,7 +334,8 @@ class Frame(Scene):
             fixed[nodes, COMPONENTS.index(name)] = True
         if "angle" in names:
             self._require_rigid(nodes, "it has no rotation to hold, pin it")
-        self._take(known.holding(fixed, settlements or known.settlements))
+        now = settlements or known.settlements
+        self._take(known._with(fixed=fixed, settlements=now, functions=now.functions))
         return self
 
     def settle(self, place: Any, x: float | Callable[[float], float] | None = None,

@@ -217,7 +217,7 @@ def make_plan(system: System, kind: str) -> Plan:
         text = (f"lines condensed to {solver.condensed.size} displacements and rotations of nodes, "
                 "sparse LDL^T of these: no multiplier is unknown")
     elif not dynamic and solver.coupled and (
-            not system.constraints.few or system.forces.far or not system.symmetric):
+            not system.constraints.few or system.forces.couples_far or not system.symmetric):
         text = "sparse LU on the null space of the joints"
     else:
         text = (f"banded {'Cholesky' if system.symmetric else 'LU'}, half bandwidth "

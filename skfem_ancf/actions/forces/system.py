@@ -66,8 +66,8 @@ class Forces:
     """The bound force elements of a scene; ``custom`` are the user-defined ones, as solvers see
     them; ``remembering`` are those with a memory.
 
-    ``far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given, with
-    places that differ by more than 1; ``distant`` if one always does. ``symmetric``: all
+    ``couples_far``: an element couples DOFs outside the band, or, where ``places`` (N,) are given,
+    with places that differ by more than 1; ``distant`` if one always does. ``symmetric``: all
     derivatives are symmetric. ``resists``: there are velocity-dependent forces. ``masses``
     contribute to the mass matrix; ``contacts`` are the obstacles. ``clear`` is a table of
     :func:`~skfem_ancf.actions.contact.tables.is_clear` of the ``changing`` ones.
@@ -77,10 +77,12 @@ class Forces:
     _vectors: Any = np.zeros(0), NONE, NONE, np.zeros(0)
     #: Rows, columns, weights and derivatives of the entries of the stiffness.
     _entries: Any = NONE, NONE, np.zeros(0), NONE
-    #: Whether their element has one outside the band; of those elements positions and numbers of
-    #: the derivatives between their rows of B, and these.
-    _far = NONE > 0
-    _between: Any = NONE, NONE, None
+    #: Whether their element has one outside the band: then it is in the border of the band. Of that
+    #: the rows, of B, rows, columns, weights and derivatives of its entries, and positions and
+    #: numbers of the derivatives between its rows.
+    _in_border = NONE > 0
+    border_entries = _entries
+    _border: Any = NONE, NONE
 
     def __init__(self, elements: Sequence[BoundForce], N: int, bandwidth: int,
                  places: Array | None = None) -> None:
@@ -122,7 +124,7 @@ class Forces:
             self._slices.append((slice(row, row + m), slice(at, at + len(a))))
             blocks.append((element.links, row + np.arange(m), a, b, numbers))
             row, at = row + m, at + len(a)
-        self.rows, self.size = row, at
+        self.rows, self.size, self.border_rows = row, at, np.zeros((0, N))
         if blocks:
             self._couple(blocks, places)
         weights = np.zeros(N)
@@ -134,8 +136,8 @@ class Forces:
             set_clear(self.clear, u, self._least_gap(u))
         #: Entries of the last tangent of a step: rows, columns and values.
         self.kept = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        self.distant = bool(self._far.any())
-        self.far = self.distant or bool(self.changing)
+        self.distant = bool(self._in_border.any())
+        self.couples_far = self.distant or bool(self.changing)
         self.symmetric = all(e.symmetric for e in self.elements)
         # those of user-defined laws first, then in the order of the parts
         self._springs = sorted((e for e in self.elements if isinstance(e, TorsionalSpring)),
@@ -173,11 +175,13 @@ class Forces:
             off |= np.abs(places[i] - places[j]) > 1
         far = np.bincount(block[pair], off, len(blocks)) > 0.0
         self._entries = i, j, B.data[p] * B.data[q], number[pair]
-        self._far = far[block[pair]]
+        self._in_border = far[block[pair]]
+        i, j, weights, number_of = (x[self._in_border] for x in self._entries)
+        self.border_entries = i, j, weights, number_of
         out = far[block]
-        rows, between = np.unique([a[out], b[out]], return_inverse=True)
-        a, b = between.reshape(2, -1)
-        self._between = len(rows) * a + b, number[out], B[rows].toarray()
+        rows, at = np.unique([a[out], b[out]], return_inverse=True)
+        a, b = at.reshape(2, -1)
+        self._border, self.border_rows = (len(rows) * a + b, number[out]), B[rows].toarray()
 
     def after(self, memory: Array, pasts: Sequence[tuple[Array, Array]]) -> Forces:
         """A copy with a history of obstacles and springs, and histories and spans of the items
@@ -196,7 +200,7 @@ class Forces:
         if not self.elements:
             return NO_FORCES
         (start, at, of, weight), (i, j, w, number) = self._vectors, self._entries
-        keep = ~self._far & ((i >= j) | (not symmetric))
+        keep = ~self._in_border & ((i >= j) | (not symmetric))
         kinds = np.array([part.kind for part in self.parts], dtype=np.int64)
         numbers = np.array([part.numbers for part in self.parts]).reshape(-1, NUMBERS)
         return ForceTables(
@@ -204,7 +208,7 @@ class Forces:
             np.searchsorted(kinds, np.arange(KINDS + 1)).astype(np.int64),
             np.ascontiguousarray(numbers.T).ravel(), self.size,
             position(i[keep], j[keep]).astype(np.int64), number[keep], w[keep],
-            self._between[0], self._between[1],
+            self._border[0], self._border[1],
             handle if self.custom or self.changing else 0, self.contacts.tables,
             len(self.changing), self.clear)
 
@@ -213,17 +217,6 @@ class Forces:
         return np.array([link.row(n, self._N) for element in self.elements
                          if not element.distributed and not element.internal
                          for link in element.links for n in np.eye(2)]).reshape(-1, self._N)
-
-    # elements that couple distant DOFs
-
-    def far_rows(self) -> Array:
-        """Derivatives of vectors of elements outside the band, shape (k, N)."""
-        return np.zeros((0, self._N)) if self._between[2] is None else self._between[2]
-
-    def far_entries(self) -> tuple[Array, Array, Array, Array]:
-        """Rows, columns, weights and source positions outside the band; shapes (k,)."""
-        i, j, w, number = (x[self._far] for x in self._entries)
-        return i, j, w, number
 
     # values
 

@@ -133,9 +133,6 @@ class Nodes(Joint):
             first += len(here)
         return out
 
-    def holding(self, fixed: Array, settlements: Settlements) -> Nodes:
-        return self._with(fixed=fixed, settlements=settlements, functions=settlements.functions)
-
     def bind(self, layout: Layout) -> None:
         self.fixed_x, self.fixed_y, self.fixed_angle = (
             self.leaders[self.fixed[self.nodes[self.leaders], k]] for k in range(3))
