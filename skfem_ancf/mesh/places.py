@@ -141,13 +141,10 @@ class Finder:
                 return e, np.minimum(np.maximum(X, 0.0), 1.0), outside, np.zeros(n, dtype=bool)
             if chain is not None or not self.is_chain:
                 return self._best(x, noise, *self._pairs(x, chain))
-            # the axis is nearest in the element of the nearest sample, or in the next one
-            near = self._tree.query(x.T)[1]
-            beside = near // SAMPLES + np.where(near % SAMPLES < SAMPLES // 2, -1, 1)
-            found = self._best(x, noise, np.tile(np.arange(n), 2), np.append(
-                near // SAMPLES, np.clip(beside, 0, self.mesh.nelements - 1)))
-            left = np.flatnonzero(found[2])
-            if len(left):  # on a face, or in a coil that is higher than the nearest one
+            found = self._best(x, noise, np.arange(n), self._tree.query(x.T)[1] // SAMPLES)
+            # outside, in another element than the nearest sample, or on a section
+            left = np.flatnonzero((found[2] > 0.0) | (found[1][0] <= noise))
+            if len(left):
                 for old, new in zip(found, self._best(x[:, left], noise, *self._pairs(x[:, left]))):
                     old[..., left] = new
         return found
@@ -173,18 +170,22 @@ class Finder:
         return e, X, outside, tied
 
     def _pairs(self, x, chain=None):
-        """Pairs of points (2, n) and elements whose bounding circles contain them, (k,) each."""
+        """Pairs of points (2, n) and elements whose bounding circles contain them, (2, k)."""
+        pairs, points = [], scipy.spatial.cKDTree(x.T)
+        for elements, tree, radius in self._groups:
+            found = points.sparse_distance_matrix(tree, radius, output_type="ndarray")
+            pairs.append([found["i"], elements[found["j"]]])
+        found = np.concatenate(pairs, axis=1)
+        return found if chain is None else found[:, self.mesh.chains[found[1]] == chain]
+
+    @cached_property
+    def _groups(self):
+        """Elements of circles of similar size, a tree of their centres, and the largest radius."""
         middle, radius = self._circles
-        level, tree = np.floor(np.log2(radius)).astype(int), scipy.spatial.cKDTree(x.T)
-        points, elements = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
-        on = np.full(len(level), True) if chain is None else self.mesh.chains == chain
-        for k in np.unique(level[on]):
-            some = np.flatnonzero(on & (level == k))
-            found = tree.sparse_distance_matrix(scipy.spatial.cKDTree(middle[:, some].T),
-                                                radius[some].max(), output_type="ndarray")
-            points.append(found["i"])
-            elements.append(some[found["j"]])
-        return np.concatenate(points), np.concatenate(elements)
+        level = np.floor(np.log2(radius)).astype(int)
+        groups = [np.flatnonzero(level == k) for k in np.unique(level)]
+        return [(some, scipy.spatial.cKDTree(middle[:, some].T), radius[some].max())
+                for some in groups]
 
     @cached_property
     def _tree(self):
