@@ -40,20 +40,6 @@ _GEOMETRY = {
     **dict.fromkeys(("p_Y", "p_XY"), "its sections turn in another way")}
 
 
-def difference(a: Beam, b: Beam) -> str | None:
-    """Why degrees of freedom of a beam do not fit that of the scene; None if they do."""
-    if a is b or (a.mesh is b.mesh and a.element is b.element):
-        return None
-    if repr(a.element) != repr(b.element) or not np.array_equal(a.element.doflocs,
-                                                                b.element.doflocs):
-        return f"its element is {a.element!r}, that of the scene {b.element!r}"
-    for name, what in _GEOMETRY.items():
-        x, y = getattr(a.mesh, name), getattr(b.mesh, name)
-        if not (x is y or x is not None and y is not None and np.array_equal(x, y)):
-            return what.format(x, y)
-    return None
-
-
 def displacement(system: System, state: State, name: str = "start") -> Array:
     """Displacement (N,) of a State for a scene; ``name`` is for messages."""
     if not isinstance(state, State):
@@ -66,8 +52,16 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
             raise InputError(f"{name} is a state of {len(other.beams)} beams, the scene has "
                              f"{len(system.beams)}")
         for k, (a, b) in enumerate(zip(other.beams, system.beams)):
-            why = difference(a, b)
-            if why:
+            if a is b or (a.mesh is b.mesh and a.element is b.element):
+                continue
+            pairs = ((getattr(a.mesh, key), getattr(b.mesh, key), text)
+                     for key, text in _GEOMETRY.items())
+            why = next((text.format(x, y) for x, y, text in pairs if not (
+                x is y or x is not None and y is not None and np.array_equal(x, y))), "")
+            if repr(a.element) != repr(b.element) or not np.array_equal(
+                    a.element.doflocs, b.element.doflocs):
+                why = f"its element is {a.element!r}, that of the scene {b.element!r}"
+            if why:  # degrees of freedom of the beam do not fit that of the scene
                 who = "" if len(system.beams) == 1 else f" of beam {b.name or k}"
                 raise InputError(
                     f"{name} is a state of another mesh{who}: {why}. Its coordinates mean "
@@ -116,17 +110,16 @@ def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
 
 def velocity_of(member: Any, v: Any) -> Array:
     """A velocity of the degrees of freedom of a member, shape (N,)."""
-    if (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,):
-        uniform = require_finite("v", v, (2,))
-        return velocity_of(member, lambda x: np.multiply.outer(uniform, np.ones(x[0].shape)))
-    if callable(v):
-        function = v
+    uniform = (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,)
+    if not (uniform or callable(v)):
+        return require_finite("v", v, (member.N,))
+    constant = require_finite("v", v, (2,)) if uniform else np.zeros(2)
 
-        def field(x: Array) -> Array:
-            return ask_field("v(x)", function, x)
+    def field(x: Array) -> Array:
+        return np.multiply.outer(constant, np.ones(x[0].shape)) if uniform else (
+            ask_field("v(x)", v, x))
 
-        v = projected(member, field) if isinstance(member, Beam) else member.velocity_of(field)
-    return require_finite("v", v, (member.N,))
+    return projected(member, field) if isinstance(member, Beam) else member.velocity_of(field)
 
 
 def solve_linear(system: System) -> State:
