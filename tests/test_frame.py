@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
-                        StVenantKirchhoff)
+                        StVenantKirchhoff, Weight)
 from skfem_ancf.core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
                                     SupportError)
 from skfem_ancf.equations import mass_solver
@@ -345,6 +345,14 @@ def test_frames_adapt(options, degrees):
     for place in ((1, 1), (0, 1)):
         assert_allclose(state.displacement(place), exact.displacement(place), atol=1e-5)
     assert_allclose(frame.rotations(state), fine.rotations(exact), atol=1e-4)
+
+
+def test_a_frame_with_other_loads_before_it_is_solved():
+    frame = portal().point_force((1e4, 0), at=1).replace(loads=[Weight((0, -9.81))])
+    assert len(frame.items) == 2
+    weight = 9.81 * sum(beam.total_mass for beam in frame.beams)
+    assert_allclose(frame.solve_linear().reactions("ground").force, [0.0, weight],
+                    atol=1e-6 * weight)
 
 
 def test_a_frame_on_other_beams():

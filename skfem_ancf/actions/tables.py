@@ -11,7 +11,7 @@ from ..core.band import Band, add_multiple, clear, copy, mirror
 from ..beam.strain_energy import (FlatBody, add_eigen_force, add_eigen_mean, add_eigen_tangent,
                                   put_eigenstrains)
 from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
-from ..core.callbacks import custom_force, custom_joints, custom_load_stiffness, custom_mean_force
+from ..core.callbacks import FORCE, JOINTS, MEAN_FORCE, STIFFNESS, call_custom
 from ..core.source import F1, F2, I1, apart, indices, primitive, source
 
 
@@ -104,7 +104,7 @@ def constraint(joints, c, g, t, u, phi):
     """Phi at u."""
     if joints.custom > 0:
         copy(c, phi)
-        custom_joints(joints.custom, np.int64(0), t, u, u, phi)
+        call_custom(JOINTS, joints.custom, np.int64(0), t, 1.0, u, u, phi)
         return
     clear(phi)
     add_triples(phi, joints.hk, joints.hv, u, joints.hi, u, joints.hj)
@@ -117,7 +117,7 @@ def constraint(joints, c, g, t, u, phi):
 def add_constraint_rate(joints, g, t, u, v, out):
     """out += J(u) v."""
     if joints.custom > 0:
-        custom_joints(joints.custom, np.int64(1), t, u, v, out)
+        call_custom(JOINTS, joints.custom, np.int64(1), t, 1.0, u, v, out)
         return
     add_products(out, joints.gk, g, v, joints.gi)
     add_triples(out, joints.hk, joints.hv, v, joints.hi, u, joints.hj)
@@ -127,7 +127,7 @@ def add_constraint_rate(joints, g, t, u, v, out):
 def add_joint_force(joints, g, t, u, multipliers, out):
     """out += J(u)^T multipliers."""
     if joints.custom > 0:
-        custom_joints(joints.custom, np.int64(2), t, u, multipliers, out)
+        call_custom(JOINTS, joints.custom, np.int64(2), t, 1.0, u, multipliers, out)
         return
     add_products(out, joints.gi, g, multipliers, joints.gk)
     add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, u, joints.hj)
@@ -145,7 +145,7 @@ def joint_directions(joints, g, t, u, J):
     flat = J.reshape(J.size)
     clear(flat)
     if joints.custom > 0:
-        custom_joints(joints.custom, np.int64(3), t, u, u, flat)
+        call_custom(JOINTS, joints.custom, np.int64(3), t, 1.0, u, u, flat)
         return
     add_entries(J, joints.gk, joints.gi, g)
     add_weighted_entries(J, joints.hk, joints.hi, joints.hv, u, joints.hj)
@@ -217,7 +217,7 @@ def external_force(loads, factors, t, scale, u, out):
     if loads.eigenstrains.shape[0] > 0:
         _add_eigen_force(loads, factors, u, u[:0], out)
     if loads.custom > 0:
-        custom_force(loads.custom, t, scale, u, out)
+        call_custom(FORCE, loads.custom, np.int64(0), t, scale, u, u, out)
 
 
 @apart("motion", LoadTables, F1, float, F1, F1, F1)
@@ -234,7 +234,7 @@ def mean_external_force(loads, factors, t, u0, u1, out):
     if loads.eigenstrains.shape[0] > 0:
         _add_eigen_force(loads, factors, u0, u1, out)
     if loads.custom > 0:
-        custom_mean_force(loads.custom, t, u0, u1, out)
+        call_custom(MEAN_FORCE, loads.custom, np.int64(0), t, 1.0, u0, u1, out)
 
 
 @apart("statics", LoadTables, F1, float, float, F1, Band)
@@ -252,4 +252,4 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)
     if loads.custom > 0:
-        custom_load_stiffness(loads.custom, t, scale, u, A.flat)
+        call_custom(STIFFNESS, loads.custom, np.int64(0), t, scale, u, u, A.flat)

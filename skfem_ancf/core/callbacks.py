@@ -83,42 +83,29 @@ def owner(handle: int) -> Any:
     return _objects[handle]
 
 
-@primitive("skfem_ancf.core.loops")
-def custom_force(handle, t, scale, u, out):
-    """Add the force of user-defined loads; the time is nan in statics."""
-    owner(handle).add_custom_force(t, scale, u, out)
+#: What :func:`call_custom` asks for.
+FORCE, MEAN_FORCE, STIFFNESS, JOINTS, ELEMENTS, POSES = range(6)
 
 
 @primitive("skfem_ancf.core.loops")
-def custom_mean_force(handle, t, u0, u1, out):
-    """Add the mean force of user-defined loads from u0 to u1."""
-    owner(handle).add_custom_mean_force(t, u0, u1, out)
+def call_custom(callback, handle, what, t, x, a, b, out):
+    """Call the object of user-defined items, with a selector, a time, a factor and three arrays.
 
-
-@primitive("skfem_ancf.core.loops")
-def custom_load_stiffness(handle, t, scale, u, flat):
-    """Subtract the derivative of user-defined loads from the entries of a band matrix."""
-    owner(handle).subtract_custom_stiffness(t, scale, u, flat)
-
-
-@primitive("skfem_ancf.core.loops")
-def custom_joints(handle, what, t, u, v, out):
-    """Joints without tables, see
-    :meth:`~skfem_ancf.equations.tables.UserDefined.add_custom_joints`.
+    The time of forces is nan in statics.
     """
-    owner(handle).add_custom_joints(what, t, u, v, out)
-
-
-@primitive("skfem_ancf.core.loops")
-def custom_elements(handle, what, t, factor, a, b, out):
-    """Custom force elements, see :meth:`skfem_ancf.actions.forces.system.Forces.add_custom`."""
-    owner(handle).forces.add_custom(what, t, factor, a, b, out)
-
-
-@primitive("skfem_ancf.core.loops")
-def custom_poses(handle, t, span, poses):
-    """Poses of moving obstacles, see :meth:`skfem_ancf.actions.contact.contacts.Contacts.put`."""
-    owner(handle).put(t, span, poses)
+    called = owner(handle)
+    if callback == FORCE:
+        called.add_custom_force(t, x, a, out)
+    elif callback == MEAN_FORCE:
+        called.add_custom_mean_force(t, a, b, out)
+    elif callback == STIFFNESS:
+        called.subtract_custom_stiffness(t, x, a, out)
+    elif callback == JOINTS:
+        called.add_custom_joints(what, t, a, b, out)
+    elif callback == ELEMENTS:
+        called.forces.add_custom(what, t, x, a, b, out)
+    else:
+        called.put(t, x, out)
 
 
 @primitive("skfem_ancf.core.loops")
@@ -133,16 +120,6 @@ def call_solver(handle, t, u, multipliers, R, phi, du, dm):
     return bool(owner(handle).solve_into(t, u, multipliers, R, phi, du, dm))
 
 
-#: Callbacks of compiled code by number, with one signature: a handle, a selector, a time, a factor
-#: and three arrays.
-_CALLBACKS = (
-    lambda handle, what, t, scale, u, _, out: custom_force(handle, t, scale, u, out),
-    lambda handle, what, t, _, u0, u1, out: custom_mean_force(handle, t, u0, u1, out),
-    lambda handle, what, t, scale, u, _, flat: custom_load_stiffness(handle, t, scale, u, flat),
-    lambda handle, what, t, _, u, v, out: custom_joints(handle, what, t, u, v, out),
-    custom_elements,
-    lambda handle, what, t, span, _, __, poses: custom_poses(handle, t, span, poses),
-)
 #: Exceptions of callbacks by thread, which compiled code cannot raise.
 _raised: dict[int, BaseException] = {}
 
@@ -183,7 +160,7 @@ def ask(callback, handle, what, t, x, places):
     """Answer a callback of compiled code with three arrays."""
     a, b, answer = _views(places, 3)
     try:
-        _CALLBACKS[callback](handle, what, t, x, a, b, answer)
+        call_custom(callback, handle, what, t, x, a, b, answer)
     except BaseException:
         answer[:] = np.nan  # ends the iteration
         raise

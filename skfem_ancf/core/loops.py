@@ -460,38 +460,13 @@ def _places(x, k, places):
     places[2 * k], places[2 * k + 1] = x.ctypes.data, x.size
 
 
-@source
-def _ask(question, handle, what, t, x, a, b, out):
+def call_custom(callback, handle, what, t, x, a, b, out):
     places = np.empty(6, np.int64)
     _places(a, 0, places)
     _places(b, 1, places)
     _places(out, 2, places)
-    ask(question, handle, what, t, x, places.ctypes.data)
+    ask(callback, handle, what, t, x, places.ctypes.data)
     places[0] = 0  # it has lived until here
-
-
-def custom_force(handle, t, scale, u, out):
-    _ask(0, handle, 0, t, scale, u, u, out)
-
-
-def custom_mean_force(handle, t, u0, u1, out):
-    _ask(1, handle, 0, t, 1.0, u0, u1, out)
-
-
-def custom_load_stiffness(handle, t, scale, u, flat):
-    _ask(2, handle, 0, t, scale, u, u, flat)
-
-
-def custom_joints(handle, what, t, u, v, out):
-    _ask(3, handle, what, t, 1.0, u, v, out)
-
-
-def custom_elements(handle, what, t, factor, a, b, out):
-    _ask(4, handle, what, t, factor, a, b, out)
-
-
-def custom_poses(handle, t, span, poses):
-    _ask(5, handle, 0, t, span, poses, poses, poses)
 
 
 def call_solver(handle, t, u, multipliers, R, phi, du, dm):

@@ -10,7 +10,7 @@ from ..actions.forces.kernels import add_resisting_force
 from ..actions.tables import JointTables, add_products, add_triples
 from ..beam.strain_energy import add_viscous_force, body_tangent
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
-from ..core.callbacks import custom_joints
+from ..core.callbacks import JOINTS, call_custom
 from ..core.source import F1, F2, F3, I1, MADE, apart, indices, source
 from ..core.words import hints
 from ..equations.tables import Equations
@@ -36,16 +36,6 @@ class Dampers(NamedTuple):
     mass: float  # factor of M v
     D: Band  # work: damping matrix
     modes: F2  # modal damping force modes^T (modes v), (k, N)
-
-
-@source
-def inverse_rows(A, J, free, Y):
-    """Y[k] = A^-1 J[k] at free DOFs, with the factors of A."""
-    for k in range(J.shape[0]):
-        row, out = J[k], Y[k]
-        for i in indices(free.size):
-            out[i] = row[i] * free[i]
-        solve(A, out)
 
 
 @source
@@ -95,7 +85,11 @@ def factorize_rows(A, rows, free):
     P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
     k = P.shape[0]
     G = np.empty((k, k))
-    inverse_rows(A, P, free, Z)
+    for a in range(k):  # Z = P A^-1
+        row, out = P[a], Z[a]
+        for i in indices(free.size):
+            out[i] = row[i] * free[i]
+        solve(A, out)
     for a in range(k):
         for b in range(k):
             G[a, b] = dot(P[a], Z[b])
@@ -175,7 +169,7 @@ def acceleration_of_joints(joints, motion, t, dt, u, v, out):
         add_products(out, joints.gk, g, v, joints.gi)
         add_products(out, joints.gk, g, v, joints.gi)
     else:
-        custom_joints(joints.custom, np.int64(4), t, u, v, out)
+        call_custom(JOINTS, joints.custom, np.int64(4), t, 1.0, u, v, out)
         if motion.drives > 0:
             _add_differences(joints, t, dt, u, v, 0.0, (PARTS / dt)**2, 2.0 * PARTS / dt, out)
 
@@ -194,7 +188,7 @@ def _add_differences(joints, t, dt, u, v, first, second, along, out):
             if c != 0.0:
                 for i in indices(out.size):
                     values[i] = 0.0
-                custom_joints(joints.custom, 7 + k, time, u, v, values)
+                call_custom(JOINTS, joints.custom, 7 + k, time, 1.0, u, v, values)
                 for i in indices(out.size):
                     out[i] += c * values[i]
 

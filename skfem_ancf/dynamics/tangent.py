@@ -10,7 +10,7 @@ from ..beam.strain_energy import (add_force_of, add_unsymmetric, body_force, bod
                                   body_mean, body_mixed, body_stress, body_tangent)
 from ..core.band import (add_multiple, add_scaled, clear, copy, dot, factorize, fix, multiply,
                          subtract_rows)
-from ..core.callbacks import call_solver, custom_joints
+from ..core.callbacks import JOINTS, call_custom, call_solver
 from ..core.source import apart, indices, source
 from ..equations.convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
 from .records import ALL, add_damping, damping_beside, factorize_rows
@@ -110,7 +110,7 @@ def directions(e, matrices, rule, s, w, state):
     if e.joints.custom > 0 and rule.conserving > 0:
         flat = w.J[0].reshape(w.J[0].size)
         clear(flat)
-        custom_joints(e.joints.custom, np.int64(5), s.acting, w.x.u, w.y[0], flat)
+        call_custom(JOINTS, e.joints.custom, np.int64(5), s.acting, 1.0, w.x.u, w.y[0], flat)
     else:
         joint_directions(e.joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
     joint_directions(e.joints, s.joints.g[0], s.t, w.x.u, w.J[1])
@@ -147,7 +147,7 @@ def add_impulses(e, matrices, rule, s, w, state):
         copy(v, ends[n:2 * n])
         copy(w.y[0], ends[2 * n:3 * n])
         copy(impulse, ends[3 * n:])
-        custom_joints(e.joints.custom, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
+        call_custom(JOINTS, e.joints.custom, np.int64(6), s.acting, 1.0, w.x.u, ends, w.x.residual)
         return
     for i in indices(v.size):
         scratch[i] = v0[i] + v[i]

@@ -258,7 +258,13 @@ class Frame(Scene):
         for name, value in {**options, "hinges": hinges}.items():
             require_unmasked(name, value)
         m = graph.lines.shape[1]
-        elements = _elements(elements, m)
+        if isinstance(elements, (int, np.integer)) and not isinstance(elements, bool):
+            elements = np.full(m, require_integer("elements", elements, 1, MOST))
+        found = require_finite("elements", elements, (m,))
+        if np.any(found != np.floor(found)) or not np.all((found >= 1) & (found <= MOST)):
+            raise InputError(f"elements is an integer from 1 to {MOST}, or one for each line, got "
+                             f"{shown(elements)}")
+        elements = found.astype(np.int64)
         sections = mapping_of("sections", sections)
         require_names("group of lines in sections", list(sections), [*graph.beams, REST])
         for name, given in sections.items():
@@ -488,17 +494,6 @@ def _no_beam(beam):
     if beam is not None:
         raise InputError("a frame is supported and loaded at nodes, got beam="
                          f"{shown(beam)}: give a name, a number, or a point (x, y)")
-
-
-def _elements(elements, m):
-    """Number of elements of each line, (m,)."""
-    if isinstance(elements, (int, np.integer)) and not isinstance(elements, bool):
-        return np.full(m, require_integer("elements", elements, 1, MOST))
-    found = require_finite("elements", elements, (m,))
-    if np.any(found != np.floor(found)) or not np.all((found >= 1) & (found <= MOST)):
-        raise InputError(f"elements is an integer from 1 to {MOST}, or one for each line, got "
-                         f"{shown(elements)}")
-    return found.astype(np.int64)
 
 
 def _heights(height, lines):

@@ -249,8 +249,9 @@ class Scene(Model):
                                  f"0))], got {shown(loads)}; classes are in "
                                  "skfem_ancf.actions.loads")
             scene = copy(scene)
-            scene._entries = tuple(entry for entry in scene._entries
-                                   if not all(isinstance(one, Load) for one in entry.bound))
+            # nodes of a frame have no bound parts before it is solved
+            scene._entries = tuple(entry for entry in scene._entries if not all(
+                isinstance(one, Load) for one in entry.bound or (entry.given,)))
             scene._put(*loads)
             return scene
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.band import clear, dot
 from ...beam.kernels.moments import mean_turning
-from ...core.callbacks import custom_elements, custom_poses
+from ...core.callbacks import ELEMENTS, POSES, call_custom
 from ...core.source import F1, I1, MADE, apart, indices, shaped, source
 from ..tables import add_products
 from ..contact.kernels import of_contacts, untouched
@@ -139,7 +139,7 @@ def _evaluate(tables, what, t, factor, y, w, out):
     if tables.number > 0:
         run_kinds(tables, what, y, w, factor, out)
     if tables.custom > 0:
-        custom_elements(tables.custom, what, t, factor, y, w, out)
+        call_custom(ELEMENTS, tables.custom, what, t, factor, y, w, out)
 
 
 @apart("elements", ForceTables, int, float, float, F1, F1, float, F1)
@@ -168,7 +168,7 @@ def add_elastic_force(tables, t, span, u0, u1, f):
     if tables.start.size > 0:
         _add_force(tables, np.int64(ELASTIC), t, span, u0, u1, 1.0, f)
     if tables.changing > 0 and not at_rest(tables, u0, u1):
-        custom_elements(tables.custom, np.int64(PUSHING), t, span, u0, u1, f)
+        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, span, u0, u1, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
@@ -179,7 +179,7 @@ def add_resisting_force(tables, t, u, v, f):
     if tables.start.size > 0:
         _add_force(tables, np.int64(RESISTING), t, 0.0, u, v, 0.0, f)
     if tables.changing > 0 and not at_rest(tables, u, u):
-        custom_elements(tables.custom, np.int64(PUSHED_BACK), t, 0.0, u, v, f)
+        call_custom(ELEMENTS, tables.custom, np.int64(PUSHED_BACK), t, 0.0, u, v, f)
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(RUBBING, t), u, v, f)
 
@@ -188,7 +188,8 @@ def add_resisting_force(tables, t, u, v, f):
 def add_contact(contacts, asked, u, v, out):
     """Add the answer of obstacles to a :class:`~skfem_ancf.actions.contact.tables.Question`."""
     if contacts.moving > 0:
-        custom_poses(contacts.custom, asked.t, asked.span, contacts.poses)
+        call_custom(POSES, contacts.custom, np.int64(0), asked.t, asked.span, contacts.poses,
+                    contacts.poses, contacts.poses)
         if np.isnan(contacts.poses[0]):  # a user's function failed: no iteration may end with it
             for i in range(out.size):
                 out[i] = np.nan
@@ -230,7 +231,7 @@ def contact_work(tables, t, u, du, f):
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(FORCE, t), u, u, f)
     if tables.changing > 0:
-        custom_elements(tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
+        call_custom(ELEMENTS, tables.custom, np.int64(PUSHING), t, 0.0, u, u, f)
     work = dot(f, du)
     clear(f)
     return work
@@ -243,7 +244,7 @@ def contact_along(tables, t, u, du, out):
     if tables.contacts.number > 0:
         add_contact(tables.contacts, _at(ALONG, t), u, du, out)
     if tables.changing > 0:
-        custom_elements(tables.custom, np.int64(ALONG_PUSHING), t, 0.0, u, du, out)
+        call_custom(ELEMENTS, tables.custom, np.int64(ALONG_PUSHING), t, 0.0, u, du, out)
 
 
 @source
@@ -281,7 +282,7 @@ def settle_elements(tables, t, u0, u1, v, out):
         vectors_of(tables, u0, 1.0, y)
         vectors_of(tables, u1, 1.0, w[:n])
         vectors_of(tables, v, 0.0, w[n:])
-        custom_elements(tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
+        call_custom(ELEMENTS, tables.custom, np.int64(SETTLED), t, 0.0, y, w, out)
     if tables.changing > 0 and not at_rest(tables, u0, u1):
         n = u0.size
         w = np.empty(2 * n)
@@ -290,7 +291,7 @@ def settle_elements(tables, t, u0, u1, v, out):
         rates = w[n:]
         for i in indices(n):
             rates[i] = v[i]
-        custom_elements(tables.custom, np.int64(ACCEPTING), t, 0.0, u0, w, out)
+        call_custom(ELEMENTS, tables.custom, np.int64(ACCEPTING), t, 0.0, u0, w, out)
 
 
 @source
@@ -336,7 +337,7 @@ def add_element_damping(tables, t, u, v, A):
 def keep_entries(tables, t, factor, u0, u1):
     """Keep the derivatives of changing elements, times a factor, beside the band of a step."""
     if tables.changing > 0 and (tables.clear[HAS_ENTRIES] > 0.0 or not at_rest(tables, u0, u1)):
-        custom_elements(tables.custom, np.int64(ENTRIES), t, factor, u0, u1, u0)
+        call_custom(ELEMENTS, tables.custom, np.int64(ENTRIES), t, factor, u0, u1, u0)
 
 
 @source

@@ -394,7 +394,7 @@ class Forces:
 
     def add_custom(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:
-        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.custom_elements`.
+        """Evaluate user-defined elements, for :func:`skfem_ancf.core.callbacks.call_custom`.
 
         ``what`` is 0: the mean force at zero velocity between positions a and b, over a span of
         time ``factor``; 1: the force at a due to velocities b; 2: the derivatives by positions,
