@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from skfem.assembly import Basis
 
+from ..actions.bound import BoundConstraint, BoundForce
+from ..actions.forces import PointMass
 from ..actions.item import Item
 from ..actions.joints import Joint
-from ..actions.loads import Load
+from ..actions.loads import Load, bind_load
 from ..actions.point_force import PointForce
 from ..beam.beam import Beam
 from ..beam.layout import WhichBeam, WhichMember, select_beam
-from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, ask,
+from ..beam.masses import projected
+from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, ask, ask_field,
                            require_finite, require_finite_scalar, require_function, require_label,
                            require_positive, shown)
 from ..core.types import Array, StrPath
@@ -28,7 +31,8 @@ from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate
 from ..dynamics.sensors import Sensor, locate
-from ..equations.matrices import SceneMatrices, matrices_of
+from ..equations.matrices import (SceneMatrices, linear_external_force, linear_force,
+                                  matrices_of)
 from ..equations.system import System
 from ..results.checks import warn_of, warn_of_points
 from ..results.modes import Buckling, Modes
@@ -45,12 +49,15 @@ from .design import Gradient
 from .linear_model import LinearModel
 from .model import Entry, Model
 from .quasistatic import StepHistory, Steps, run
-from .solve import (Plan, configuration, displacement, make_plan, solve_linear, solve_static,
-                    system_of, velocity_of)
+from .solve import Plan, configuration, displacement, make_plan, solve_static
 from .stepper import Held, Stepper
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+#: Iterative refinement of linear solutions: largest number of solves with one factorisation,
+#: largest number of degrees of freedom, and relative size of a correction to stop at.
+LINEAR_SOLVES, SOLVED_AGAIN, CLOSE = 4, 50000, 1e-13
 
 
 class Scene(Model):
@@ -132,7 +139,16 @@ class Scene(Model):
         """The discrete equations, built on first use."""
         with self._lock:
             if self._system is None:
-                self._system = system_of(self.layout, self._all(object), self._fixed, self._damping)
+                layout, loads, elements = self.layout, self._all(Load), self._all(BoundForce)
+                masses = [x for x in elements if isinstance(x, PointMass) and x.mass]
+                weights = [bind_load(PointForce(x.mass * g, x.at, None, one.amplitude), one.beam)
+                           for one in loads if (g := getattr(one, "g", None)) is not None
+                           for x in masses if layout.beam(x.beam) is one.beam]
+                self._system = System(
+                    layout.beams, [*loads, *weights], np.array(list(self._fixed), dtype=int),
+                    np.array(list(self._fixed.values()), dtype=float),
+                    list(self._all(BoundConstraint)), self._damping, list(elements),
+                    layout.bodies, eigen.rest_modes, layout.domains)
                 self._system.items = self.items
                 # a copy has no equations: with self, memory would wait for a garbage collection
                 self._system.derivatives = partial(Gradient, copy(self))
@@ -283,8 +299,27 @@ class Scene(Model):
             If the solution penetrates an obstacle.
         """
         with self._lock:
-            warn_of_points(self.system)
-            return solve_linear(self.system)
+            system = self.system
+            warn_of_points(system)
+            system.constraints.require_supports()
+            zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
+            system.assemble(zero, 1.0, geometric=False)
+            system.solver.factorize(zero, 1.0, none)
+            u, multipliers = np.zeros(system.N), none
+            u[system.constraints.fixed] = system.constraints.values(1.0)
+            gap = system.constraints.constraint(zero, 1.0)
+            J = system.constraints.full_jacobian(zero, 1.0)
+            # refine with residuals from strains: the stiffness has round-off in bending
+            for _ in range(LINEAR_SOLVES if system.N <= SOLVED_AGAIN else 1):
+                rest = (linear_external_force(system, zero, u) - linear_force(system, zero, u)
+                        - multipliers @ J)
+                du, dm = system.solver.solve(rest, -gap - J @ u)
+                u, multipliers = u + du, multipliers + dm
+                if np.max(np.abs(du)) <= CLOSE * np.max(np.abs(u)):
+                    break
+            system.forces.contacts.require_free(u, "solve_linear()", "solve_static()")
+            return State(system, u, iterations=1, message="linear, one factorisation",
+                         multipliers=multipliers, base=State(system, zero, load=0.0))
 
     def solve_static(self, start: State | None = None, adapt: float | None = None, *,
                      method: str = "auto", tol: float = 1e-8, max_iterations: int = 30,
@@ -551,7 +586,20 @@ class Scene(Model):
         """
         with self._lock:
             k = self.layout.number(beam)
-            found = velocity_of(self.layout.members[k], v)
+            member, found = self.layout.members[k], v
+            function: Any = v
+            uniform = (isinstance(v, (list, tuple)) and len(v) == 2) or (
+                getattr(v, "shape", None) == (2,))
+            if uniform or callable(v):
+                constant = require_finite("v", v, (2,)) if uniform else np.zeros(2)
+
+                def field(x: Array) -> Array:
+                    return np.multiply.outer(constant, np.ones(x[0].shape)) if uniform else (
+                        ask_field("v(x)", function, x))
+
+                found = projected(member, field) if isinstance(member, Beam) else (
+                    member.velocity_of(field))
+            found = require_finite("v", found, (member.N,))
             self._velocities = {**self._velocities, k: (v, found)}
         return self
 

@@ -1,30 +1,19 @@
-"""From the description of a scene to equations, from states to states, and plans of solutions."""
+"""States for the equations of a scene, static solutions, and plans of solutions."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
-from ..actions.forces import PointMass
-from ..actions.bound import BoundConstraint, BoundForce
-from ..actions.loads import Load, bind_load
-from ..actions.point_force import PointForce
-from ..beam.beam import Beam
-from ..beam.layout import Layout
-from ..beam.masses import projected
 from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknown, SupportError,
-                           ask_field, require_finite, require_option)
+                           require_finite, require_option)
 from ..core.types import Array
 from ..dynamics.choice import choose_scheme
 from ..dynamics.integrator import OF_STEP
-from ..equations.matrices import linear_external_force, linear_force
 from ..equations.system import System
-from ..materials.damping import Damping
 from ..results.state import State
-from ..solvers import eigen
 from ..solvers.iteration import ITERATIONS
 from ..solvers.outcome import StaticResult
 
@@ -86,62 +75,6 @@ def configuration(system: System, state: State) -> State:
                          "scene.state(u, multipliers) takes them as they are")
     memory = system.histories.of_state(state)
     return state.replace(system=system, u=u).replace(memory=memory)
-
-
-#: Iterative refinement of linear solutions: largest number of solves with one factorisation,
-#: largest number of degrees of freedom, and relative size of a correction to stop at.
-LINEAR_SOLVES, SOLVED_AGAIN, CLOSE = 4, 50000, 1e-13
-
-
-def system_of(layout: Layout, bound: Sequence[Any], fixed: dict[int, float],
-              damping: Damping | None) -> System:
-    """The equations of a scene."""
-    loads = [one for one in bound if isinstance(one, Load)]
-    elements = [one for one in bound if isinstance(one, BoundForce)]
-    masses = [one for one in elements if isinstance(one, PointMass) and one.mass]
-    weights = [bind_load(PointForce(one.mass * g, one.at, None, load.amplitude), load.beam)
-               for load in loads if (g := getattr(load, "g", None)) is not None
-               for one in masses if layout.beam(one.beam) is load.beam]
-    return System(layout.beams, loads + weights,
-                  np.array(list(fixed), dtype=int), np.array(list(fixed.values()), dtype=float),
-                  [one for one in bound if isinstance(one, BoundConstraint)], damping, elements,
-                  layout.bodies, eigen.rest_modes, layout.domains)
-
-
-def velocity_of(member: Any, v: Any) -> Array:
-    """A velocity of the degrees of freedom of a member, shape (N,)."""
-    uniform = (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,)
-    if not (uniform or callable(v)):
-        return require_finite("v", v, (member.N,))
-    constant = require_finite("v", v, (2,)) if uniform else np.zeros(2)
-
-    def field(x: Array) -> Array:
-        return np.multiply.outer(constant, np.ones(x[0].shape)) if uniform else (
-            ask_field("v(x)", v, x))
-
-    return projected(member, field) if isinstance(member, Beam) else member.velocity_of(field)
-
-
-def solve_linear(system: System) -> State:
-    """The small-displacement solution, see :meth:`skfem_ancf.Scene.solve_linear`."""
-    system.constraints.require_supports()
-    zero, none = np.zeros(system.N), np.zeros(system.constraints.m)
-    system.assemble(zero, 1.0, geometric=False)
-    system.solver.factorize(zero, 1.0, none)
-    u, multipliers = np.zeros(system.N), none
-    u[system.constraints.fixed] = system.constraints.values(1.0)
-    gap, J = system.constraints.constraint(zero, 1.0), system.constraints.full_jacobian(zero, 1.0)
-    # refine with residuals from strains: the assembled stiffness has round-off in bending
-    for _ in range(LINEAR_SOLVES if system.N <= SOLVED_AGAIN else 1):
-        rest = (linear_external_force(system, zero, u) - linear_force(system, zero, u)
-                - multipliers @ J)
-        du, dm = system.solver.solve(rest, -gap - J @ u)
-        u, multipliers = u + du, multipliers + dm
-        if np.max(np.abs(du)) <= CLOSE * np.max(np.abs(u)):
-            break
-    system.forces.contacts.require_free(u, "solve_linear()", "solve_static()")
-    return State(system, u, iterations=1, message="linear, one factorisation",
-                 multipliers=multipliers, base=State(system, zero, load=0.0))
 
 
 def solve_static(system: System, u: Array | None, memory: Array | None,
