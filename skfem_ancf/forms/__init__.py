@@ -130,12 +130,8 @@ def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) ->
         :meth:`~skfem_ancf.materials.base.Material.shear_factor`.
     """
     law, width = _law(material, k_s), require_positive("width", width)
-
-    @EnergyForm
-    def strain_energy(w):
-        return width * law.energy(green_lagrange(deformation_gradient(w.r, w.frame)))
-
-    return strain_energy
+    return EnergyForm(lambda w: width * law.energy(
+        green_lagrange(deformation_gradient(w.r, w.frame))))
 
 
 def textbook_internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
@@ -241,12 +237,7 @@ def internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> 
         As for :func:`textbook_energy`.
     """
     law, width = _law(material, k_s), require_positive("width", width)
-
-    @StressForm
-    def force(w):
-        return width * piola(law, deformation_gradient(w.r, w.frame), w.frame)
-
-    return force
+    return StressForm(lambda w: width * piola(law, deformation_gradient(w.r, w.frame), w.frame))
 
 
 def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
@@ -258,12 +249,8 @@ def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> Bilinea
         As for :func:`textbook_energy`.
     """
     law, width = _law(material, k_s), require_positive("width", width)
-
-    @ModuliForm
-    def stiffness(w):
-        return width * moduli_of(law, deformation_gradient(w.r, w.frame), w.frame)
-
-    return stiffness
+    return ModuliForm(lambda w: width * moduli_of(
+        law, deformation_gradient(w.r, w.frame), w.frame))
 
 
 def mass(density: float, width: float = 1.0) -> BilinearForm:
@@ -280,12 +267,7 @@ def mass(density: float, width: float = 1.0) -> BilinearForm:
         Width of the section, positive.
     """
     density, width = require_positive("density", density), require_positive("width", width)
-
-    @BilinearForm
-    def inertia(u, v, _):
-        return width * density * dot(u, v)
-
-    return inertia
+    return BilinearForm(lambda u, v, _: width * density * dot(u, v))
 
 
 def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
@@ -302,12 +284,7 @@ def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
     """
     density, width = require_positive("density", density), require_positive("width", width)
     g = require_finite("g", g, (2,))
-
-    @LinearForm
-    def weight(v, _):
-        return width * density * (g[0] * v[0] + g[1] * v[1])
-
-    return weight
+    return LinearForm(lambda v, _: width * density * (g[0] * v[0] + g[1] * v[1]))
 
 
 def _widths(width):

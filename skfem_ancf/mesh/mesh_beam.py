@@ -463,11 +463,8 @@ class MeshBeam(NumberedMesh):
         ``mapping`` is not used.
         """
         find = Finder(self)
-
-        def finder(*x):
-            return find.inside(require_finite("the points", x, (2, None)))[0].astype(np.int32)
-
-        return finder
+        return lambda *x: find.inside(
+            require_finite("the points", x, (2, None)))[0].astype(np.int32)
 
     # refinement
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,37 +27,33 @@ COMPONENTS = "x", "y", "angle"
 
 
 class Settlements:
-    """Prescribed displacements of supports along x and y, and rotations in radians: ``numbers`` (n,
-    3) proportional to the load factor, replaced by ``functions`` of time of the node and component
-    ``at``.
+    """Prescribed displacements of supports along x and y, and rotations in radians: ``numbers``
+    (n, 3) proportional to the load factor, or functions of time ``of`` a node and a component.
     """
 
-    def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),
-                 at: Sequence[tuple[int, int]] = ()) -> None:
-        self.numbers, self.functions, self.at = numbers, tuple(functions), tuple(at)
-        self._sampled = [partial(sample, f, name=COMPONENTS[k], shape=())
-                         for f, (_, k) in zip(self.functions, self.at)]
+    def __init__(self, numbers: Array, of: dict[tuple[int, int], Any] | None = None) -> None:
+        self.numbers, self.of = numbers, of or {}
+        self.functions = tuple(self.of.values())
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
         """A copy with nodes displaced by a number or a function of time."""
-        numbers, new = self.numbers.copy(), {(int(node), k) for node in nodes}
-        kept = [(f, at) for f, at in zip(self.functions, self.at) if at not in new]
-        if callable(by):
-            numbers[nodes, k] = 0.0
-            kept += [(by, at) for at in sorted(new)]
-        else:
-            numbers[nodes, k] = by
-        return Settlements(numbers, [f for f, _ in kept], [at for _, at in kept])
+        numbers, of = self.numbers.copy(), dict(self.of)
+        numbers[nodes, k] = 0.0 if callable(by) else by
+        for node in map(int, nodes):
+            of.pop((node, k), None)
+            if callable(by):
+                of[node, k] = by
+        return Settlements(numbers, of)
 
     def moves(self, k: int) -> bool:
-        return bool(np.any(self.numbers[:, k])) or any(at == k for _, at in self.at)
+        return bool(np.any(self.numbers[:, k])) or any(at == k for _, at in self.of)
 
     def by(self, nodes: Array, k: int, times: Array) -> Array:
         """Displacements of nodes at some times, shape (n, m)."""
         out = np.multiply.outer(times, self.numbers[nodes, k])
-        for sampled, (node, at) in zip(self._sampled, self.at):
+        for (node, at), function in self.of.items():
             if at == k:
-                out[:, np.searchsorted(nodes, node)] = sampled(times)
+                out[:, np.searchsorted(nodes, node)] = sample(function, times, COMPONENTS[k], ())
         return out
 
 
