@@ -122,7 +122,7 @@ class Collocation(Scheme):
         table, memory = self.table, new.memory or {}
         c, k, (u, v) = table.points, len(table.points), memory["start"]
         known = new.acceleration if c[-1] < 1.0 else old.acceleration
-        Z = memory["stages"] - u - dt * c[:, None] * v
+        Z = memory["points"][:, :len(u)] - u - dt * c[:, None] * v
         bend, lower = table.bends[:, :k] @ Z + dt**2 * table.bends[:, k:] * known
         n, high, low = derivative(old, new, old.t + 0.5 * dt, bend / dt**(k + 2),
                                   self.order - 1 - k)

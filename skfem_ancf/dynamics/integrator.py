@@ -12,18 +12,24 @@ import numpy as np
 
 from ..actions.contact.tables import HAS_ENTRIES
 from ..actions.tables import constraint, joint_directions
-from ..core.band import BandMatrix, CoupledBand
+from ..beam.strain_energy import gradients_size
+from ..core.band import BandMatrix, CoupledBand, factorize, fix, solve
 from ..core.callbacks import handle_of
 from ..core.errors import ConvergenceError, InputError, SupportError, require_positive, shown
+from ..core.source import I1
 from ..core.types import Array
+from ..core.words import hints
 from ..equations.condensation import Condensed, CondensedMass
 from ..equations.system import System
 from .base import Motion, Scheme, in_steps, interpolate
-from .time_functions import SAMPLES, TimeFunctions, TimeValues, rates
+from .collocation import Collocation
+from .time_functions import SAMPLES, TimeFunctions, rates
 from .energy_momentum import EnergyMomentum
-from .records import (FAILURES, Dampers, JointMotion, JointMotions, LowRankRows, Matrices, Rule,
-                      StepData, acceleration_of_joints, drive_rate, mass_factor, new_state,
-                      new_work, solve_rows)
+from .records import (FAILURES, Dampers, JointMotion, JointMotions, LowRankRows, Matrices,
+                      Multipliers, Rule, StepData, StepState, Vectors, Work,
+                      acceleration_of_joints, drive_rate, mass_factor, solve_rows)
+from .stage_tangent import Interval, new_points, solve_for
+from .stages import collocate
 from .steps import steps
 from .tangent import factors
 
@@ -124,7 +130,8 @@ class Integrator:
         self._rule = Rule._make([
             int(scheme.conserving), *map(float, scheme.parameters), self.tol,
             8.0 * system.scales.strain_noise, system.scales.inertia_of_places, *handles])
-        self._state = new_state()
+        self._state = StepState._make(
+            np.zeros(1, int if hint is I1 else float) for hint in hints(StepState))
         self.dt, self.substeps, self._lost, self.stopped = np.nan, 0, "", False
         self.longest = max(1, min(STORED // (4 * system.N + system.histories.values.size), BLOCK))
 
@@ -242,9 +249,11 @@ class Integrator:
 
     @cached_property
     def _work(self):
-        s = self.system
-        return new_work(s.N, self.m, s.backend.tables.stresses.size,
-                              0 if self._nodes else self.m)
+        s, m, dense = self.system, self.m, 0 if self._nodes else self.m  # J of eliminated joints
+        return Work(np.zeros((4, s.N)), Vectors(*np.zeros((len(Vectors._fields), s.N))),
+                    Multipliers(*np.zeros((len(Multipliers._fields), m))),
+                    np.zeros((4, dense, s.N)), np.zeros((dense, dense)),
+                    np.zeros((7, s.backend.tables.stresses.size)))
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> list[Motion]:
@@ -252,24 +261,34 @@ class Integrator:
 
         Functions of time are sampled for all steps ``range(*block)`` at once; by default for these.
         """
-        s, histories = self.system, self.system.histories
-        begun = y.t if start is None else start
+        s, begun = self.system, y.t if start is None else start
         given = self._functions.of(begun, dt, (first, first + n), self.limit, block)
+        lasting = s.histories.lasting
+        rows, multipliers = np.full((n, 4, s.N), np.nan), np.empty((n, 2, self.m))
+        memories = np.full((n, 1 + (s.histories.values.size if lasting else 0)), np.nan)
+        kernel, data, points = self._begin(y, dt, n, given)
+        done = self._call(kernel, y, dt, (rows, memories[:, :1]), self._rule, data, self._state,
+                          self._work, memories, rows, multipliers, points)
+        starts = [np.array([y.u, y.v]), *rows[:, :2]]  # of the steps, for the next guess
+        return [Motion(begun + dt * (first + k + 1), u, v, a, w, m, force, dt, float(kept[0]),
+                       kept[1:] if lasting else y.history, y.turns,
+                       {"start": starts[k], "points": points[k]} if points.size else None)
+                for k, (u, v, a, w), (m, force), kept in zip(
+                    range(done), rows, multipliers, memories)]
+
+    def _begin(self, y, dt, n, given):
+        """The kernel, its functions of time, and an array for what a step has at its points."""
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
-        rows, works = np.full((n, 4, s.N), np.nan), np.empty(n)
-        multipliers = np.full((n, 2, self.m), np.nan)
-        memories = np.empty((n, histories.values.size if histories.lasting else 0))
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        done = self._call(steps, y, dt, (rows, multipliers), self._rule,
-                          _step_data(given, dt, s), self._state, work, memories, rows, multipliers,
-                          works)
-        return [Motion(begun + dt * (first + k + 1), u, v, a, w, m, force, dt, dissipated,
-                       memory if histories.lasting else y.history, y.turns)
-                for k, (u, v, a, w), (m, force), dissipated, memory in zip(
-                    range(done), rows, multipliers, works.tolist(), memories)]
+        g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
+        joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
+                              int(self.system.backend.tables.motion_varies))
+        return steps, StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
+                               given.factors[:, -1].copy(), given.supports[:, -1].copy(),
+                               joints), np.empty((n, 0, 0))
 
     def _call(self, function: Callable, y: Motion, dt: float, out: tuple[Array, Array],
               *args: Any) -> int:
@@ -451,15 +470,6 @@ class Integrator:
                 "carried": work.stresses[3], "rates": work.stresses[5], **beside}
 
 
-def _step_data(given: TimeValues, dt: float, system: System) -> StepData:
-    """Functions of time as :mod:`~skfem_ancf.dynamics.steps` takes them."""
-    g = np.concatenate([given.g[:, -1:, 0], given.g[:, :1, 0], given.g[:, -1, 1:]], axis=1)
-    joints = JointMotions(np.ascontiguousarray(given.c[:, -1]), g,
-                          int(system.backend.tables.motion_varies))
-    return StepData(float(dt), given.times[:, ::-1].copy(), given.factors[:, 0].copy(),
-                    given.factors[:, -1].copy(), given.supports[:, -1].copy(), joints)
-
-
 def _coupled(A, system):
     """A band matrix, with the entries of force elements that couple DOFs anywhere."""
     if not system.forces.changing:
@@ -486,4 +496,72 @@ def _damping(system):
                     system.damping.mass, D, modes))
 
 
-__all__ = ["Integrator", "TimeStepFailed"]
+#: Samples of functions of time in a step of collocation: Chebyshev points.
+CHEBYSHEV = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
+
+
+class StageIntegrator(Integrator):
+    """Integrates a system by collocation, as an Integrator."""
+
+    scheme: Collocation
+
+    @cached_property
+    def _backend(self):
+        backend = self.system.backend
+        return backend.with_tables(backend.tables.copied(len(self.scheme.points)))
+
+    @cached_property
+    def _functions(self):
+        return TimeFunctions(self.system, np.append(self.scheme.points, 1.0), CHEBYSHEV)
+
+    @cached_property
+    def _work(self):
+        s, tables = self.system, self.system.backend.tables
+        return new_points(self.scheme.table.method, s.N, self.m, len(self._matrices.rows.P),
+                          tables.stresses.size, gradients_size(tables.plain.body),
+                          s.mass._replace(flat=np.zeros(s.mass.flat.size)))
+
+    def _begin(self, y, dt, n, given):
+        s, w, table, memory = self.system, self._work, self.scheme.table, y.memory or {}
+        w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
+        ahead = table.method.ahead
+        if "points" in memory:
+            w.U[:], w.first[:] = np.split(memory["points"], [s.N], axis=1)
+            w.before[:] = memory["start"]
+            ahead = ahead if dt == y.before else table.ahead(dt / y.before)
+        else:
+            w.guess[:] = 0.5 * (dt * table.points[:, None])**2 * y.acceleration
+        times, factors, supports, c, g = (  # steps and instants in one axis
+            np.ascontiguousarray(x).reshape(len(x) * x.shape[1], *x.shape[2:]) for x in (
+                given.times, given.factors, given.supports, given.c, given.g[:, :, [0, 0, 1, 2]]))
+        joints = JointMotions(c, g, int(s.backend.tables.motion_varies))
+        return collocate, Interval(float(dt), int("points" in memory), ahead, times, factors,
+                                   supports, joints), np.empty((n, len(w.U), s.N + self.m))
+
+    def filtered(self, du: Array) -> Array:
+        s, w = self.system, self._work
+        k = int(np.argmin(np.abs(w.method.values[1])))
+        mu = complex(*w.method.values[:, k]) / self.dt
+        x = mu**2 * s.mass.multiply(du) * s.constraints.free
+        x, y = np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
+        solve_for(w, k, x, y)
+        return x
+
+    def damped(self, du: Array, time: float) -> Array:
+        """Average a damped increment over a time span: (M + D time / 2)^-1 M du."""
+        s, M = self.system, self.system.mass
+        A = M._replace(flat=M.flat + 0.5 * time * self._work.D.flat, pivots=M.pivots.copy())
+        fix(A, s.constraints.fixed)
+        if not factorize(A):
+            return du
+        x = s.mass.multiply(du) * s.constraints.free
+        solve(A, x)
+        return x
+
+    def _factors(self) -> dict[str, Any]:
+        w = self._work
+        beside = {"J": w.J, "Y": w.Y, "S": w.S, "Q": w.Q} if len(w.J) else {}
+        return {"pairs": w.pairs, "real": w.real.flat, **beside}
+
+
+__all__ = ["Integrator", "StageIntegrator", "TimeStepFailed"]

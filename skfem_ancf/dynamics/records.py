@@ -6,13 +6,12 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from ..actions.forces.kernels import add_resisting_force
+from ..actions.forces.kernels import add_resisting_force, settle_contact, settle_elements
 from ..actions.tables import JointTables, add_products, add_triples
-from ..beam.strain_energy import add_viscous_force, body_tangent
+from ..beam.strain_energy import accept_body, add_viscous_force, body_tangent
 from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..core.callbacks import JOINTS, call_custom
 from ..core.source import F1, F2, F3, I1, MADE, apart, indices, source
-from ..core.words import hints
 from ..equations.tables import Equations
 
 
@@ -320,20 +319,21 @@ class StepState(NamedTuple):
     mixed_steps: I1  # remaining steps of the mixed iteration
 
 
-def new_state() -> StepState:
-    """The StepState before the first step."""
-    return StepState._make(np.zeros(1, int if hint is I1 else float) for hint in hints(StepState))
-
-
 #: Arguments of the functions of a step: equations, matrices, rule, step, work and state.
 ALL = Equations, Matrices, Annotated[Rule, MADE], Annotated[Step, MADE], Work, StepState
 
 
-def new_work(N: int, m: int, stresses: int, dense: int) -> Work:
-    """The :class:`Work` of steps; ``dense`` is m, or 0 if joints are eliminated."""
-    x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Multipliers._fields), m))
-    return Work(np.zeros((4, N)), Vectors(*x), Multipliers(*shares), np.zeros((4, dense, N)),
-                np.zeros((dense, dense)), np.zeros((7, stresses)))
+@source
+def settle(e, t, along, u0, u1, v1, taken):
+    """Update the history at the end of a step; ``taken`` is the dissipated work.
+
+    ``t`` are the instants of the forces of contact and of the end. Contact works from u0 to u1 in
+    the time ``along`` of a conserving step, or at u1 if that is 0.
+    """
+    settle_contact(e.forces, t[0], along, u0 if along > 0.0 else u1, u1, taken)
+    settle_elements(e.forces, t[1], u0, u1, v1, taken)
+    accept_body(e.body, u0, u1, taken)
+    e.span[0] = 0.0
 
 
 @source

@@ -20,9 +20,8 @@ from ..equations.system import System
 from ..results.state import State
 from .base import Motion, Scheme, in_blocks, interpolate, same_scheme
 from .history import COLUMNS, History, state_of
-from .integrator import DEPTH, Integrator, TimeStepFailed
+from .integrator import DEPTH, Integrator, StageIntegrator, TimeStepFailed
 from .sensors import Recorder, Sensor
-from .stage_integrator import StageIntegrator
 from .time_functions import Lookahead
 
 # automatic step size

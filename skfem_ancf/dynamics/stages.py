@@ -11,17 +11,16 @@ since then; it changes at the end of the step.
 import numpy as np
 
 from ..core.band import add_multiple, clear, copy, multiply, solve, solve_joined
-from ..beam.strain_energy import (accept_body, add_force_by, add_viscous_stress, body_force,
+from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force,
                                   body_gradients, body_mixed, body_stress, linearised_by)
-from ..actions.forces.kernels import (add_elastic_force, set_contact_rate, settle_contact,
-                                      settle_elements)
+from ..actions.forces.kernels import add_elastic_force, set_contact_rate
 from ..core.source import indices, source
 from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, carry_eigenstrains,
                               constraint, external_force, joint_directions)
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, judged, noise_of_step)
 from .records import (ITERATIONS, JointMotion, acceleration_of_joints, damping_beside,
-                      damping_force, drive_rate, row_of)
+                      damping_force, drive_rate, row_of, settle)
 from .stage_tangent import factorize_stages, flat_points, join, solve_for
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
@@ -32,12 +31,11 @@ CLOSINGS = 2
 
 
 @source
-def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows):
+def collocate(e, matrices, rule, s, state, w, memories, rows, multiplier_rows, points):
     """Take steps from ``w.y`` and ``w.first``; returns how many succeeded.
 
-    Written for each step: work of damping and history, (s, 1 + k); u, v, acceleration,
-    (s, 3, N); displacements of the points, (s, n, N); multipliers there and at the end, (s, n + 1,
-    m).
+    Written for each step as by :func:`~skfem_ancf.dynamics.steps.steps`, w is the acceleration;
+    and displacements and multipliers of the points, (s, n, N + m).
     """
     method = w.method
     taken = np.empty(1)
@@ -59,21 +57,19 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
             if e.lasting >= MATERIALS:
                 carry_eigenstrains(e.loads, row_of(
                     s.factors, (k + 1) * (method.points.size + 1) - 1))
-            settle_contact(e.forces, t, 0.0, w.y[0], w.y[0], taken)
-            settle_elements(e.forces, t, w.before[0], w.y[0], w.y[1], taken)
-            accept_body(e.body, w.before[0], w.y[0], taken)
-            e.span[0] = 0.0
+            settle(e, (t, t), 0.0, w.before[0], w.y[0], w.y[1], taken)
             state.dissipated[0] += taken[0]
             copy(e.history, memories[k, 1:])
         state.last_dt[0], state.mixed_steps[0] = s.h, max(0, state.mixed_steps[0] - 1)
-        for j in range(3):
-            copy(w.y[j], rows[k, j])
+        for j in range(4):
+            copy(w.y[min(j, 2)], rows[k, j])
         for j in range(method.points.size):
-            copy(w.U[j], stages[k, j])
+            copy(w.U[j], points[k, j, :e.free.size])
             copy(w.l[j], w.first[j])
-            copy(w.l[j], multiplier_rows[k, j])
-        copy(w.shares, multiplier_rows[k, method.points.size])
-        memories[k, 0] = state.dissipated[0]
+            copy(w.l[j], points[k, j, e.free.size:])
+        for j in range(2):
+            copy(w.shares, multiplier_rows[k, j])
+        memories[k, 0] = state.dissipated[0]  # last: the step is complete
     return rows.shape[0]
 
 

@@ -16,10 +16,9 @@ a discrete gradient with ``J (u_1 - u_0) = Phi(u_1) - Phi(u_0)``.
 import numpy as np
 
 from ..actions.contact.tables import PRESSURES
-from ..actions.forces.kernels import (augment_contact, set_contact_rate, settle_contact,
-                                      settle_elements)
+from ..actions.forces.kernels import augment_contact, set_contact_rate
 from ..actions.tables import MATERIALS, add_constraint_rate, carry_eigenstrains, constraint
-from ..beam.strain_energy import accept_body, body_linearised, body_stress, quadratic
+from ..beam.strain_energy import body_linearised, body_stress, quadratic
 from ..core.band import clear, copy, dot, solve_joined, subtract_rows, total
 from ..core.callbacks import call_solver
 from ..core.source import F1, apart, indices, shaped, source
@@ -27,7 +26,7 @@ from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, LASTING, MI
                                      RESTART, REUSED, ROUGH, SLOW, SYMMETRIC, UNSETTLED,
                                      UNSYMMETRIC, judged, noise_of_step)
 from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, damping_force, drive_rate,
-                      solve_rows, step_of)
+                      settle, solve_rows, step_of)
 from .tangent import (add_damping_force, add_elastic, add_impulses, directions, factorize_tangent,
                       factors, free_velocity, internal_force, kinetic_energy, residual, tangent,
                       to_damping_velocity, to_middle)
@@ -155,15 +154,10 @@ def begin_step(e, s):
 
 
 @apart("history", *ALL, F1)
-def settle(e, matrices, rule, s, w, state, taken):
+def end_history(e, matrices, rule, s, w, state, taken):
     """Update the history at the end of the step; ``taken`` is the dissipated work."""
-    if rule.conserving > 0:
-        settle_contact(e.forces, s.acting, s.dt, w.y[0], w.x.u, taken)
-    else:
-        settle_contact(e.forces, s.acting, 0.0, w.x.u, w.x.u, taken)
-    settle_elements(e.forces, s.t, w.y[0], w.x.u, w.x.v, taken)
-    accept_body(e.body, w.y[0], w.x.u, taken)
-    e.span[0] = 0.0
+    along = s.dt if rule.conserving > 0 else 0.0
+    settle(e, (s.acting, s.t), along, w.y[0], w.x.u, w.x.v, taken)
 
 
 @apart("motion", *ALL)
@@ -181,11 +175,11 @@ def finish(e, matrices, rule, s, w, state):
 
 
 @source
-def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, works):
+def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, _):
     """Take steps from ``w.y`` and the multipliers in ``w.m``; returns how many succeeded.
 
-    Written for each step: history, (n, k); u, v, a and w, (n, 4, N); multipliers at the end
-    and where they were evaluated, (n, 2, m); work of damping, (n,).
+    Written for each step: work of damping and history, (n, 1 + k); u, v, a and w, (n, 4, N);
+    multipliers at the end and where they were evaluated, (n, 2, m).
     """
     contacts, taken = e.forces.contacts, np.empty(1)
     for n in range(rows.shape[0]):
@@ -200,14 +194,14 @@ def steps(e, matrices, rule, data, state, w, memories, rows, multiplier_rows, wo
         if matrices.dampers.active > 0:
             add_work(e, matrices, rule, s, w, state)
         if e.lasting > 0:
-            settle(e, matrices, rule, s, w, state, taken)
+            end_history(e, matrices, rule, s, w, state, taken)
             state.dissipated[0] += taken[0]
-            copy(e.history, memories[n])
-        works[n] = state.dissipated[0]
+            copy(e.history, memories[n, 1:])
         finish(e, matrices, rule, s, w, state)
         copy(shaped(w.y, (w.y.size,)), shaped(rows[n], (w.y.size,)))
         copy(w.m.l0, multiplier_rows[n, 0])
         copy(w.m.last, multiplier_rows[n, 1])
+        memories[n, 0] = state.dissipated[0]  # last: the step is complete
     return rows.shape[0]
 
 
