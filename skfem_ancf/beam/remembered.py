@@ -39,18 +39,14 @@ def elements_of(beam: Any, k: int) -> Any:
                 if one.layer is layer)
 
 
-def rule_of(beam: Any, k: int) -> tuple[Array, Array]:
-    """Points along and across of layer k, on [0, 1]."""
-    if beam.has_sections:
-        term = beam.layers[k].terms[0]
-        return term.axis[0], term.section[0]
-    layer = beam.across.layers[k]
-    return beam.kernel.points, layer.measure.gauss(max(layer.material.points, 2))[0]
-
-
 def between(beam: Any, k: int, values: Array, e: Array, X: Array) -> Array:
     """Values (c, points, ne) of layer k at points X (2, n) of elements e (n,), (c, n)."""
-    along, across = rule_of(beam, k)
+    if beam.has_sections:
+        term = beam.layers[k].terms[0]
+        along, across = term.axis[0], term.section[0]
+    else:
+        layer = beam.across.layers[k]
+        along, across = beam.kernel.points, layer.measure.gauss(max(layer.material.points, 2))[0]
     values = values.reshape(len(values), len(along), len(across), -1)
     out = np.zeros((len(values), len(e)))
     (i, s), (j, t) = _places(along, X[0]), _places(across, X[1])
@@ -64,12 +60,6 @@ def _places(nodes, x):
     """Number of the interval of points, and their place in it, beyond [0, 1] outside."""
     k = np.clip(np.searchsorted(nodes, x) - 1, 0, len(nodes) - 2)
     return k, (x - nodes[k]) / (nodes[k + 1] - nodes[k])
-
-
-def stress_of_layer(beam: Any, k: int, u: Array, e: Array, X: Array) -> Array:
-    """Stress (3 or 1, n) of layer k, which has a history."""
-    of = elements_of(beam, k)
-    return between(beam, k, of.evaluate(of.strain_at(np.array(u)))[0], e, X)
 
 
 def has_history(beam: Any, k: int) -> bool:

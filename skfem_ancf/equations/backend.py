@@ -84,12 +84,6 @@ class Backend:
             self._plain = ("a user-defined law in Python; a "
                            "skfem_ancf.materials.PointwiseMaterial is compiled")
 
-    @property
-    def _off(self):
-        if self._plain is not None:
-            return self._plain
-        return PROBLEMS[0] if PROBLEMS else compiled_off()
-
     @cached_property
     def linearised(self) -> Backend | None:
         """The backend for :attr:`Tables.linearised`, or None."""
@@ -114,7 +108,8 @@ class Backend:
 
     def choose(self, name: str, iterations: float = 1.0) -> Choice:
         """The choice for the next call of a kernel, by its name and expected iterations."""
-        missing, off = self._missing(name), self._off
+        missing = self._missing(name)
+        off = self._plain or (PROBLEMS[0] if PROBLEMS else compiled_off())
         if name in NEEDED and self.tables.system.forces.changing:
             off = off or "contact of members, or another sparse stiffness"
         if off is not None:
@@ -187,13 +182,39 @@ class Backend:
         return run
 
     def _loaded(self, kernel, args, calls):
-        """A kernel as the first call needs it: compiled, or in NumPy if that is impossible."""
+        """A kernel as the first call needs it: compiled, or in NumPy if that is impossible.
+
+        It announces long compilations.
+        """
+        global _worked
+        name = kernel.__name__
         if PROBLEMS or self._plain is not None:  # found since it was chosen
             return self._in_numpy(kernel)
+        missing = self._missing(name)
         try:
-            function = partial(self._load(kernel, args), self._flat[1].address)
-        except Exception as error:  # a user's function, or an incompatible Numba
-            self._give_up(kernel, error)
+            if missing:
+                from ..core.jit import entry
+
+                if not code_cache.on_disk(*missing):
+                    _worked = 0.0
+                with _LOCK, announced(missing) as update:
+                    for part in self._parts(name):
+                        load_part(part, update)
+                    equations, *_ = self._flatten()
+                    if name not in LOADED:
+                        LOADED[name] = entry(kernel, (equations, *args))
+                        code_cache.note(name)
+                        update(name)
+            function = partial(LOADED[name], self._flatten()[1].address)
+        except code_cache.NotCompiled as error:  # a user's function
+            self._plain = (self._base or self)._plain = str(error)
+            logger.info(self._plain)
+            return self._in_numpy(kernel)
+        except Exception as error:  # an incompatible Numba
+            PROBLEMS.append(
+                f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
+                f"{name} cannot be compiled: {error!r}")
+            logger.warning("%s; it runs in NumPy", PROBLEMS[-1])
             return self._in_numpy(kernel)
 
         def checked(*args):
@@ -207,36 +228,6 @@ class Backend:
     def keep_factors(self) -> None:
         """Let the tangent have the factors of the last compiled iteration."""
         self.tables.system.K.factors = self._flat[0].factors
-
-    def _give_up(self, kernel, error):
-        if isinstance(error, code_cache.NotCompiled):
-            self._plain = (self._base or self)._plain = str(error)
-            logger.info(self._plain)
-            return
-        PROBLEMS.append(f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
-                        f"{kernel.__name__} cannot be compiled: {error!r}")
-        logger.warning("%s; it runs in NumPy", PROBLEMS[-1])
-
-    def _load(self, kernel, args):
-        """The compiled function, and its equations in ``_flat``; announces long compilations."""
-        global _worked
-        name = kernel.__name__
-        missing = self._missing(name)
-        if missing:
-            from ..core.jit import entry
-
-            if not code_cache.on_disk(*missing):
-                _worked = 0.0
-            with _LOCK, announced(missing) as update:
-                for part in self._parts(name):
-                    load_part(part, update)
-                equations, *_ = self._flatten()
-                if name not in LOADED:
-                    LOADED[name] = entry(kernel, (equations, *args))
-                    code_cache.note(name)
-                    update(name)
-        self._flatten()
-        return LOADED[name]
 
     def _flatten(self):
         """Make the equations for compiled code; returns them."""

@@ -133,7 +133,12 @@ class Tables:
         # a weak reference, since the system refers to the tables
         self._system = ref(system)
         self._user_defined: UserDefined | None = None
-        self._sort(system.loads)
+        # constant loads, moments, linear loads, eigenstrains, others
+        self._loads: list[list[Any]] = [[], [], [], [], []]
+        for load in system.loads:
+            kind = (0 if load.constant else 1 if load.turning else 2 if load.linear else
+                    3 if load.eigen_stresses else 4)
+            self._loads[kind].append(load)
         self.motion_varies = any(joint.moving for joint in system.constraints.joints)
         self.turns = any(joint.turning for joint in system.constraints.joints)
         joints, histories = self._joints(), system.histories
@@ -152,12 +157,6 @@ class Tables:
         system = self._system()
         assert system is not None
         return system
-
-    def _sort(self, loads):
-        # constant loads, moments, linear loads, eigenstrains, others
-        self._loads: list[list[Any]] = [[], [], [], [], []]
-        for load in loads:
-            self._loads[_kind(load)].append(load)
 
     @cached_property
     def parts(self) -> list[str]:
@@ -198,10 +197,17 @@ class Tables:
         histories, plain = system.histories, self.plain
         tables = self.with_equations(plain)
         tables._system = ref(system)
-        body = plain.body
-        loads = plain.loads._replace(eigenstrained=self._remembered(system))
+        body, loads, elements = plain.body, plain.loads, list[Any]()
         if histories.of_beams.history.size:
             body = body.after(histories.of_beams)
+            if self._loads[3]:  # the beams with eigenstrains, with their histories
+                those: Any = loads.eigenstrained
+                for beam in self._eigenstrained:
+                    some = those.elements[len(elements):len(elements) + len(beam.kernel.tables)]
+                    past = histories.past(beam)
+                    elements += some if past is None else remembering(some, past)
+                those = Body(those.packs, those.table, elements=elements)
+                loads = loads._replace(eigenstrained=those)
         if plain.forces.custom:
             tables._user_defined = None
         forces = plain.forces._replace(
@@ -212,17 +218,6 @@ class Tables:
             copies=body, loads=loads, forces=forces, history=histories.values,
             span=histories.span)
         return tables
-
-    def _remembered(self, system):
-        """The beams with eigenstrains, with their histories."""
-        body, elements = self.plain.loads.eigenstrained, []
-        if not self._loads[3] or not system.histories.of_beams.history.size:
-            return body
-        for beam in self._eigenstrained:
-            some = body.elements[len(elements):len(elements) + len(beam.kernel.tables)]
-            past = system.histories.past(beam)
-            elements += some if past is None else remembering(some, past)
-        return Body(body.packs, body.table, elements=elements)
 
     def _forces(self):
         s = self.system
@@ -438,14 +433,3 @@ def packed(values: Any, dtype: Any = np.float64) -> Any:
 def _beside(arrays):
     """Arrays (n, ...) side by side."""
     return packed(arrays[0] if len(arrays) == 1 else np.hstack(arrays))
-
-
-def _kind(load):
-    """Number of the table of a load."""
-    if load.constant:
-        return 0
-    if load.turning:
-        return 1
-    if load.linear:
-        return 2
-    return 3 if load.eigen_stresses else 4

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import repeat
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -471,15 +473,17 @@ class _Record:
 
     def history(self) -> StepHistory:
         empty = np.zeros((0, self.system.N))
-        columns: dict[str, Any] = {name: np.array(
-            [np.zeros(0) if (x := getattr(y, name)) is None else x for y in self._motions])
-            for name in COLUMNS}
+        values: Iterable[Any] = zip(*map(
+            attrgetter(*COLUMNS), self._motions)) if self._motions else repeat(())
+        columns: dict[str, Any] = {
+            name: np.array([np.zeros(0) if x is None else x for x in xs])
+            for name, xs in zip(COLUMNS, values)}
         if not self._motions:
             columns |= dict.fromkeys(("u", "v", "acceleration"), empty)
-        results = [instant.result for instant in self._instants]
+        iterations = [instant.result.iterations for instant in self._instants]
         return StepHistory(
             self.system, self.scheme, columns, (None, None), self._recorder.readings(),
-            event=None, steps=max(0, len(results) - 1), substeps=0, rejected=0,
-            iterations=sum(x.iterations for x in results), factorizations=0, plan=self.plan,
+            event=None, steps=max(0, len(iterations) - 1), substeps=0, rejected=0,
+            iterations=sum(iterations), factorizations=0, plan=self.plan,
             found_by=[x.found_by for x in self._instants],
-            iterations_at=np.array([x.iterations for x in results], dtype=int))
+            iterations_at=np.array(iterations, dtype=int))

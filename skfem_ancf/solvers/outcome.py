@@ -90,7 +90,7 @@ class StaticResult:
     @property
     def iterations(self) -> int:
         """Number of linear systems solved for the converged steps, including failed attempts."""
-        return sum(step.iterations for step in self.steps)
+        return sum([step.iterations for step in self.steps])
 
 
 class Equilibrium(NamedTuple):
