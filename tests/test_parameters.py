@@ -4,11 +4,15 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from skfem_ancf import (Beam, Circle, Design, ElementBeamANCF, ElementBeamCable, Frame, InputError,
-                        MeshBeam, NameUnknown, Parameters, PointForce, RigidBody, Scene, Section,
-                        Spring, StVenantKirchhoff, Temperature)
+from skfem_ancf import (Beam, Circle, Design, EigenStrain, ElementBeamANCF, ElementBeamCable,
+                        EndMoment, Energy, FollowerForce, Foundation, Frame, InputError, Item, Line,
+                        LineLoad, MeshBeam, NameUnknown, Obstacle, Parameters, PointForce,
+                        PointMass, PointwiseMaterial, PrescribedAngle, PrescribedPosition,
+                        PrescribedTurn, Pressure, RigidBody, RotatingFrame, Scene, Section, Spring,
+                        StVenantKirchhoff, Support, Temperature, TorsionalSpring, Traction, Weight)
 
 S = np.linspace(0, 1, 6)
 
@@ -70,6 +74,209 @@ def test_numbers_by_object_and_name(element):
     u, = state.sensitivity([(load, "force")])
     assert u.shape == (scene.N, 2)
     close(u, quotient(lambda x: solve(force=x)[0].solve_static().u, (0.1, -0.8)))
+
+
+class Press(Energy):
+    """A potential of one's own: a pull to the axis."""
+
+    def __init__(self, k):
+        self.k = k
+        super().__init__(lambda r, F, X, t: k * r[1]**2, beam=0)
+
+
+class Tip(Item):
+    """Forces of one's own at the last node."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def energy(self, u, t):
+        return self.k / 4 * np.sum(u[-12:-10]**2)**2 + self.k * u[-11]**2
+
+
+class Cubic(PointwiseMaterial):
+    """A law of one's own, with a parameter."""
+
+    def __init__(self, E, nu, c):
+        super().__init__(E, nu)
+        self.c = c
+
+    def stress(self, strain):
+        lame, mu = self.E * self.nu / (1 - self.nu**2), 0.5 * self.E / (1 + self.nu)
+        x, y, z = strain
+        return np.array([lame * (x + y) + 2 * mu * x + self.c * x**3, lame * (x + y) + 2 * mu * y,
+                         2 * mu * z])
+
+
+def _loaded(F=1.0, **options):
+    scene = Scene(beam_of(**options)).clamp("left").point_force((0.1, -F), at="right")
+    return scene, scene.beams[0]
+
+
+def _with_item(make, F=1.0):
+    """A case of an item beside a load, without one for F = 0."""
+    def build(x):
+        item = make(x)
+        scene = Scene(beam_of()).clamp("left").add(item)
+        return (scene.point_force((0.1, -F), at="right") if F else scene), item
+    return build
+
+
+def _layered(thickness, width, E, rest=False):
+    laws = [StVenantKirchhoff(one, 0.3, 1000.0) for one in E]
+    parts = list(zip(thickness, laws, width))
+    if rest:
+        parts.insert(1, (None, laws[0], 0.02))
+    beam = Beam(MeshBeam.init_line(S, 0.05 if rest else float(sum(thickness))), ElementBeamANCF(2),
+                section=Section.layers(*parts))
+    return Scene(beam).clamp("left").point_force((0.1, -1), at="right"), beam
+
+
+def _law_of_a_layer(x):
+    scene, beam = _layered((0.02, 0.03), (0.02, 0.02), (2e6, x))
+    return scene, beam.section.parts[1][1]
+
+
+def _point_mass(x):
+    scene, item = _with_item(lambda x: PointMass(x, (1, 0)), 0)(x)
+    return scene.gravity((0, -1.0)), item
+
+
+def _profile(**changed):
+    sizes = {"width": 0.03, "web": 0.004, "flange": 0.006} | changed
+    return _loaded(width=None, section=Section.profile("I", **sizes))
+
+
+def _numbers(EA=200.0, EI=0.05):
+    beam = Beam(MeshBeam.init_line(S, 0.05), ElementBeamANCF(1), section=Section.numbers(EA, EI))
+    return Scene(beam).clamp("left").point_force((0, -0.02), at="right"), beam
+
+
+def _turned(x):
+    a, b = (Beam(MeshBeam.init_line(S, 0.05, origin=(o, 0)), ElementBeamANCF(2),
+                 StVenantKirchhoff(2e6, 0.3, 1000.0), width=0.02) for o in (0, 1))
+    scene = Scene(a, b).clamp("left", 0)
+    scene.hinge((1, 0))
+    turn = PrescribedTurn((0, "right"), (1, "left"), lambda t: x * t)
+    return scene.add(turn).gravity((0, -0.3)), turn
+
+
+def _axis(x):
+    spline = CubicSpline(S, x[0]), CubicSpline(S, x[1])
+    mesh = MeshBeam.init_curve(lambda s: np.array([one(s) for one in spline]), S, 0.05,
+                               lambda s: np.array([one(s, 1) for one in spline]))
+    return _loaded(height=mesh)
+
+
+def _law(x):
+    law = Cubic(2e6, 0.3, x)
+    beam = Beam(MeshBeam.init_line(S, 0.05), ElementBeamANCF(2), law, width=0.02)
+    return Scene(beam).clamp("left").point_force((0.1, -1), at="right"), law
+
+
+def _spring(ground=(0.6, 0.5), point=0.6, **options):
+    return _with_item(lambda _: Spring(20.0, ((point, 0.0), ("ground", ground)), **options))(0)
+
+
+#: Scenes and owners for a value, names, values and the step of differences.
+NAMED = {
+    "thickness": (lambda x: _layered(x, (0.02, 0.03), (2e6, 4e6)), "thickness", (0.02, 0.03)),
+    "thickness of some": (lambda x: _layered(x, (0.02, 0.03), (2e6, 4e6), True), "thickness",
+                          (0.02, 0.01)),
+    "widths": (lambda x: _layered((0.02, 0.03), x, (2e6, 4e6)), "width", (0.02, 0.03)),
+    "one width": (lambda x: _layered((0.02, 0.03), (x, 0.02), (2e6, 4e6)),
+                  "section.parts.0.2", 0.03),
+    "law of a layer": (_law_of_a_layer, "E", 4e6),
+    "web": (lambda x: _profile(web=x), "web", 0.004),
+    "flange": (lambda x: _profile(flange=x), "flange", 0.006),
+    "EA": (lambda x: _numbers(EA=x), "EA", 200.0),
+    "EI": (lambda x: _numbers(EI=x), "EI", 0.05),
+    "place": (_with_item(lambda x: PointForce((0, -1.0), at=tuple(x)), 0), "at", (0.7, 0.0)),
+    "follower": (_with_item(lambda x: FollowerForce(x, at=(1, 0)), 0), "force", (0.3, -0.8)),
+    "moment": (_with_item(lambda x: EndMoment("right", x)), "M", 0.03),
+    "pressure": (_with_item(lambda x: Pressure("top", x), 0), "p", 30.0),
+    "traction": (_with_item(lambda x: Traction("top", x), 0), "t", (1.0, -30.0)),
+    "line load": (_with_item(lambda x: LineLoad(x), 0), "force", (0.2, -1.0)),
+    "weight": (_with_item(lambda x: Weight(x), 0), "g", (0.2, -3.0)),
+    "settlement": (_with_item(lambda x: Support("right", "r^2", x), 0), "displacement", 0.02),
+    "angle": (_with_item(lambda x: PrescribedAngle("right", lambda t: x * t)), "angle", 0.2),
+    "position": (_with_item(lambda x: PrescribedPosition(
+        (1, 0), lambda t: np.array([1, 0]) + x * t), 0), "r", (0.02, 0.03)),
+    "turn": (_turned, "angle", 0.3),
+    "stiffness": (_with_item(lambda x: Spring(x, ((0.6, 0), ("ground", (0.6, 0.5))))), "k", 20.0),
+    "free length": (lambda x: _spring(length=x), "length", 0.45),
+    "end of a spring": (lambda x: _spring(ground=tuple(x)), "between.1.1", (0.6, 0.5)),
+    "torsion": (_with_item(lambda x: TorsionalSpring(0.1, "right", angle=x)), "angle", 0.2),
+    "foundation": (_with_item(lambda x: Foundation(x)), "k", 1000.0),
+    "rotation": (_with_item(lambda x: RotatingFrame(x)), "speed", 3.0),
+    "point mass": (_point_mass, "mass", 0.05),
+    "eigenstrain": (_with_item(lambda x: EigenStrain(xx=x)), "xx", 2e-3),
+    "temperature": (_with_item(lambda x: Temperature(x)), "change", 20.0),
+    "centre of a circle": (_with_item(lambda x: Obstacle(Circle(x, 0.15)), 4.0), "shape.center",
+                           (0.5, -0.2), 1e-5),
+    "floor": (_with_item(lambda x: Obstacle(Line(x)), 4.0), "shape.point", (0.0, -0.06), 1e-5),
+    "moved obstacle": (_with_item(lambda x: Obstacle(
+        Circle((0.5, -0.2), 0.15), position=lambda t: t * np.asarray(x)), 4.0), "position",
+        (0.01, 0.005), 1e-5),
+    "stiffness of contact": (_with_item(lambda x: Obstacle(Line((0, -0.05)), stiffness=x), 2.0),
+                             "stiffness", 2e6, 1e-5),
+    "energy": (_with_item(lambda x: Press(x)), "k", 30.0),
+    "item": (_with_item(lambda x: Tip(x)), "k", 3.0),
+    "law": (_law, "c", 3e9),
+    "axis": (_axis, "nodes", (S, 0.05 * np.sin(3 * S))),
+}
+
+
+@pytest.mark.parametrize("case", NAMED)
+def test_every_kind_of_parameter(case):
+    """By object and name, against differences of whole solutions; numbers and arrays."""
+    build, name, x, step = (*NAMED[case], 1e-3)[:4]
+    x = np.array(x, dtype=float)
+
+    def readings(state):
+        return np.append(np.array(state.u)[-12:-8], state.strain_energy)
+
+    scene, owner = build(x if x.ndim else float(x))
+    found, = scene.solve_static().gradient(readings, [(owner, name)])
+    expected = quotient(lambda y: readings(build(y)[0].solve_static()), x, step)
+    assert found.shape == expected.shape
+    for one, other in zip(found, expected):  # contact: differences of small steps are rough
+        assert np.allclose(one, other, rtol=1e-6, atol=(1e-6 if step == 1e-3 else 1e-5) * np.abs(
+            expected).max() + 1e-10)
+
+
+def test_coefficients_of_functions():
+    """Heights, moduli and eigenstrains as sums of functions, from those of the scene."""
+    def solve(a=(0.0, 0.0), b=(0.0, 0.0), c=(0.0,)):
+        mesh = MeshBeam.init_line(S, lambda s: 0.05 + np.interp(s, S, a[0] + a[1] * S * S))
+        law = StVenantKirchhoff(lambda X, Y: 2e6 + b[0] + b[1] * X, 0.3)
+        strain = EigenStrain(xx=lambda X, Y: c[0] * Y)
+        beam = Beam(mesh, ElementBeamANCF(2), law, width=0.02)
+        scene = Scene(beam).clamp("left").point_force((0.1, -1), at="right").add(strain)
+        return scene, beam, strain
+
+    scene, beam, strain = solve()
+    found = scene.solve_static().gradient(tip, [
+        (beam, "height", lambda s: np.array([1 + 0 * s, s * s])),
+        (beam, "E", lambda X, Y: np.array([1 + 0 * X, X])), (strain, "xx", lambda X, Y: [Y])])
+    for name, one, size in zip("abc", found, (0.05, 2e6, 0.1)):
+        n = one.shape[1]
+        close(one, quotient(lambda x: tip(solve(**{name: size * (x - 1.0)})[0].solve_static()),
+                            np.ones(n)) / size)
+    with pytest.raises(InputError, match="must return values of k functions"):
+        scene.solve_static().gradient(tip, [(beam, "E", lambda X, Y: 1.0)])
+    with pytest.raises(InputError, match="no number, array or function of time"):
+        scene.solve_static().gradient(tip, [(strain, "xx")])
+
+
+def test_layers_and_their_laws_change_together():
+    """Values of several parameters at once reach the same section."""
+    scene, beam = _layered((0.02, 0.03), (0.02, 0.02), (2e6, 4e6))
+    law = beam.section.parts[1][1]
+    made = Parameters(scene, [(beam, "thickness"), (law, "E"), (beam, "width")])
+    p = made.start * [1.1, 0.8, 1.3, 1.0, 0.9]
+    direct, _ = _layered((0.022, 0.024), (0.02, 0.018), (2e6, 5.2e6))
+    assert np.allclose(made(p).solve_static().u, direct.solve_static().u, rtol=1e-9, atol=1e-14)
 
 
 @pytest.mark.parametrize("field", ["nodes", "elements"])
@@ -212,7 +419,8 @@ def test_what_is_not_a_parameter_is_said():
     for wrt, match in (([(beam, "stiffness")], "no argument 'stiffness'"), ([beam], "wrt must be"),
                        ([(beam_of(), "E")], "no part of the scene"),
                        ([(load, "amplitude")], "no argument"),
-                       ([(profile.section, "web")], "no argument 'web'"),
+                       ([(profile.section, "web")], "no part of the scene"),
+                       ([(profile.section, "wall")], "no argument 'wall'"),
                        ([(load, "height", "nodes")], "fields are of beams")):
         with pytest.raises(InputError, match=match):
             state.gradient(tip, wrt)

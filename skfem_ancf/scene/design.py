@@ -268,10 +268,10 @@ class Design:
 
     def _changes(self, p, state):
         """Derivatives of equations, readings and rows of eigenvalues by parameters, sparse."""
-        sizes = np.abs(p) if self._sizes is None else self._sizes
+        sizes = self._typical(p)
         touching = state is not None and state.system.forces.contacts.obstacles
         step, stencil = (MANY_STEP, PAIR) if len(p) > MANY else (STEP, STENCIL)
-        h = (TOUCHING if touching else step) * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
+        h = (TOUCHING if touching else step) * sizes
         rows = [frozen.rows(self._built) for frozen in self._frozen]
         noise = CHANGED * self._magnitudes(state, rows)
         known = isinstance(self.build, Parameters)
@@ -290,6 +290,13 @@ class Design:
         # parameters act elsewhere than they did at the last groups: contact, say
         self._groups = by.grouped()
         return by.of(self._groups)
+
+    def _typical(self, p):
+        """Typical sizes of the parameters, (n,)."""
+        sizes = np.abs(p) if self._sizes is None else self._sizes
+        if isinstance(self.build, Parameters):
+            sizes = np.where(self.build.sizes > 0.0, self.build.sizes, sizes)
+        return np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
 
     def _equations(self, p, state):
         """The equations at the displacements and multipliers of a state, and the readings.
@@ -462,7 +469,7 @@ def _along(function, state, z):
     """The derivative of a function of the State along a change (N + m,) of the solution, (r,)."""
     system, N = state.system, state.system.N
     size = np.abs(z[:N] / system.constraints.coordinate_sizes).max()
-    step = ASIDE / size if size > 0.0 else 1.0
+    step = (TOUCHING if system.forces.contacts.obstacles else ASIDE) / size if size > 0.0 else 1.0
 
     def at(k):
         return np.ravel(ask_array("a reading", None, function, State(

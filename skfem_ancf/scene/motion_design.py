@@ -178,8 +178,7 @@ class MotionDesign(Design):
     # forward
 
     def _jacobian(self, p, scene, state):
-        sizes = np.abs(p) if self._sizes is None else self._sizes
-        h = STEP * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
+        h = STEP * self._typical(p)
         moved = [[(c / step, s * step, self._located(p + s * step * unit)) for s, c in STENCIL]
                  for step, unit in zip(h, np.eye(len(p)))]
 
@@ -216,8 +215,7 @@ class MotionDesign(Design):
     def _backward(self, weights):
         """The derivative by the parameters of the sum of weighted readings (r,), (n,)."""
         p, c = self._p, self._built.system.constraints
-        sizes = np.abs(p) if self._sizes is None else self._sizes
-        h = STEP * np.where(sizes > 0.0, sizes, sizes.max() or 1.0)
+        h = STEP * self._typical(p)
         weights = weights.reshape(len(self.history.sensors.t), -1)
         groups = [([k], np.full(c.N + c.m, k)) for k in range(len(p))]
         if isinstance(self.build, Parameters):

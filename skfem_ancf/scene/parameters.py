@@ -7,30 +7,39 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from ..actions.item import Item
 from ..beam.beam import Beam
-from ..core.errors import InputError, NameUnknown, require_option, shown
+from ..core.errors import InputError, NameUnknown, ask_array, require_option, shown
 from ..core.immutable import Immutable, is_builtin, rebuilt
 from ..core.types import Array
 from ..mesh.mapping import PLACES
-from ..sections.section import Rectangle
+from ..mesh.mesh_beam import MeshBeam
+from ..sections.section import Layers, Profile, Rectangle
 
 #: Kinds of fields, and the names of a beam that may be one.
 FIELDS, FIELD_NAMES = ("nodes", "elements"), ("height", "E", "width")
 #: Where a name of a beam is found.
-PARTS = ("material", "mesh")
+PARTS = ("material", "mesh", "section")
 #: Arguments that items of the package store by another name.
-STORED = {"force": ("total", "per_length"), "stiffness": ("penalty",)}
+STORED = {"force": ("total", "per_length"), "stiffness": ("penalty",), "r": ("motion",)}
+#: Numbers of the layers of a section, by the name for the beam.
+OF_LAYERS = {"thickness": 0, "width": 2}
 
 
 class Parameter(NamedTuple):
-    """One parameter, which may be an array: ``name`` of ``owner``, or a field of a beam."""
+    """One parameter, which may be an array: ``name`` of ``owner``, or a field of a beam.
+
+    ``name`` is a path of attributes, or several; ``field`` one of FIELDS, "axis", "time" for a
+    function of time, a function for coefficients, or empty; ``sizes`` are typical.
+    """
 
     owner: Any
-    name: str
-    field: str
+    name: Any
+    field: Any
     start: Array
+    sizes: Array
     at: slice
 
 
@@ -45,16 +54,24 @@ class Parameters:
     scene
         A :class:`~skfem_ancf.Scene`.
     wrt
-        Pairs ``(object, name)`` of a beam, material, rigid body, item of the scene, or anything
-        that these consist of, and an argument of it, a number or an array. A beam has the names of
-        its material and mesh, too. Triples ``(beam, name, "nodes")`` or
-        ``(beam, name, "elements")`` are fields: "height", "E" or "width", linear between nodes or
-        constant in elements.
+        Pairs ``(object, name)`` of a beam, material, rigid body, section, item or shape of the
+        scene, or anything that these consist of, and an argument of it, a number or an array. A
+        beam has the names of its material, mesh and section, too; "thickness" and "width" of layers
+        are arrays. Parts of an argument follow after dots, as (spring, "between.1.1"). A function
+        of time is its value at t = 1, which changes in proportion to t. ``(beam, "nodes")`` are the
+        positions (2, n) of the nodes, with a cubic spline between their changes. Triples ``(beam,
+        name, "nodes")`` or ``(beam, name, "elements")`` are fields: "height", "E" or "width",
+        linear between nodes or constant in elements. Triples ``(object, name, basis)`` are
+        coefficients (k,) from zero, with which a function ``basis`` of the arguments of the
+        property that returns (k, ...) is added to it: x and y, for heights the parameter of the
+        axis.
 
     Attributes
     ----------
     start
         The values in the scene, (n,).
+    sizes
+        Typical sizes of coefficients and changes of the axis, (n,), zero for others.
     each
         The ``Parameter`` of each of ``wrt``.
 
@@ -79,31 +96,42 @@ class Parameters:
                 raise InputError("wrt must be a list of (object, name), or of (beam, name, "
                                  f'"nodes"), as [(beam, "height")], got {shown(one)}')
             owner, name, field = (*one, "")[:3]
-            if field:
+            sizes = 0.0
+            if callable(field):
+                name, start, sizes = self._coefficients(owner, name, field)
+            elif field:
                 start = self._field(owner, name, require_option("field", field, FIELDS))
+            elif name == "nodes" and isinstance(owner, Beam):
+                start, field = owner.mesh.p.copy(), "axis"
+                sizes = 0.1 * owner.mesh.lengths.min()
+                if owner.mesh.curve is None and not owner.mesh.is_straight:
+                    raise InputError(f"the mesh of {owner!r} does not know its curve: make it by "
+                                     "MeshBeam.init_curve or from_points")
             else:
-                name, start = self._number(owner, name)
-            self.each.append(Parameter(owner, name, field, start, slice(n, n + start.size)))
+                name, start, field = self._number(owner, name)
+            self.each.append(Parameter(owner, name, field, start, np.broadcast_to(
+                sizes, start.shape), slice(n, n + start.size)))
             n += start.size
-        self.start = np.concatenate([np.zeros(0), *(one.start.ravel() for one in self.each)])
+        self.start, self.sizes = (np.concatenate([np.zeros(0), *(
+            getattr(one, name).ravel() for one in self.each)]) for name in ("start", "sizes"))
         for one in self.each:
-            if not one.field and not _has([*scene.beams, *scene.bodies, *scene.items], one.owner):
+            if not _has([*scene.beams, *scene.bodies, *scene.items], one.owner):
                 raise InputError(f"{one.owner!r} is no part of the scene: take beams, bodies and "
                                  "items of scene.beams, scene.bodies, scene.items, and their "
                                  "attributes")
 
     def _number(self, owner, name):
-        """The name of an argument, for a beam as "material.E", and its value."""
-        path = name
-        if isinstance(owner, Beam) and not (name == "width" and isinstance(
-                owner.section, Rectangle)):
-            path = next((f"{part}.{name}" for part in PARTS
-                         if getattr(getattr(owner, part), name, None) is not None), name)
-        if isinstance(owner, Item) and is_builtin(owner):
-            path = next((x for x in STORED.get(name, ()) if x in vars(owner)), name)
+        """Path of an argument, for a beam as "material.E", its value, and "time" or nothing."""
+        section = owner.section if isinstance(owner, Beam) else owner
+        if isinstance(section, Layers) and name in OF_LAYERS:
+            before, k = "section." if section is not owner else "", OF_LAYERS[name]
+            values = {f"{before}parts.{i}.{k}": part[k] for i, part in enumerate(section.parts)
+                      if isinstance(part[k], float)}
+            return tuple(values), np.array(list(values.values())), ""
+        path = self._path(owner, name)
         value = owner
         for part in path.split("."):
-            value = getattr(value, part, None)
+            value = _part(value, part)
         if path == "mesh.height" and owner.mesh.heights is not None:
             raise InputError(f"the height of {owner!r} varies: use the field (beam, 'height', "
                              "'nodes')")
@@ -111,10 +139,51 @@ class Parameters:
             raise InputError(f"{shown(owner)} has no argument {name!r} that can be changed alone; "
                              "for anything else use a Design with a function that builds the scene")
         try:
-            return path, np.array(value, dtype=float)
+            timed = callable(value) and isinstance(owner, Item) and not isinstance(value, float)
+            return path, np.array(value(1.0) if timed else value, dtype=float), "time" * timed
         except (TypeError, ValueError):
-            raise InputError(f"{name!r} of {owner!r} is {shown(value)} and no number or array: use "
-                             "a Design with a function that builds the scene") from None
+            raise InputError(f"{name!r} of {owner!r} is {shown(value)} and no number, array or "
+                             "function of time: add a function with coefficients to it, as "
+                             f"(object, {name!r}, basis), or use a Design with a function that "
+                             "builds the scene") from None
+
+    def _path(self, owner, name):
+        """Where the argument of an object is found, attributes with dots between them."""
+        if isinstance(owner, Beam) and not (name == "width" and isinstance(
+                owner.section, Rectangle)):
+            if isinstance(owner.section, Profile) and name in owner.section.sizes:
+                return f"section.sizes.{name}"
+            return next((f"{part}.{name}" for part in PARTS
+                         if getattr(getattr(owner, part), name, None) is not None), name)
+        if isinstance(owner, Profile) and name in owner.sizes:
+            return f"sizes.{name}"
+        if isinstance(owner, Item) and is_builtin(owner):
+            first, dot, rest = name.partition(".")
+            return next((x for x in STORED.get(first, ()) if x in vars(owner)), first) + dot + rest
+        return name
+
+    def _coefficients(self, owner, name, basis):
+        """Path, zeros (k,) and sizes (k,) of the coefficients of a function."""
+        beam = owner if isinstance(owner, Beam) else self._scene.beams[0]
+        x = beam.mesh.parameters
+        if name == "height" and owner is beam:
+            path, old, found = "height", beam.mesh.height, basis(x)
+        else:
+            path = self._path(owner, name)
+            old = owner
+            for part in path.split("."):
+                old = _part(old, part)
+            if old is None:
+                raise InputError(f"{shown(owner)} has no argument {name!r} to which a function "
+                                 "could be added")
+            old = np.max(np.abs(old(x, 0.0 * x) if callable(old) else old))
+            found = basis(x, 0.0 * x)
+        found = np.asarray(found, dtype=float)
+        if found.ndim < 2 or found.shape[-1] != len(x):
+            raise InputError(f"the function of {name!r} must return values of k functions, (k, "
+                             f"..., n) for n points, got the shape {found.shape} for {len(x)}")
+        largest = np.abs(found).reshape(len(found), -1).max(axis=1)
+        return path, np.zeros(len(found)), (old or 1.0) / np.where(largest > 0.0, largest, 1.0)
 
     def _field(self, beam, name, field):
         """The values of a field at nodes or in elements."""
@@ -142,32 +211,56 @@ class Parameters:
         for one in self.each:
             value = np.asarray(p[one.at]).reshape(one.start.shape)
             if not np.array_equal(value, one.start):
-                name, value = self._changed(one, value)
-                new.setdefault(id(one.owner), {})[name] = value
+                new.setdefault(id(one.owner), {}).update(self._changed(one, value))
         made: dict[int, Any] = {}
         return self._scene._rebuilt(*([_replaced(x, new, made) for x in some] for some in (
             self._scene.beams, self._scene.bodies, self._scene.items)))
 
     def _changed(self, one, value):
-        """Argument and value of a changed parameter."""
+        """Arguments and values of a changed parameter."""
+        change, owner = value - one.start, one.owner
+        if isinstance(one.name, tuple):
+            found = dict(zip(one.name, value.tolist()))
+            parts = owner.section.parts if isinstance(owner, Beam) else ()
+            if one.name[0].endswith(".0") and parts and all(part[0] for part in parts):
+                found["mesh.height"] = float(value.sum())
+            return found
         if not one.field:
-            return one.name, value if value.ndim else float(value)
-        mesh = one.owner.mesh
+            return {one.name: value if value.ndim else float(value)}
+        if one.field == "time":
+            function = _part(owner, one.name)
+            return {one.name: lambda t: function(t) + t * (change if change.ndim else (
+                float(change)))}
+        if one.field == "axis":
+            return {"mesh": _bent(owner.mesh, change)}
         if one.name == "height":
-            change = value - one.start
-            ends = change[mesh.t] if one.field == "nodes" else np.array([change, change])
+            mesh = owner.mesh
+            nodal = change if one.field == "nodes" else change @ one.field(mesh.parameters) if (
+                callable(one.field)) else None
+            ends = np.array([change, change]) if nodal is None else nodal[mesh.t]
             old = np.full((4, mesh.nelements), mesh.height) if mesh.heights is None else (
                 mesh.heights)
             heights = old + np.outer(1.0 - PLACES, ends[0]) + np.outer(PLACES, ends[1])
-            return "mesh", replace(mesh, heights=heights, height=float(heights.max()), taper=None)
-        s = mesh.parameters
+            return {"mesh": replace(mesh, heights=heights, height=float(heights.max()),
+                                    taper=None)}
+        if callable(one.field):
+            old = owner
+            for part in one.name.split("."):
+                old = _part(old, part)
+
+            def added(*x):
+                return (old(*x) if callable(old) else old) + np.tensordot(
+                    change, ask_array("basis", None, one.field, *x), 1)
+
+            return {one.name: added}
+        s = owner.mesh.parameters
 
         def field(x, _):
             if one.field == "nodes":
                 return np.interp(x, s, value)
             return value[np.clip(np.searchsorted(s, x) - 1, 0, len(value) - 1)]
 
-        return "material.E" if one.name == "E" else one.name, field
+        return {"material.E" if one.name == "E" else one.name: field}
 
     def groups(self, size: int) -> list[tuple[list[int], Array]]:
         """Parameters that change different rows, and the parameter of each of ``size`` rows.
@@ -178,7 +271,7 @@ class Parameters:
         out = []
         for one in self.each:
             first, n = one.at.start, one.start.size
-            if not one.field:
+            if one.field not in FIELDS:
                 out += [([k], np.full(size, k)) for k in range(first, first + n)]
                 continue
             beam, offset = one.owner, self._scene.layout.offset(one.owner)
@@ -197,6 +290,31 @@ class Parameters:
                 if len(members):
                     out.append((members.tolist(), of))
         return out
+
+
+def _part(thing, name):
+    """An attribute, or an entry of a list or dict; None if there is none."""
+    if isinstance(thing, dict):
+        return thing.get(name)
+    if name.isdigit() and isinstance(thing, (tuple, list, np.ndarray)):
+        return thing[int(name)] if int(name) < len(thing) else None
+    return getattr(thing, name, None)
+
+
+def _bent(mesh, change):
+    """The mesh with nodes moved by (2, n), and a cubic spline of these changes between them."""
+    s, old = mesh.parameters, mesh.curve
+    spline = scipy.interpolate.CubicSpline(s, change.T)
+    start, tangent = mesh.p[:, :1], mesh.p_X[:, :1]
+
+    def r(x):
+        return (old(x) if old else start + tangent * (x - s[0])) + spline(x).T
+
+    def dr(x):
+        return (old.rate(x) if old else tangent + 0.0 * x) + spline(x, 1).T
+
+    return replace(MeshBeam.init_curve(r, s, mesh.height, dr), heights=mesh.heights,
+                   height=mesh.height, taper=mesh.taper)
 
 
 def _arguments(thing):
@@ -226,21 +344,25 @@ def _replaced(thing, new, made):
     if id(thing) not in made:
         changes = {name: other for name, value in _arguments(thing).items()
                    if (other := _replaced(value, new, made)) is not value}
-        parts: dict[str, dict[str, Any]] = {}
-        for name, value in new.get(id(thing), {}).items():
-            first, _, inner = name.partition(".")
-            if inner:
-                parts.setdefault(first, {})[inner] = value
-            else:
-                changes[first] = value
-        for name, given in parts.items():
-            changes[name] = _copy(changes.get(name, getattr(thing, name)), given)
+        changes |= new.get(id(thing), {})
         made[id(thing)] = _copy(thing, changes) if changes else thing
     return made[id(thing)]
 
 
-def _copy(thing, changes):
-    """A copy with changed arguments."""
+def _copy(thing, given):
+    """A copy with changed arguments, whose names may be those of parts of them, with dots."""
+    changes = {name: value for name, value in given.items() if "." not in name}
+    parts: dict[str, dict[str, Any]] = {}
+    for name, value in given.items():
+        first, dot, inner = name.partition(".")
+        if dot:
+            parts.setdefault(first, {})[inner] = value
+    for name, inner in parts.items():
+        changes[name] = _copy(changes.get(name, _part(thing, name)), inner)
+    if isinstance(thing, (tuple, list)):
+        return type(thing)(changes.get(str(k), x) for k, x in enumerate(thing))
+    if isinstance(thing, dict):
+        return thing | changes
     if isinstance(thing, Item) and is_builtin(thing):
         # linear laws of springs are floats, too
         other = thing._with(**{name: type(old)(value) if isinstance(

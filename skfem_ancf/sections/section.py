@@ -549,12 +549,12 @@ class Layers(Section):
 
     has_materials = True
 
-    def __init__(self, *layers: Any, width: float | Callable[..., Any] | None = None) -> None:
-        if not layers:
+    def __init__(self, *parts: Any, width: float | Callable[..., Any] | None = None) -> None:
+        if not parts:
             raise InputError("layers are pairs of a thickness and a material, as Section.layers("
                              "(0.001, steel), (0.002, brass), width=0.01); got none")
         found = []
-        for k, layer in enumerate(layers):
+        for k, layer in enumerate(parts):
             if not isinstance(layer, (tuple, list)) or len(layer) not in (2, 3) or not isinstance(
                     layer[1], Material):
                 raise InputError(f"layer {k} must be a thickness and a material, and perhaps a "
@@ -634,7 +634,7 @@ class Numbers(Section):
         self.GA = None if GA is None else require_positive("GA", GA)
         self.rhoA = None if rhoA is None else require_positive("rhoA", rhoA)
         self.rhoI = None if rhoI is None else require_positive("rhoI", rhoI)
-        self.width_of_faces = require_positive("width", width)
+        self.width = require_positive("width", width)
         if rhoI is not None and rhoA is None:
             raise InputError("rhoI is given without rhoA: give both, or neither of them")
 
@@ -646,7 +646,7 @@ class Numbers(Section):
         return plane
 
     def layers_on(self, mesh: MeshBeam, material: Any) -> list[Layer]:
-        b, h = self.width_of_faces, mesh.height
+        b, h = self.width, mesh.height
         if mesh.heights is not None:
             raise InputError("a section given by numbers is constant along the beam: use a mesh of "
                              "constant height")
