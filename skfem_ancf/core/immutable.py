@@ -170,17 +170,17 @@ def rebuilt(thing: T, changes: dict[str, Any], more: Sequence[str] = ()) -> T:
     names = [a.name for a in arguments if a.kind in (a.POSITIONAL_OR_KEYWORD, a.KEYWORD_ONLY)]
     several = [a for a in arguments if a.kind in (a.VAR_POSITIONAL, a.VAR_KEYWORD)
                and isinstance(getattr(thing, a.name, None), (tuple, dict))]
+    if any(a.kind == a.VAR_KEYWORD for a in arguments):
+        names += [name for name in more if name not in names]
+    for name in changes:
+        if name not in names + [a.name for a in several]:
+            raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
     if several:  # the constructor takes *parts or **sizes, and stores them
         given = {a.kind: changes.get(a.name, getattr(thing, a.name)) for a in several}
         others = {name: changes.get(name, getattr(thing, name, None)) for name in names
                   if name in changes or hasattr(thing, name)}
         return type(thing)(*given.get(inspect.Parameter.VAR_POSITIONAL, ()), **others, **given.get(
             inspect.Parameter.VAR_KEYWORD, {}))
-    if any(a.kind == a.VAR_KEYWORD for a in arguments):
-        names += [name for name in more if name not in names]
-    for name in changes:
-        if name not in names:
-            raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
     missing = [name for name in names if name not in changes and not hasattr(thing, name)]
     if missing:
         raise InputError(f"{thing!r} does not store its argument {missing[0]!r}: store it as an "
