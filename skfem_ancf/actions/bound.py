@@ -392,7 +392,7 @@ class Remembering:
         return self.accept(x, y, 0.0 * y, t)
 
     def sample(self, u: Array, v: Array, t: float, first: bool) -> None:
-        """Set the history after a measurement at u and v (N,), if due; ``first`` is anew."""
+        """Set the history after a measurement at u and v (N,), if due; ``first`` starts over."""
         w = np.array([link(v) - link.start for link in self.element.links])
         self._values[:] = self.element.sample(positions(self, u), w, t,
                                               self.start if first else self.history)
