@@ -96,6 +96,25 @@ def test_a_cantilever_on_a_shorter_one():
     assert str(state.verdict) == "stable" and np.all(scene.modes(2, state).frequencies > 0)
 
 
+@pytest.mark.parametrize("element", [ELEMENTS[2], ElementBeamANCF(3)], ids=repr)
+def test_section_forces_of_members_that_touch(element):
+    """Where the shorter of two cantilevers ends, the shear force of the longer one jumps."""
+    h, L, a, F = 0.01, 1.0, 0.6, 5.0
+    scene = Scene(line(L, 10, h, element=element), line(a, 6, h, (0.0, -h), element))
+    scene = scene.clamp("left", 0).clamp("left", 1).contact(0, 1, friction=0.1)
+    state = scene.point_force((0.0, -F), at=(L, 0.0), beam=0).solve_static()
+    push = F * (3 * L / a - 1) / 4  # F at this ratio of lengths, see above
+    for beam, y, values in ((0, 0.0, {0.11: push - F, 0.47: push - F, 0.73: -F, 0.97: -F}),
+                            (1, -h, {0.11: -push, 0.47: -push})):
+        for x, value in values.items():
+            assert state.resultants((x, y), beam).force[1] == pytest.approx(value, abs=5e-3 * push)
+        root = state.reactions("left", beam)
+        first = state.resultants((0.0, y), beam)
+        assert_allclose(first.force, -np.array(root.force), atol=1e-6 * F)
+        assert first.M == pytest.approx(-root.moment, abs=1e-6 * F)
+    assert state.resultants((0.0, -h), 1).M == pytest.approx(-push * a, rel=5e-3)
+
+
 @pytest.mark.parametrize("element", [*ELEMENTS[1:], ElementBeamANCF(3)], ids=repr)
 @pytest.mark.parametrize("n", [2, 3])
 def test_leaves_without_friction_are_so_many_springs(n, element):
@@ -366,3 +385,43 @@ def test_what_does_not_touch_is_seldom_looked_at(monkeypatch):
     scene.obstacle(Circle((0.5, -1.0), 0.9)).integrate(0.1, 1e-3)
     assert all(n < 60 for n in looks.values()), looks
     assert looks["_touching"] > 0
+
+
+@pytest.mark.parametrize("element", ELEMENTS[2:], ids=repr)
+def test_a_strip_folded_on_itself_is_half_of_it_on_a_rigid_plane(element):
+    """The legs of a hairpin are pressed together until they lie on each other."""
+    h, R, leg, F = 0.01, 0.04, 0.3, 40.0
+
+    def hairpin(pieces):  # from the end of the upper leg on
+        places = np.concatenate([np.linspace(0.0, leg, 9), leg + R * np.linspace(0, np.pi, 17)[1:],
+                                 leg + np.pi * R + np.linspace(0.0, leg, 9)[1:]])
+
+        def axis(s):
+            turn = np.clip((s - leg) / R, 0.0, np.pi)
+            along = np.maximum(s - leg - np.pi * R, 0.0) - np.minimum(s - leg, 0.0)
+            return np.array([along - R * np.sin(turn), R * np.cos(turn)])
+
+        mesh = MeshBeam.init_curve(axis, places[:pieces + 1], h)
+        return Scene(Beam(mesh, element, StVenantKirchhoff(1e8, 0.0, 1000.0), width=0.02))
+
+    half, whole = hairpin(16).obstacle(Line((0.0, 0.0), (0.0, 1.0))), hairpin(32)
+    for scene, at in ((half, "right"), (whole, (-R, 0.0))):
+        for name in ("r^1", "r^2", "r_X^1"):
+            scene.fix(at, name)
+        scene.point_force((0.0, -F), at=(0.5 * leg, R), amplitude=lambda t: t**3)
+    whole.point_force((0.0, F), at=(0.5 * leg, -R), amplitude=lambda t: t**3).contact(
+        0, self_contact=True)
+    a, b = (scene.run(1.0, increments=20) for scene in (half, whole))
+    one, both = a.state(-1), b.state(-1)
+    for place in ("left", (0.6 * leg, R)):
+        assert_allclose(both.displacement(place), one.displacement(place), atol=3e-3 * R)
+    assert_allclose(both.displacement("right"), both.displacement("left") * [1, -1], atol=1e-6 * R)
+    on_floor, found = one.contact().total[1], both.contact()
+    assert on_floor > 0.8 * F and np.ptp(found.points[0]) > 0.5 * h  # they lie on each other
+    up = found.force[1] > 0.0
+    assert found.force[1, up].sum() == pytest.approx(on_floor, rel=1e-3)
+    assert found.penetration < 0.01 * h
+    # balance: the work of both forces is stored
+    way = np.array([b.state(k).displacement((0.5 * leg, R))[1] for k in range(len(b.t))])
+    work = -2.0 * trapezoid(F * b.t**3, way)
+    assert both.strain_energy == pytest.approx(work, rel=0.02)

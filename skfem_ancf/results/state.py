@@ -560,8 +560,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
                 loads.append((scale * factor, now.distribution(
                     (base if at_rest else self).u_of(number))))
         points: list[Any] = []
-        if base is None and system.forces.contacts.groups:
-            points = loads_of_contact(self, s)
+        if base is None and (system.forces.contacts.groups or system.forces.changing):
+            points = loads_of_contact(self, beam, s)
             loads.append((1.0, Distribution(stations=tuple(e + xi for e, xi, _ in points),
                                             points=tuple(points))))
         sampled, places = self._distributed(beam)
@@ -582,10 +582,8 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         system, base = self._equations, self.base
         sampled: list[Sampled] = []
         places: list[float] = []
-        free = [element for element, found in system.forces.looks(np.array(self.u), self._time)
-                if not np.any(found[2])]  # members that do not touch each other
         elements = [e for e in system.forces.elements
-                    if e.distributed and not e.groups and e not in free]
+                    if e.distributed and not e.groups and not hasattr(e, "loads_on")]
         if not elements:
             return sampled, places
         tables = system.backend.tables.plain.forces

@@ -142,8 +142,8 @@ def _of_bodies(state, known, member):
         yield *(value[..., here] for value in both), float(np.min(both[3][here], initial=np.inf))
 
 
-def loads_of_contact(state: Any, dofs: slice) -> list[tuple[int, float, Array]]:
-    """Forces of obstacles on the beam with some DOFs: element, xi, and nodal force (nb, 2)."""
+def loads_of_contact(state: Any, beam: Any, dofs: slice) -> list[tuple[int, float, Array]]:
+    """Forces of contact on a beam, whose DOFs are given: element, xi, and nodal force (nb, 2)."""
     contacts, u = state._equations.forces.contacts, np.array(state.u)
     t, out = state._time, []
     v = None if state.t is None else np.array(state.v)
@@ -161,6 +161,9 @@ def loads_of_contact(state: Any, dofs: slice) -> list[tuple[int, float, Array]]:
                 nodal -= group.offsets[k] * (F @ slope) / (slope @ slope) ** 1.5 * np.outer(
                     group.slopes[:, k], [-y, x])
             out.append((e, float(at), nodal))
+    for element, at in state._equations.forces.changing:
+        if hasattr(element, "loads_on"):
+            out += element.loads_on(beam, dofs.start, u[at].reshape(-1, 2), element.history)
     return out
 
 

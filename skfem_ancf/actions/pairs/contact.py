@@ -453,6 +453,24 @@ class BodyContact(ForceElement):
         return (_plane(at), _plane(at - met.end.gap * normal), _plane(force), p / area,
                 met.end.gap, sticks, f.members[f.of[pairs.p]], f.members[pairs.e])
 
+    def loads_on(self, beam: Beam, first: int, x: Array, history: Array
+                 ) -> list[tuple[int, float, Array]]:
+        """Forces on the elements of a beam, whose first DOF is given.
+
+        Of each contact point, and of the place that it touches: element, xi, nodal force (nb, 2).
+        """
+        z, f, out = _complex(x, x)[0], self.search.surfaces.facets, []
+        met = self._meet(z, z)
+        rows, pairs, nb = self._forces(met, z, z, history), met.pairs, beam.nd
+        nodes, B = beam.mesh.t[0] * (nb // 2) + first // 2, pairs.weights[0].shape[1]
+        for e, zeta, part in ((f.of[pairs.p], f.zeta[pairs.p], rows[:, :B]),
+                              (pairs.e, pairs.zeta, rows[:, B:])):
+            xi = 0.5 + 0.5 * np.where(f.spans[e] > 0.0, zeta, -f.sides[e])  # or of an end
+            for k, node in enumerate(self.dofs[f.dofs[e, 0]]):
+                out += [(n, float(xi[k]), _plane(part[k, :nb]).T)
+                        for n in np.flatnonzero(nodes == node).tolist()]
+        return out
+
 
 def _plane(z):
     return np.array([z.real, z.imag])
