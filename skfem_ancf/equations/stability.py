@@ -77,8 +77,8 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
         system.assemble(u, load)
         system.solver.factorize(u, load if t is None else t, multipliers)
         negative, singular = system.solver.inertia()
-        rubs = system.forces.contacts.anchored
-        who = "friction or loads have" if rubs else "the loads have"
+        has_friction = system.forces.contacts.anchored
+        who = "friction or loads have" if has_friction else "the loads have"
         if system.symmetric or _is_symmetric(system):
             return Verdict("unstable" if negative else "singular" if singular else "stable",
                            negative)
@@ -89,7 +89,7 @@ def verdict(system: Any, u: Array, load: float, multipliers: Array,
     if negative:
         return Verdict("undecided", negative, f"{who} no potential, and only the symmetric "
                        "part of the tangent is indefinite: see scene.modes")
-    return Verdict("singular" if singular else "stable", 0, RUBS if rubs else FOLLOWS)
+    return Verdict("singular" if singular else "stable", 0, RUBS if has_friction else FOLLOWS)
 
 
 def _diverges(system):

@@ -19,7 +19,7 @@ from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Start,
                         find_equilibrium)
 from .outcome import (Diverging, Equilibrium, FirstStepTooLarge, LoadStep, LoadStepFailed,
                       StaticResult, Unstable)
-from .touching import MOST_FROM_SOFT, found_touching
+from .contact_search import MOST_FROM_SOFT, search_contact
 
 logger = logging.getLogger(__name__)
 
@@ -158,7 +158,7 @@ class Increment:
                              f"{AUGMENTED} corrections of the pressure")
 
     def _touching(self):
-        """Iterate, with obstacles by :mod:`skfem_ancf.solvers.touching`."""
+        """Iterate, with obstacles by :mod:`skfem_ancf.solvers.contact_search`."""
         contacts, options = self.system.forces.contacts, self.options
         if not contacts.obstacles:
             return self._from_start(options)
@@ -171,7 +171,7 @@ class Increment:
             return self._from_start(chosen) if begin is None else self.iterate(begin, chosen)
 
         before = self.start.u, options.route.acting(self.start.load)[1]
-        return found_touching(contacts, before, self.time, solve,
+        return search_contact(contacts, before, self.time, solve,
                               lambda u: self.system.strain_energy(u, self.time), self._response,
                               LoadStepFailed, options.close, options.drag is not None)
 

@@ -24,7 +24,7 @@ from .continuation import continuation
 from .increment import Increment, Options, Route
 from .outcome import (Attempt, FirstStepTooLarge, LoadStepFailed, StaticResult, UnboundedMotion,
                       Unstable)
-from .touching import MOST_FROM_SOFT
+from .contact_search import MOST_FROM_SOFT
 
 logger = logging.getLogger(__name__)
 

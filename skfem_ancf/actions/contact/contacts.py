@@ -47,7 +47,7 @@ CHANGE = 1e-4
 #: Relative pressure of points that count, and relative distance from the limit of friction.
 SEEN = 1e-3
 #: Factor on the stiffness for difficult equilibria.
-EASED = 1e-2
+SOFTENED = 1e-2
 #: Collocation cannot correct multipliers within a step: constraints at its points cause rebound.
 BY_POINTS = ("its steps do not update multipliers: a stopped body would rebound up to 3, 4.1 or "
              "5.6 times as fast with 1, 2 or 3 Gauss points, 4.3 times with Radau points")
@@ -196,8 +196,8 @@ class Contacts:
     # history
 
     @contextmanager
-    def eased(self, soft: bool = False) -> Iterator[None]:
-        """Context without friction, and if ``soft`` with reduced stiffness.
+    def without_friction(self, soft: bool = False) -> Iterator[None]:
+        """Context in which nothing sticks, if ``soft`` with reduced stiffness too.
 
         Iterations converge there more easily, to a nearby state.
         """
@@ -207,7 +207,7 @@ class Contacts:
         try:
             memory[ANCHORED] = 0.0
             for x in numbers:
-                x[STIFFNESS] *= EASED if soft else 1.0
+                x[STIFFNESS] *= SOFTENED if soft else 1.0
             yield
         finally:
             memory[ANCHORED] = sticks

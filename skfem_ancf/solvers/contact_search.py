@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ LEAST = 1e-3
 #: Target of penetration, energy and error, relative to their limits.
 LEFT = 0.5
 #: Largest stiffening factor in one step.
-RUNG = 30.0
+STEP = 30.0
 #: Largest number of iterations close to the last equilibrium: directly, and from a soft start.
 MOST_DIRECT, MOST_FROM_SOFT = 8, 15
 #: Largest number of stiffenings in a load step, and of reductions of the factor.
@@ -105,7 +106,7 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float, yields: Array) -
     return out
 
 
-def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
+def search_contact(contacts: Contacts, start: tuple[Array, float], t: float,
                    solve: Callable[..., Any], energy: Callable[[Array], float],
                    respond: Callable[..., Any], failed: type[Exception],
                    close: bool = False, dragged: bool = False) -> Any:
@@ -116,76 +117,60 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
     raises ``failed``. ``respond`` is that of ``contacts.yielding`` at an equilibrium. If the start
     is ``close`` to the equilibrium, few iterations are tried.
     """
-    before = contacts.tables.memory.copy()
-    climb = _Climb(contacts, start, t, solve, energy, respond, failed)
-    ways = [_at_once, _soon] if close else [_released, _from_soft, _directly]
-    if dragged:  # which already stabilises the iteration
-        ways = [_directly]
-    flags = lies_near(contacts, *start) if _released in ways else None
-    for way in ways:
-        if way is _released and flags is None:
-            continue
+    memory, before = contacts.tables.memory, contacts.tables.memory.copy()
+    ramp = StiffnessRamp(contacts, start, t, solve, energy, respond, failed)
+
+    def from_soft(most=None):
+        # on soft obstacles contacts do not open and close one after the other: the correction that
+        # moves one point out of the obstacle does not throw off its neighbours
+        with contacts.without_friction(soft=True):
+            found = solve(None, True)
+        return solve(found, False, most)
+
+    def released():  # rough, on soft obstacles, from points that are bound
+        with bound(contacts, flags):
+            found = solve(None, True)
+        contacts.harden(soft(contacts, found[0], t), *start)
+        if contacts.anchored:
+            with contacts.without_friction():
+                found = solve(found, True)
+        return solve(found, True)
+
+    def directly():
         try:
-            return climb.up(way(climb, flags), rough=way is _released)
+            return solve(None, False)
+        except failed:
+            if not contacts.anchored:
+                raise
+            with contacts.without_friction():
+                found = solve(None, True)
+            return solve(found, False)
+
+    flags = None if close or dragged else lies_near(contacts, *start)
+    ways: list[Callable[[], Any]] = [released] if flags is not None else []
+    if dragged:  # which already stabilises the iteration
+        ways = [directly]
+    elif close:
+        ways = [partial(solve, None, False, MOST_DIRECT), partial(from_soft, MOST_FROM_SOFT)]
+    else:
+        ways += [from_soft, directly]
+    for way in ways:
+        try:
+            return ramp.climb(way(), rough=way is released)
         except failed:
             if way is ways[-1]:
                 raise
-            contacts.tables.memory[:] = before
+            memory[:] = before
 
 
-def _at_once(climb, _):
-    """The equilibrium in few iterations."""
-    return climb.solve(None, False, MOST_DIRECT)
-
-
-def _soon(climb, flags):
-    """As :func:`_from_soft`, in few iterations."""
-    return _from_soft(climb, flags, MOST_FROM_SOFT)
-
-
-def _from_soft(climb, _, most=None):
-    """The equilibrium, starting from that on soft obstacles without friction.
-
-    Contacts then no longer open and close one after the other: the correction that moves one point
-    out of the obstacle does not throw off its neighbours.
-    """
-    with climb.contacts.eased(soft=True):
-        found = climb.solve(None, True)
-    return climb.solve(found, False, most)
-
-
-def _released(climb, flags):
-    """A rough equilibrium on soft obstacles, starting from bound points."""
-    contacts = climb.contacts
-    with bound(contacts, flags):
-        found = climb.solve(None, True)
-    contacts.harden(soft(contacts, found[0], climb.t), *climb.start)
-    if contacts.anchored:
-        with contacts.eased():  # no friction
-            found = climb.solve(found, True)
-    return climb.solve(found, True)
-
-
-def _directly(climb, _):
-    """The equilibrium without further measures, or from one without friction if that fails."""
-    try:
-        return climb.solve(None, False)
-    except climb.failed:
-        if not climb.contacts.anchored:
-            raise
-        with climb.contacts.eased():
-            found = climb.solve(None, True)
-        return climb.solve(found, False)
-
-
-class _Climb:
-    """Stiffens soft obstacles step by step; see :func:`found_touching`."""
+class StiffnessRamp:
+    """Stiffens soft obstacles step by step; see :func:`search_contact`."""
 
     def __init__(self, contacts, start, t, solve, energy, respond, failed):
         self.contacts, self.start, self.t, self.respond = contacts, start, t, respond
         self.solve, self.energy, self.failed = solve, energy, failed
 
-    def up(self, found, rough):
+    def climb(self, found, rough):
         """The equilibrium on stiff obstacles, or the last one before a failure.
 
         ``rough``: ``found`` is one that is only a start.
@@ -205,18 +190,18 @@ class _Climb:
 
     def _to(self, wanted, found, rough):
         """The equilibrium at a firmness or the last one before it; if reached; if it is rough."""
-        contacts, rung, fails = self.contacts, RUNG, 0
+        contacts, step, fails = self.contacts, STEP, 0
         memory = contacts.tables.memory
         while True:
             before, now = memory.copy(), 1.0 + contacts.firmness
-            more = np.clip((1.0 + wanted) / now, 1.0 / rung, rung)
+            more = np.clip((1.0 + wanted) / now, 1.0 / step, step)
             last = np.allclose(more * now, 1.0 + wanted, rtol=1e-9)
             contacts.harden(wanted if last else more * now - 1.0, *self.start)
             try:
                 found = self.solve(found, not last)
             except self.failed:
                 memory[:] = before
-                rung, fails = np.sqrt(rung), fails + 1
+                step, fails = np.sqrt(step), fails + 1
                 if fails > HALVED:
                     return found, False, rough
                 continue
