@@ -120,7 +120,7 @@ def needs_compiled():
 @pytest.fixture
 def interrupted(monkeypatch):
     """Calls what integrates with a checkpoint, up to an interrupt; returns the exception."""
-    from skfem_ancf.dynamics.checkpoint import Checkpoint
+    from skfem_ancf.dynamics.integrate import Checkpoint
 
     def run(integrate, steps=14):
         update = Checkpoint.update

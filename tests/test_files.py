@@ -9,7 +9,7 @@ import pytest
 from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.core import archive
 from skfem_ancf.core.errors import AncfError
-from skfem_ancf.dynamics import checkpoint
+from skfem_ancf.dynamics import integrate
 from skfem_ancf.io import PvdWriter
 
 
@@ -67,17 +67,17 @@ def test_what_was_there_stays_where_writing_fails(writer, monkeypatch, tmp_path)
 def _stopped(path, **options):
     """A file of a motion that has stopped in the middle."""
     whole = dict(dt=0.01, every=3, scheme="generalized-alpha") | options
-    write, copies = checkpoint.write, []
+    write, copies = integrate.write, []
 
     def kept(target, arrays):
         write(target, arrays)
         copies.append(path.read_bytes())
 
-    checkpoint.write = kept
+    integrate.write = kept
     try:
         scene().integrate(0.1, checkpoint=path, **whole)
     finally:
-        checkpoint.write = write
+        integrate.write = write
     path.write_bytes(copies[1])
     return path
 

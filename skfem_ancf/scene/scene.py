@@ -26,10 +26,9 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknow
 from ..core.types import Array, StrPath
 from ..dynamics import choose_scheme, get_scheme
 from ..dynamics.base import Scheme
-from ..dynamics.checkpoint import resume
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
-from ..dynamics.integrate import follow, integrate
+from ..dynamics.integrate import follow, integrate, resume
 from ..dynamics.sensors import Sensor, locate
 from ..equations.matrices import (SceneMatrices, linear_external_force, linear_force,
                                   matrices_of)
