@@ -9,7 +9,7 @@ from test_restart import driven, swinging
 
 from skfem_ancf import ElementBeamANCF
 from skfem_ancf.core.errors import CheckpointError, InputError
-from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark, checkpoint
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark, integrate
 
 NAMES = ("t", "u", "v", "acceleration", "multipliers")
 
@@ -23,13 +23,13 @@ def assert_identical(a, b):
 
 def stages(monkeypatch, path):
     """Copies of the file after each time that it is written: a list that grows."""
-    copies, write = [], checkpoint.write
+    copies, write = [], integrate.write
 
     def kept(target, arrays):
         write(target, arrays)
         copies.append(shutil.copy(path, path.with_name(f"{len(copies)}{path.suffix}")))
 
-    monkeypatch.setattr(checkpoint, "write", kept)
+    monkeypatch.setattr(integrate, "write", kept)
     return copies
 
 
@@ -116,7 +116,7 @@ def test_an_unfinished_run_is_not_overwritten(unfinished):
 
 
 def test_files_of_other_versions(unfinished, tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoint, "FORMAT", "skfem-ancf checkpoint 99")
+    monkeypatch.setattr(integrate, "FORMAT", "skfem-ancf checkpoint 99")
     with pytest.raises(CheckpointError, match="not of this version, which reads .* 99"):
         swinging(False).resume(unfinished)
 

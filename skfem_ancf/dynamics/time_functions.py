@@ -7,13 +7,13 @@ not used, so that a kink at the end of a step does not spoil the rates of its ne
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
 from ..core.errors import sample
+from ..core.immutable import array_cache, read_only
 from ..core.types import Array
 from ..equations.system import System
 
@@ -34,17 +34,15 @@ class TimeValues(NamedTuple):
     c: Array  # joint terms that depend on time, and their two rates, (n, p, 3, m)
     g: Array  # the same of the joints' derivatives, (n, p, 3, k)
 
-    def rows(self, part: slice) -> TimeValues:
-        """Select some of the steps."""
-        return TimeValues(*(x if len(x) == 1 else x[part] for x in self))
 
-
+@array_cache(maxsize=8)
 def rate_weights(at: Array, samples: Array) -> Array:
     """Weights (2, p, k) of k samples for the first and second derivative at p points."""
     k = len(samples)
     fit = np.linalg.inv(chebvander(2.0 * samples - 1.0, k - 1))
-    return np.array([2.0**order * chebval(2.0 * at - 1.0, chebder(np.eye(k), order)).T @ fit
-                     for order in (1, 2)])
+    return read_only(np.array([
+        2.0**order * chebval(2.0 * at - 1.0, chebder(np.eye(k), order)).T @ fit
+        for order in (1, 2)]))
 
 
 def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool,
@@ -68,10 +66,6 @@ class TimeFunctions:
         self._system, self._at, self._samples = system, np.array(at), np.array(samples)
         self._block: tuple[tuple[float, ...], TimeValues] | None = None
 
-    @cached_property
-    def _rates(self):
-        return rate_weights(self._at, self._samples)
-
     def of(self, start: float, dt: float, steps: tuple[int, int], limit: float,
            block: tuple[int, int] | None = None) -> TimeValues:
         """Values and rates in the steps ``range(*steps)``; step 0 begins at ``start``.
@@ -83,7 +77,8 @@ class TimeFunctions:
         key = start, dt, first, last, limit
         if self._block is None or self._block[0] != key:
             self._block = key, self._sampled(*key)
-        return self._block[1].rows(slice(steps[0] - first, steps[1] - first))
+        part = slice(steps[0] - first, steps[1] - first)
+        return TimeValues(*(x if len(x) == 1 else x[part] for x in self._block[1]))
 
     def _sampled(self, start, dt, first, last, limit):
         s, tables, n = self._system, self._system.backend.tables, last - first
@@ -101,7 +96,7 @@ class TimeFunctions:
             samples = found[times.size:].reshape(n, len(self._samples), -1)
             values = found[:times.size].reshape(*times.shape, -1)
             return np.stack([values, *(rates / dt**k @ samples for k, rates in enumerate(
-                self._rates, 1))], axis=2)
+                rate_weights(self._at, self._samples), 1))], axis=2)
 
         supports = np.zeros((*times.shape, 3, s.N) if s.constraints.moves else (1, 1, 3, s.N))
         if s.constraints.moves:
