@@ -38,14 +38,8 @@ class Dampers(NamedTuple):
 
 
 @source
-def damping_force(e, dampers, M, t, u, v, out, scratch):
-    """The damping force of the equations e at u and v."""
-    damping_beside(e, dampers, M, t, u, v, 0.0, out, scratch)
-
-
-@source
-def damping_beside(e, dampers, M, t, u, v, mixed, out, scratch):
-    """The same, without materials in the mixed iteration (``mixed``)."""
+def damping_force(e, dampers, M, t, u, v, mixed, out, scratch):
+    """The damping force of the equations e at u and v, without materials if ``mixed``."""
     clear(out)
     if dampers.viscous > 0 and mixed == 0.0:
         add_viscous_force(e.viscous, u, v, out)

@@ -19,8 +19,8 @@ from ..actions.tables import (MATERIALS, add_constraint_rate, add_joint_force, c
                               constraint, external_force, joint_directions)
 from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, NOT_CONVERGED, RESTART,
                                      SINGULAR, judged, noise_of_step)
-from .records import (ITERATIONS, JointMotion, acceleration_of_joints, damping_beside,
-                      damping_force, drive_rate, row_of, settle)
+from .records import (ITERATIONS, JointMotion, acceleration_of_joints, damping_force, drive_rate,
+                      row_of, settle)
 from .stage_tangent import factorize_stages, flat_points, join, solve_for
 
 #: Largest contraction with which factors are reused, also in the mixed iteration; number of mixed
@@ -149,7 +149,7 @@ def _end(e, matrices, method, s, w, state, step):
         c, U, V, W = s.h * method.weights[k], w.U[k], w.V[k], w.W[k]
         e.span[0] = s.h * method.points[k]
         if dampers.active > 0:
-            damping_force(e, dampers, matrices.M, s.times[first + k], U, V, f, scratch)
+            damping_force(e, dampers, matrices.M, s.times[first + k], U, V, 0.0, f, scratch)
             state.dissipated[0] += c * np.dot(f, V)
         if not ends:
             add_multiple(c, V, u)
@@ -197,7 +197,7 @@ def _balance(e, matrices, s, w, at):
     for i in indices(a.size):
         a[i] += (Q[i] - f[i] - scratch[i]) * e.free[i]
     if matrices.dampers.active > 0:
-        damping_force(e, matrices.dampers, matrices.M, t, u, v, f, scratch)
+        damping_force(e, matrices.dampers, matrices.M, t, u, v, 0.0, f, scratch)
         for i in indices(a.size):
             a[i] -= f[i] * e.free[i]
     solve(matrices.mass, a)
@@ -328,7 +328,7 @@ def _residual(e, matrices, method, s, w, state, step, k):
     t, e.span[0] = s.times[at], s.h * method.points[k]
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     if matrices.dampers.active > 0:
-        damping_beside(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)
+        damping_force(e, matrices.dampers, matrices.M, t, u, v, state.mixed_steps[0], d, scratch)
         for i in indices(f.size):
             f[i] += d[i]
     external_force(e.loads, row_of(s.factors, at), t, 1.0, u, Q)

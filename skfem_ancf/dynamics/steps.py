@@ -139,7 +139,7 @@ def add_work(e, matrices, rule, s, w, state):
         damping_velocity[i] = (u[i] - u0[i]) / s.dt
         middle[i] = 0.5 * (u[i] + u0[i])
     t = s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt
-    damping_force(e, matrices.dampers, matrices.M, t, middle, damping_velocity, d, w.x.scratch)
+    damping_force(e, matrices.dampers, matrices.M, t, middle, damping_velocity, 0.0, d, w.x.scratch)
     state.dissipated[0] += s.dt * dot(d, damping_velocity)
 
 

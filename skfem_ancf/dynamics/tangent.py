@@ -13,7 +13,7 @@ from ..core.band import (add_multiple, add_scaled, clear, copy, dot, factorize, 
 from ..core.callbacks import JOINTS, call_custom, call_solver
 from ..core.source import apart, indices, source
 from ..equations.convergence import EXPECTED, LASTING, SINGULAR, SYMMETRIC, UNSYMMETRIC
-from .records import ALL, add_damping, damping_beside, factorize_rows
+from .records import ALL, add_damping, damping_force, factorize_rows
 
 
 # the residual of a step, ``Q - f - M a - J^T lambda``, at an iterate
@@ -95,8 +95,8 @@ def add_elastic(forces, rule, s, w):
 def add_damping_force(e, matrices, rule, s, w, state):
     """Add the damping force; materials are included already in the mixed iteration."""
     d, f = w.x.damping, w.x.force
-    damping_beside(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.damping_velocity,
-                   state.mixed_steps[0], d, w.x.scratch)
+    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.damping_velocity,
+                  state.mixed_steps[0], d, w.x.scratch)
     for i in indices(f.size):
         f[i] += d[i]
 
