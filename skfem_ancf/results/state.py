@@ -16,12 +16,11 @@ from ..actions.item import Item
 from ..actions.joints.base import Joint
 from ..actions.loads import Unscaled
 from ..actions.obstacles.contact import Contact, contact_of, loads_of_contact
-from ..beam.beam import Beam
+from ..beam import Beam, RigidBody
 from ..beam.distribution import Distribution, Sampled, station_of_node, stations_of_vector
 from ..beam.domain import Domain, DomainPoints
 from ..beam.layout import WhichBeam, WhichMember, select_beam, select_member
 from ..beam.points import BeamPoints, require_body
-from ..beam.rigid import RigidBody
 from ..core.errors import (InputError, NameUnknown, NearMisses, require_flag, require_integer,
                            shown)
 from ..core.immutable import Immutable, cached_property

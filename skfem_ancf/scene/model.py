@@ -25,10 +25,9 @@ from ..actions.obstacles import Obstacle
 from ..actions.pairs import BodyContact
 from ..actions.places import joined
 from ..actions.supports import Clamp, Pin, Support
-from ..beam.beam import Beam
+from ..beam import Beam, RigidBody
 from ..beam.domain import Domain
 from ..beam.layout import Layout, WhichMember
-from ..beam.rigid import RigidBody
 from ..core.errors import InputError, NearMisses, require_text, shown
 from ..core.types import TimeFunction
 from ..materials.damping import Damping

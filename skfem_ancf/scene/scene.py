@@ -24,8 +24,7 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, NameUnknow
                            require_finite, require_finite_scalar, require_function, require_label,
                            require_positive, shown)
 from ..core.types import Array, StrPath
-from ..dynamics import choose_scheme, get_scheme
-from ..dynamics.base import Scheme
+from ..dynamics import Scheme, choose_scheme, get_scheme
 from ..dynamics.choice import RTOL
 from ..dynamics.history import History
 from ..dynamics.integrate import follow, integrate, resume
