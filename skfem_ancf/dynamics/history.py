@@ -291,8 +291,7 @@ class History(MaterialPoints, SpringForces):
 
     # files and pictures
 
-    def _repr_html_(self):
-        return history_html(self)
+    _repr_html_ = history_html
 
     def to_pyvista(self, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                    lagrange: bool = False, undeformed: bool = False,

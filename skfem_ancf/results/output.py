@@ -128,9 +128,7 @@ class Output:
             raise undefined
         return [one for one, _ in sorted(found, key=lambda pair: -pair[1])[:count]]
 
-    def _repr_html_(self) -> str:
-        return html.state_html(self)
-
+    _repr_html_ = html.state_html
     save = vtu.save_vtu
     to_xarray = tables.to_xarray
     to_pyvista = pyvista.to_pyvista

@@ -11,6 +11,7 @@ import numpy as np
 from ..core.errors import require_index
 from ..core.types import Array
 from ..equations.system import System
+from ..visuals.html import path_html
 from ..visuals.matplotlib import plot_path
 from .state import MaterialPoints, State
 
@@ -95,10 +96,7 @@ class Path(MaterialPoints):
                 f"{len(self.bifurcation_points())} bifurcation points, {self.iterations} "
                 f"iterations, relative error {self.error.max():.1g}>")
 
-    def _repr_html_(self):
-        from ..visuals.html import path_html
-
-        return path_html(self)
+    _repr_html_ = path_html
 
     def state(self, k: int) -> State:
         """Point ``k`` as a State."""

@@ -129,8 +129,7 @@ class Scene(Model):
         return (f"<Scene of {len(self.beams)} beam(s), {bodies}{len(self._fixed)} fixed "
                 f"coordinates, {len(self.loads)} load(s)>")
 
-    def _repr_html_(self):
-        return scene_html(self)
+    _repr_html_ = scene_html
 
     @property
     def system(self) -> System:
@@ -377,19 +376,7 @@ class Scene(Model):
             warn_of(state)
             return state
 
-    def plot(self, ax: Any = None, *, nodes: bool = False, names: bool = False,
-             loads: bool = True, supports: bool = True, thickness: float | str = "auto",
-             title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
-        """Draw the scene before it is solved: bodies, supports, joints, springs, loads.
-
-        Parameters
-        ----------
-        ax, nodes, names, loads, supports, thickness, title, filename, dpi
-            As for :func:`skfem_ancf.visuals.matplotlib.plot_scene`.
-        """
-        return plot_scene(self.state(load=0.0), ax, nodes=nodes, names=names, loads=loads,
-                          supports=supports, thickness=thickness, title=title,
-                          filename=filename, dpi=dpi)
+    plot = plot_scene
 
     def explore(self, load: PointForce | Callable[[float], Item | Scene],
                 interval: ArrayLike = (0.0, 1.0), value: float | None = None, *, title: str = "",

@@ -161,17 +161,17 @@ def _draw_contact(ax, scenery, state):
                 va="top" if way[1, most] > 0 else "bottom")
 
 
-def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool = True,
+def plot_scene(scene: Any, ax: Any = None, *, loads: bool = True, supports: bool = True,
                nodes: bool = False, names: bool = False, thickness: float | str = "auto",
                title: str | None = None, filename: StrPath | None = None, dpi: float = 200) -> Any:
-    """Draw the reference configuration of a scene with its items; returns the Axes.
+    """Draw a scene before it is solved, with its items; returns the Axes.
 
     Where there are several materials, each has a colour and an entry of the legend.
 
     Parameters
     ----------
-    state
-        The reference configuration, a :class:`~skfem_ancf.results.State`.
+    scene
+        A Scene, or a State of it in the reference configuration.
     loads
         Draw forces as straight arrows and moments as curved ones, with their values, and write
         temperature changes and eigenstrains beside the bodies.
@@ -190,6 +190,7 @@ def plot_scene(state: Any, ax: Any = None, *, loads: bool = True, supports: bool
     loads, supports, nodes, names = (require_flag(name, value) for name, value in (
         ("loads", loads), ("supports", supports), ("nodes", nodes), ("names", names)))
     filename, dpi = page(ax, title, filename, dpi)
+    state = scene.state(load=0.0) if hasattr(scene, "state") else scene
     scenery = Scenery([state], "displacement", thickness, True, None, (8, 2), False)
     scenery.margin, inside = WIDE, ax is not None
     if ax is None:
