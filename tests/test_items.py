@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 from scipy import sparse
 from skfem import LinearForm
 
-from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, Energy, FormLoad, InputError,
-                        Item, MeshBeam, Prony, Scene, StVenantKirchhoff, sweep)
+from skfem_ancf import (Beam, Circle, ElasticPlastic, ElementBeamANCF, ElementBeamCable, Energy,
+                        FormLoad, InputError, Item, MeshBeam, PointMass, Prony, Scene, Spring,
+                        StVenantKirchhoff, sweep)
 from skfem_ancf.actions.forces import point
 from skfem_ancf.actions.joints import JOINTS, Joint, Motor
 from skfem_ancf.dynamics import SCHEMES
@@ -351,6 +352,56 @@ def test_a_constraint_is_that_of_a_joint():
     a, b = one.solve_static(), two.solve_static()
     assert a.displacement((1.0, 0.0), 0)[1] == pytest.approx(0.02, abs=1e-12)
     assert a.joint_force(item)[0] == pytest.approx(b.joint_force(joint)[1], rel=0.05)
+
+
+class Inside(Item):
+    """A spring from a point inside an element to (0.7, -0.6), or a mass there, or a line."""
+
+    def __init__(self, what):
+        self.what = what
+
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.r = r = point(layout, 0, (0.7, 0.0))
+        bound.rows, bound.dofs = np.array([r.row(e, layout.N) for e in np.eye(2)]), r.dofs
+        return bound
+
+    def __getattr__(self, name):
+        one = {"force": "force", "mass": "mass", "constraint": "line"}.get(name)
+        if one is None or vars(self).get("what") != one:
+            raise AttributeError(name)
+        return getattr(self, "_" + name)
+
+    def _force(self, u, v, t):
+        d = self.r(u) - np.array([0.7, -0.6])
+        return -40.0 * (1.0 - 0.6 / np.sqrt(d @ d)) * d @ self.rows
+
+    def _mass(self):
+        return 0.05 * self.rows.T @ self.rows
+
+    def _constraint(self, u, t):
+        return self.r(u)[1:]
+
+
+@pytest.mark.parametrize("what, known", [
+    ("force", lambda: Spring(40.0, ((0.7, 0.0), ("ground", (0.7, -0.6))))),
+    ("mass", lambda: PointMass(0.05, (0.7, 0.0))),
+    ("line", lambda: JOINTS["line"]((0.7, 0.0), (1.0, 0.0)))])
+def test_section_forces_know_where_a_custom_item_acts(what, known):
+    """Also within its element, in statics and in motion; what it prescribes is as of a joint."""
+    def states(item):
+        beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 7), height=0.03), ElementBeamCable(3),
+                    MATERIAL, width=0.03)
+        scene = Scene(beam).clamp("left").point_force((0.1, -1.0), at=(1.0, 0.0)).add(item)
+        return scene.solve_static(), scene.integrate(0.05, 2e-3).state(-1)
+
+    for one, other in zip(states(Inside(what)), states(known())):
+        assert_allclose(one.u, other.u, rtol=0, atol=1e-9 * np.abs(other.u).max())
+        for x in (0.3, 0.68, 0.7, 0.72, 0.9):
+            a, b = ([found.N, found.Q, found.M] for found in (
+                state.resultants((x, 0.0)) for state in (one, other)))
+            assert_allclose(a, b, rtol=0, atol=1e-5 * max(1.0, np.abs(b).max()))
+        assert one.recovered == other.recovered
 
 
 @pytest.mark.filterwarnings("ignore:a support moves")

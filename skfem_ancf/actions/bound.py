@@ -621,15 +621,21 @@ class UserForce(BoundForce):
 class UserConstraint(BoundConstraint):
     """The constraint of a user-defined item."""
 
-    constant = tabled = False
-
     def __init__(self, item: Any, layout: Layout) -> None:
         self.item, self.moving, self.name, self._key = item, item.moving, item.name, item._key
         zero = np.zeros(layout.N)
         value = item.constraint(zero, 0.0)
         m = len(require_finite(f"constraint(u, t) of {item!r}", value, (None,)))
         self.equations = tuple(f"equation {k}" for k in range(m))
-        require_finite(f"jacobian(u, t) of {item!r}", self.jacobian(zero, 0.0), (m, layout.N))
+        J = require_finite(f"jacobian(u, t) of {item!r}", self.jacobian(zero, 0.0), (m, layout.N))
+        # as of a joint: does it depend on displacement or time?
+        u = 0.1 * layout.sizes * np.cos(1.0 + np.arange(layout.N))
+        try:
+            changes = [np.abs(self.jacobian(s * u, t) - J) for s, t in ((1.0, 0.37), (-0.7, 1.0))]
+            self.constant = bool(np.max(changes) <= ROUND_OFF * np.abs(J).max())
+        except Exception:  # it may not be defined there
+            self.constant = False
+        self.tabled = self.constant or hasattr(item, "jacobian")  # second derivatives are exact
         at_generic_displacements(partial(require_derivatives, self, layout.sizes), layout.sizes)
 
     def value(self, u: Array, t: float) -> Array:
@@ -641,7 +647,10 @@ class UserConstraint(BoundConstraint):
             return found.toarray() if sparse.issparse(found) else np.asarray(found)
         return super().jacobian(u, t)
 
-    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array] | None:
+        if self.constant:
+            return None
         rows = np.flatnonzero(np.any(self.jacobian(u, t) != 0.0, axis=0))
 
         def pulled(x: Array) -> Array:

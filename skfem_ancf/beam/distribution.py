@@ -150,6 +150,11 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
     """Element + xi of a nodal force that acts on sections or points; None if it is distributed."""
     rows, t = np.asarray(vector).reshape(-1, beam.nd), beam.mesh.t
     loaded = np.nonzero(np.any(rows != 0, axis=1))[0]
+    runs = np.split(loaded, np.flatnonzero(np.diff(loaded) > 1) + 1)
+    if len(runs) > 1:  # points of elements apart from each other
+        alone = [rows * np.isin(np.arange(len(rows)), run)[:, None] for run in runs]
+        each: list[Any] = [stations_of_vector(beam, one) for one in alone]
+        return None if None in each else sum(each, ())
     if len(loaded) == 2 and loaded[1] == loaded[0] + 1 and np.any(t[0] == loaded[0]):
         e, total = int(np.flatnonzero(t[0] == loaded[0])[0]), rows[loaded, :2].sum(axis=0)
         xi = None

@@ -227,7 +227,7 @@ class Constraints:
     @cached_property
     def tabled(self) -> bool:
         """True if Phi is quadratic and given by :attr:`slopes`, :attr:`seconds` and offsets."""
-        if all(map(is_builtin, self.joints)):
+        if all(is_builtin(getattr(joint, "item", joint)) for joint in self.joints):
             return all(joint.tabled for joint in self.joints)
         # test user-defined joints against the tables at a random displacement
         times = (0.0, 0.37)

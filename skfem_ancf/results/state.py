@@ -203,6 +203,9 @@ class SpringForces:
 
 logger = logging.getLogger(__name__)
 
+#: Difference of axial coordinates (element + xi) that is round-off.
+SAME = 1e-6
+
 
 class Reaction(NamedTuple):
     """Reaction of a support on the beam.
@@ -642,7 +645,7 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         system = self.system
         fixed = np.zeros(system.N, dtype=bool)
         fixed[system.constraints.fixed] = True
-        acting = system.forces.acting_rows()
+        acting, own = self._equations.forces.acting_rows(self._acted, self._time)
         J = None
         if system.constraints.m or len(acting):
             J = sparse.vstack([system.constraints.sparse_jacobian(self._acted, self._time),
@@ -653,12 +656,10 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
             found = [station_of_node(beam.mesh, int(k)) for k in nodes]
             here = None if J is None else J[:, s]
             for row in () if here is None else here[np.unique(here.indices)].toarray():
-                if np.any(row):
-                    # an equation between neighbouring nodes: at both
-                    loaded = np.nonzero(np.any(row.reshape(-1, beam.nd) != 0, axis=1))[0]
-                    found += (stations_of_vector(beam, row)
-                              or [station_of_node(beam.mesh, int(k)) for k in loaded])
-            out.append(found)
+                found += _acting_at(beam, row)
+            places = np.sort([x for row in own[:, s] for x in _acting_at(beam, row)])
+            # forces of one point differ by round-off
+            out.append([*found, *places[np.diff(places, prepend=-1.0) > SAME]])
         return out
 
     def resultants(self, at: Any = None, beam: WhichBeam = None, recover: bool = True,
@@ -804,3 +805,9 @@ class State(Immutable, MaterialPoints, SpringForces, Output, Derivatives):
         """Force of a joint on its first beam, in the order of ``joint.equations``; (m,)."""
         return self.system.constraints.joint_force(
             joint, self.multipliers, self._support_force(), self._acted, self._time)
+
+
+def _acting_at(beam, row):
+    """Where a nodal force (N,) acts; between neighbouring nodes it is at both."""
+    loaded = np.nonzero(np.any(row.reshape(-1, beam.nd) != 0, axis=1))[0]
+    return stations_of_vector(beam, row) or [station_of_node(beam.mesh, int(k)) for k in loaded]

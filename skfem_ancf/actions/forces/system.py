@@ -15,7 +15,7 @@ from ...core.words import constant
 from ..contact.contacts import NO_CONTACTS, Contacts
 from ..contact.tables import HAS_ENTRIES, SEEN, clear_table, is_clear, set_clear
 from ..places import Vector
-from ..bound import BoundForce, Remembering, recalled
+from ..bound import BoundForce, Remembering, UserForce, positions, recalled
 from .base import KernelElement
 from .inertia import RotatingFrame
 from .kernels import (ACCEPTING, ALONG_PUSHING, ELASTIC, ENTRIES, NUMBERS, PUSHED_BACK, PUSHING,
@@ -57,6 +57,8 @@ class DomainForce(BoundForce):
 
 #: Kinds that the kernels know.
 KINDS = 4
+#: Relative size of forces of an item that are round-off.
+SMALL = 1e-6
 #: The derivatives of elements that depend on their first vector.
 FIRST = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
 NONE = np.zeros(0, dtype=np.int64)
@@ -212,11 +214,33 @@ class Forces:
             handle if self.custom or self.changing else 0, self.contacts.tables,
             len(self.changing), self.clear)
 
-    def acting_rows(self) -> Array:
-        """Derivatives of positions of concentrated elements, shape (k, N)."""
-        return np.array([link.row(n, self._N) for element in self.elements
-                         if not element.distributed and not element.internal
-                         for link in element.links for n in np.eye(2)]).reshape(-1, self._N)
+    def acting_rows(self, u: Array, t: float) -> tuple[Array, Array]:
+        """Derivatives of positions of concentrated elements, and forces of items, (k, N) each."""
+        rows, own, N = [], [np.zeros((0, self._N))], self._N
+        known = {id(getattr(e, "element", e)): e for e in self.custom}
+        for element in self.elements:
+            if not isinstance(element, UserForce):
+                if not (element.distributed or element.internal):
+                    rows += [link.row(n, N) for link in element.links for n in np.eye(2)]
+                continue
+            # it acts where its force at u, the derivatives of that and its mass do
+            found, e = [], known.get(id(element))
+            if e is not None:
+                x, at = positions(e, u), element.all_dofs
+                for K in (e.force(x, 0.0 * x, t), e.stiffness(x, 0.0 * x, t),
+                          e.resistance(x, 0.0 * x, t)):
+                    found.append(np.zeros((N, 1 if np.shape(K) == x.shape else x.size)))
+                    found[-1][at] = K.toarray() if sparse.issparse(K) else np.reshape(
+                        K, (x.size, -1))
+            if (mass := element.mass_entries()) is not None:
+                found.append(sparse.csr_array((mass[2], mass[:2]), shape=(N, N)).toarray())
+            columns = np.hstack([K / (np.abs(K).max() or 1.0) for K in found])
+            at = np.flatnonzero(np.any(columns != 0.0, axis=1))
+            U, sizes, _ = np.linalg.svd(columns[at], full_matrices=False)
+            own.append(np.zeros((np.sum(sizes > SMALL * sizes.max(initial=0.0)), N)))
+            own[-1][:, at] = U.T[:len(own[-1])]
+            own[-1][np.abs(own[-1]) < SMALL] = 0.0
+        return np.array(rows).reshape(-1, self._N), np.concatenate(own)
 
     # values
 
