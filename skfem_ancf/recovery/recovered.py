@@ -190,6 +190,8 @@ class Segment:
         moved[0], moved[-1] = SIDE, -SIDE
         xi = xi + moved * ((xi > 0.0) & (xi < 1.0))
         self.points = at = r.intervals.points(r._heights(e, xi))
+        #: Weights of integrals from the axis, (m, m), or (n, m, m) where points vary.
+        self._till = r.intervals.from_bottom.T - at.till_axis[..., None]
         sections = Sections(self.beam, e, xi, at.eta, self.forces.lifted, r.geometry)
         axis = Sections(self.beam, e, xi, mapping=r.geometry)
         X, speed = off_ends(sections.X), np.hypot(*axis.J[:, 0, :, 0])
@@ -211,7 +213,7 @@ class Segment:
                       else np.zeros((2, len(e))) for k in (0, 1)]
         self.axis_angle = unwrapped(angle_of(*self.forces.tangent(axis)))
         # Jourawski's shear stress up to a factor: first moment of E dA over the width
-        E = self.grade * r.modulus(np.zeros((3,) + self.g.shape))
+        self.E = E = self.grade * r.modulus(np.zeros((3,) + self.g.shape))
         centre = (self.integral(E * self.Y) / self.integral(E))[:, None]
         self.jourawski = self.from_bottom(self.width * E * (centre - self.Y)) / self.width
         #: Derivatives along the segment; ``smoothed`` removes short waves, which would grow.
@@ -241,12 +243,11 @@ class Segment:
 
     def from_axis(self, values: Array) -> Array:
         """Integral from the axis to each point of values (..., n, m)."""
-        till_axis = (self.span * values * self.points.till_axis).sum(axis=-1)
-        return self.from_bottom(values) - till_axis[..., None]
+        return _times(self.span * values, self._till)
 
     def at_axis(self, values: Array) -> Array:
         """Values (..., n, m) on the axis, (..., n)."""
-        return (values * self.points.axis).sum(axis=-1)
+        return _times(values, self.points.axis[..., None])[..., 0]
 
     def slope_from_axis(self, values: Array, d_ds: Array) -> Array:
         """Integral from the axis of the axial derivative at constant distance from it, for values
@@ -298,10 +299,11 @@ class Segment:
         N, self.Q = _turned(self.R, self.phi)
         for _ in range(times):
             self._section()
-            E = self.grade * self.recovery.modulus(self.eps - self.E0)
+            E = self.E if self.recovery.linear else (
+                self.grade * self.recovery.modulus(self.eps - self.E0))
             x, y = self.from_axis(self.rY)
             z = y / self.height
-            force = (E if self.rigid else self.S[0] + E * self.stretch**2) / self.g
+            force = (E + 0.0 * z if self.rigid else self.S[0] + E * self.stretch**2) / self.g
             # force and moment, and their derivatives by stretch 1 / g and bending z / g
             found, moment, one, two, three = self.integral(np.array([
                 self.P[0], x * self.P[1] - y * self.P[0], force, z * force, z * z * force]))
@@ -430,6 +432,11 @@ class Segment:
 DIVERGED = "the strain is too large: no equilibrium of the section was found"
 
 
+def _times(values, A):
+    """Rows (..., n, m) times a matrix (m, k), or one of each section, (n, m, k)."""
+    return values @ A if A.ndim == 2 else (values[..., None, :] @ A)[..., 0, :]
+
+
 def _arcsin(x):
     return np.arcsin(np.minimum(np.maximum(x, -1.0), 1.0))
 
@@ -499,6 +506,7 @@ class Recovery:
             laws = [law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
                     for law in laws]
         self.laws = list(zip(self.intervals.layers, laws))
+        self.linear = all(isinstance(law, LinearLaw) for law in laws)
         self.arc = ArcLength(beam)
         #: Mapping with sections that follow the axis at jumps of the curvature.
         self.geometry = None if beam.mesh.sections == "linear" or not len(
