@@ -284,16 +284,12 @@ class MappingBeam(Mapping):
 
     # facets
 
-    def _facet_elements(self, find):
-        """An element of each facet, and the local number of the facet in it."""
+    def facet_points(self, X: Array, find: Array | None = None) -> tuple[Array, Array]:
+        """Elements (nf,) and reference points (2, nf, np) of points (1, np) on facets."""
         m = self.mesh
         find = np.arange(m.nfacets, dtype=np.int32) if find is None else np.asarray(find)
         tind = m.f2t[0, find]
-        return tind, np.argmax(m.t2f[:, tind] == find, axis=0)
-
-    def facet_points(self, X: Array, find: Array | None = None) -> tuple[Array, Array]:
-        """Elements (nf,) and reference points (2, nf, np) of points (1, np) on facets."""
-        tind, local = self._facet_elements(find)
+        local = np.argmax(m.t2f[:, tind] == find, axis=0)  # number of the facet in the element
         s = np.broadcast_to(X[0], (len(tind), X.shape[-1]))
         points = np.empty((2,) + s.shape)
         for k, place in enumerate(_FACET_POINTS):
@@ -308,9 +304,9 @@ class MappingBeam(Mapping):
     def detDG(self, X: Array, find: Array | None = None) -> Array:
         """Length of a facet per unit of its parameter, (nf, np)."""
         tind, points = self.facet_points(X, find)
-        _, local = self._facet_elements(find)
-        J = self.DF(points, tind)
-        return np.hypot(*np.where((local % 2 == 0)[:, None], J[:, 0], J[:, 1]))
+        J, find = self.DF(points, tind), np.arange(self.mesh.nfacets) if find is None else find
+        faces = np.asarray(find) >= self.mesh.p.shape[1]  # the others are sections
+        return np.hypot(*np.where(faces[:, None], J[:, 0], J[:, 1]))
 
     def normals(self, X: Array, tind: Array, find: Array, t2f: Array) -> Array:
         """Unit normals of facets (nf,), outward from elements ``tind`` (nf,): (2, nf, np)."""

@@ -477,11 +477,9 @@ def strain_of_stress(law: Law, stress: Array, strain: Array,
 
 def _axial(law, strain):
     """dS_xx / deps_xx at constant S_yy and S_xy, shape (...), for strains (3, ...)."""
-    D = law.D if isinstance(law, LinearLaw) else law.moduli(strain)
-    det = D[1, 1] * D[2, 2] - D[1, 2] * D[2, 1]
-    return 0.0 * strain[0] + D[0, 0] - (
-        D[0, 1] * (D[1, 0] * D[2, 2] - D[1, 2] * D[2, 0])
-        + D[0, 2] * (D[1, 1] * D[2, 0] - D[1, 0] * D[2, 1])) / det
+    C = law.compliance((0, 1, 2)) if isinstance(law, LinearLaw) else np.linalg.inv(
+        np.moveaxis(law.moduli(strain), (0, 1), (-2, -1)))
+    return 0.0 * strain[0] + 1.0 / C[..., 0, 0]
 
 
 class Recovery:

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
-from scipy.linalg import eigh_tridiagonal
 
 from ..core.errors import (CallError, InputError, ask_array, require_flag, require_option,
                            require_positive, shown)
@@ -135,9 +134,8 @@ class Weighted(Measure):
 
     They are exact, to round-off, for polynomials of degree 2 n - 1 times the width, jumps and
     square roots at the ends of circles included. The measure is discretised interval by interval
-    with ``Y = middle - half cos t`` and Gauss points in t; its orthogonal polynomials follow from
-    the Stieltjes procedure (Gautschi: "Orthogonal Polynomials: Computation and Approximation",
-    Oxford University Press, 2004, section 2.2).
+    with ``Y = middle - half cos t`` and Gauss points in t (Gautschi: "Orthogonal Polynomials:
+    Computation and Approximation", Oxford University Press, 2004).
     """
 
     def __init__(self, pieces: Sequence[Piece]) -> None:
@@ -164,16 +162,9 @@ class Weighted(Measure):
 
     def gauss(self, n: int) -> Rule:
         x, w = self._discrete(2 * n)
-        w = w / np.sum(w)
-        a, b = np.zeros(n), np.zeros(n)
-        before, now, size = np.zeros_like(x), np.ones_like(x), 1.0
-        for k in range(n):
-            a[k] = w @ (x * now * now) / size
-            before, now = now, (x - a[k]) * now - b[k] * before
-            old, size = size, w @ (now * now)
-            if k + 1 < n:
-                b[k + 1] = size / old
-        points, vectors = eigh_tridiagonal(a, np.sqrt(b[1:]))
+        # Golub and Welsch: eigenvalues of the product with eta of orthonormal polynomials
+        Q, _ = np.linalg.qr(np.sqrt(w / np.sum(w))[:, None] * legvander(2.0 * x - 1.0, n - 1))
+        points, vectors = np.linalg.eigh(Q.T @ (x[:, None] * Q))
         return points, vectors[0] ** 2
 
 
