@@ -26,7 +26,7 @@ SEAMS = [
     ("beam.kernels.elements", None, "Elements.add_to_band", ["K"], []),
     (None, "beam.kernels.blocks", "to_rows", [], ["d"]),
     (None, "beam.kernels.blocks", "add_to_nodes", ["F"], []),
-    (None, "beam.kernels.tangents", "add_to_band", ["K", "Z"], []),
+    (None, "beam.kernels.blocks", "add_to_band", ["K", "Z"], []),
     # entries of bands, and solutions
     ("core.band", "core.loops", "factorize", ["A.flat"], []),
     ("core.band", "core.loops", "solve", [], ["x"]),

@@ -40,12 +40,6 @@ def compiled_files() -> dict[Path, bytes]:
 
 
 @cache
-def _stamp() -> str:
-    """Hash of all compiled files: Numba checks only the file of a function, not its callees."""
-    return hashlib.sha256(b"".join(compiled_files().values())).hexdigest()[:10]
-
-
-@cache
 def folder() -> Path:
     """The folder of notes on compiled code, as Numba's cache."""
     given = os.environ.get("NUMBA_CACHE_DIR")
@@ -93,7 +87,9 @@ def key() -> str:
         numba = version("numba")
     except PackageNotFoundError:
         numba = "none"
-    parts = (_stamp(), numba, sys.implementation.cache_tag,
+    # all compiled files: Numba checks only the file of a function, not its callees
+    stamp = hashlib.sha256(b"".join(compiled_files().values())).hexdigest()[:10]
+    parts = (stamp, numba, sys.implementation.cache_tag,
              os.environ.get("NUMBA_CPU_NAME", ""), os.environ.get("NUMBA_CPU_FEATURES", ""))
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 

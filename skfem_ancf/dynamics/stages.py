@@ -106,7 +106,10 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             state.failure[0] = DEPENDENT
             return False
         status = judged(state, rule.tol, reference, noise, REUSED, MIXED, False)
-        if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and _is_lost(state):
+        # the first correction has more energy than the motion
+        lost = (state.mixed_steps[0] == 0 and state.last_correction[0] < 0.0
+                and state.correction[0] > reference)
+        if status == GO_ON and state.fresh[0] > 0 and e.lasting < MATERIALS and lost:
             state.mixed_steps[0], status = LASTING, RESTART  # with the same factors
             body_gradients(e.body, w.origin, w.B)
         if status == RESTART:
@@ -249,13 +252,6 @@ def _start(e, matrices, method, s, w, state, step):
                 Z, c = w.Z[k], 0.5 * (s.h * method.points[k])**2 / state.last_dt[0]
                 for i in indices(v.size):
                     Z[i] = c * (v0[i] - v[i])
-
-
-@source
-def _is_lost(state):
-    """True if the first correction has more energy than the motion."""
-    return (state.mixed_steps[0] == 0 and state.last_correction[0] < 0.0
-            and state.correction[0] > np.sqrt(state.energy[0]))
 
 
 @source

@@ -27,7 +27,7 @@ from ..equations.convergence import (DEPENDENT, DONE, FAILED, GO_ON, LASTING, MI
                                      UNSYMMETRIC, judged, noise_of_step)
 from .records import (ALL, AUGMENTED, ITERATIONS, acceleration_of_joints, damping_force, drive_rate,
                       settle, solve_rows, step_of)
-from .tangent import (add_damping_force, add_elastic, add_impulses, directions, factorize_tangent,
+from .tangent import (add_damping_force, add_impulses, directions, factorize_tangent,
                       factors, free_velocity, internal_force, kinetic_energy, residual, tangent,
                       to_damping_velocity, to_middle)
 
@@ -227,7 +227,6 @@ def _iterate(e, matrices, rule, s, w, state):
             to_middle(rule, w)
             to_damping_velocity(e.free, rule, s, w)
         internal_force(e, matrices, rule, s, w, state)
-        add_elastic(e.forces, rule, s, w)
         if damped:
             add_damping_force(e, matrices, rule, s, w, state)
         anew, stale = joined and (stale or not s.constant), False

@@ -79,16 +79,10 @@ def internal_force(e, matrices, rule, s, w, state):
         body_mean(e.body, u0, u, f)
     else:
         body_force(e.body, u, f)
-
-
-@source
-def add_elastic(forces, rule, s, w):
-    """Add the force of elements, of the iterate or the mean."""
-    u, f = w.x.u, w.x.force
     if rule.conserving > 0:
-        add_elastic_force(forces, s.acting, s.dt, w.y[0], u, f)
+        add_elastic_force(e.forces, s.acting, s.dt, u0, u, f)
     else:
-        add_elastic_force(forces, s.acting, 0.0, u, u, f)
+        add_elastic_force(e.forces, s.acting, 0.0, u, u, f)
 
 
 @apart("damping", *ALL)
@@ -223,12 +217,6 @@ def factors(matrices, state):
     return matrices.U if state.factors[0] == UNSYMMETRIC else matrices.A
 
 
-@source
-def use_unsymmetric(matrices, state):
-    """True if the next factors are those of the unsymmetric matrix."""
-    return state.mixed_steps[0] > LASTING and matrices.U.flat.size > 0
-
-
 @apart("motion", *ALL, returns=int)
 def factorize_tangent(e, matrices, rule, s, w, state):
     """Factorise the iteration matrix; 0 on failure."""
@@ -241,7 +229,7 @@ def factorize_tangent(e, matrices, rule, s, w, state):
             dl[k] = s.stiffness_factor * l[k]
         good = call_solver(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:
-        if use_unsymmetric(matrices, state):
+        if state.mixed_steps[0] > LASTING and matrices.U.flat.size > 0:
             _unsymmetric_tangent(e, matrices, rule, s, w, state)
             state.factors[0] = UNSYMMETRIC
         good = factorize(factors(matrices, state))

@@ -115,8 +115,8 @@ class Increment:
         target, *_ = self._target(system.backend.tables, u, multipliers, system.solver)
         force = system.internal_force(u, self.time, self.load)
         missing = self.load * system.external_force(u) - force
-        opening = system.constraints.constraint(u, self.load)
-        still = not (target.moving or np.any(opening))
+        gaps = system.constraints.constraint(u, self.load)
+        still = not (target.moving or np.any(gaps))
         rests = still and stability.is_nothing(system, missing)
         return Equilibrium(u, multipliers, force) if rests else None
 
@@ -235,21 +235,17 @@ class Increment:
             raise LoadStepFailed("an element is turned inside out")
         if lost := system.constraints.lost(x.u):
             raise LoadStepFailed(lost)
-        if n == 0:
-            self._take_tangent(backend, target, x)
+        if n == 0:  # factorise the first tangent, if it is that of the solution
+            tables, solver = backend.tables, system.solver
+            try:
+                if (backend is not system.backend or tables.prestressed
+                        or tables.plain.loads.custom):
+                    solver.forget()
+                else:
+                    solver.factorize(x.u, target.at, x.multipliers)
+            except NO_FACTORS:
+                solver.forget()
         return Equilibrium(x.u, x.multipliers, x.force)
-
-    def _take_tangent(self, backend, target, x):
-        """Factorise the first tangent of an iteration if it is that of the solution."""
-        tables, solver = backend.tables, self.system.solver
-        if (backend is not self.system.backend or tables.prestressed
-                or tables.plain.loads.custom):
-            solver.forget()
-            return
-        try:
-            solver.factorize(x.u, target.at, x.multipliers)
-        except NO_FACTORS:
-            solver.forget()
 
     def _target(self, tables, u, multipliers, solver):
         """The Target of the level, the Start, and load factors, for a solver."""

@@ -342,7 +342,7 @@ class Search:
         step = Increment(self.system, result, 1.0, options)
         try:
             with np.errstate(all="ignore"):  # overflow shows in the residual
-                found = step.solve(self._wanted(route))
+                found = step.solve(self._ends_stable(route))
             # a later strategy may find an equilibrium on the side away from the load
             if (self.attempts and self.stable and route.proportional
                     and not (self.stabilised_by_loads or self.touches)
@@ -388,7 +388,7 @@ class Search:
             with np.errstate(all="ignore"):
                 found = descent.descend(step, lambda begin: step.iterate(begin, far, down), down)
                 if system.forces.contacts.obstacles:
-                    found = self._firm(found, step)
+                    found = self._with_stiff_contact(found, step)
         except NO_FACTORS as error:
             raise LoadStepFailed("a tangent has no factors") from error
         except LoadStepFailed as failure:
@@ -407,7 +407,7 @@ class Search:
         watched = watched and method == "mixed" and self._auto and not self.touches
         return Options(route, method, self.rules.tol, self.rules.max_iterations, watched)
 
-    def _wanted(self, route):
+    def _ends_stable(self, route):
         """True if the end of a route has to be stable."""
         return self.stable and route.acting(1.0) == (1.0, self.route.times[1])
 
@@ -436,8 +436,8 @@ class Search:
             if not again:  # if two strategies find it, the mesh is too coarse: a warning says so
                 raise LoadStepFailed("the axis folds back within an element")
 
-    def _firm(self, found, step):
-        """Solve again with contact that is stiff enough."""
+    def _with_stiff_contact(self, found, step):
+        """Solve again, with contact that is stiff enough."""
         start = replace(self._beginning(self.route), u=found.u, multipliers=found.multipliers)
         loads, times = ((x, x) for x in step.options.route.acting(1.0))
         again = Increment(self.system, start, 1.0, step.options._replace(
@@ -460,7 +460,7 @@ class Search:
         the first :data:`CUT` steps fail.
         """
         rules, route = self.rules, route or self.route
-        stable, result = self._wanted(route), result or self._beginning(route)
+        stable, result = self._ends_stable(route), result or self._beginning(route)
         size, cuts, spent = size or rules.first_step, 0, 0
         if size < rules.first_step:  # a strategy has tried the larger step
             result.rejected, cuts = 1, int(self._unstable)

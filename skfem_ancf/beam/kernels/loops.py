@@ -1,19 +1,19 @@
 """Compiled kernels: the functions of :mod:`.runs` as loops over blocks of elements.
 
 t are :class:`~skfem_ancf.beam.kernels.compiled.CompiledTables`; ``given`` and ``out`` are stresses
-(ne ns,), or of size 0. Other arrays are as in :mod:`.blocks` and :mod:`.tangents`.
+(ne ns,), or of size 0. Other arrays are as in :mod:`.blocks`.
 """
 
 import numpy as np
 
 from ...core.band import add_multiple
 from ...core.source import F1, F2, I1, apart, source
-from .blocks import (add, at_points, between_samples, block, changes, directions, displaced,
-                     from_points, gather, moduli, push, put, strains, stresses,
-                     take, times, to_rows)
+from .blocks import (add, add_forces_of, add_geometric, add_material, add_matrices, at_points,
+                     between_samples, block, changes, directions, displaced, from_points, gather,
+                     moduli, place, products, put, scale_products, strains, stresses, take, times,
+                     to_rows)
 from .compiled import W, CompiledTables
 from .law import LINEAR, conserve, law_evaluate
-from .tangents import (add_geometric, add_material, add_matrices, place, products, scale_products)
 
 
 @apart("StrainTables", CompiledTables, F1, F1, F1, F1, F1)
@@ -50,7 +50,7 @@ def force(t, u, v, given, out, f):
         if given.size > 0:
             take(t, first, given, T)
         if f.size > 0:
-            push(t, first, D, T, U if whole else U[:0], B, F, f)
+            add_forces_of(t, first, D, T, U if whole else U[:0], B, F, f)
 
 
 def run_force(t, u, f):
@@ -96,7 +96,7 @@ def linearised(t, u, du, given, out, f):
         if out.size > 0:
             put(t, first, T, given, out)
         if f.size > 0:
-            push(t, first, D, T, U[:0], B, F, f)
+            add_forces_of(t, first, D, T, U[:0], B, F, f)
 
 
 def run_linearised(t, u, du, given, out):
@@ -125,7 +125,7 @@ def run_tangent(t, u, given, out, f, A, ld):
         if out.size > 0:
             put(t, first, T, out[:0], out)
         if f.size > 0:
-            push(t, first, X, T, U, B, F, f)
+            add_forces_of(t, first, X, T, U, B, F, f)
         w[:] = 0.0
         z[:] = 0.0
         add_material(t, moduli(t, first, E), X, w, z)
@@ -311,7 +311,7 @@ def eigen_mean(t, u, v, shift, f):
         add(0.5, C, E)
         shifted(t, first, E, C, shift, S)
         from_points(t, first, S, T)
-        push(t, first, D, T, U[:0], B, U, f)
+        add_forces_of(t, first, D, T, U[:0], B, U, f)
 
 
 def run_eigen_force(t, u, given, f):
