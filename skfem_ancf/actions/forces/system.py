@@ -233,7 +233,8 @@ class Forces:
                     found[-1][at] = K.toarray() if sparse.issparse(K) else np.reshape(
                         K, (x.size, -1))
             if (mass := element.mass_entries()) is not None:
-                found.append(sparse.csr_array((mass[2], mass[:2]), shape=(N, N)).toarray())
+                M = sparse.csc_array((mass[2], mass[:2]), shape=(N, N))
+                found.append(M[:, np.unique(mass[1])].toarray())
             columns = np.hstack([K / (np.abs(K).max() or 1.0) for K in found])
             at = np.flatnonzero(np.any(columns != 0.0, axis=1))
             U, sizes, _ = np.linalg.svd(columns[at], full_matrices=False)
