@@ -301,6 +301,38 @@ def test_an_item_with_a_memory_needs_no_energy():
                     rtol=1e-6, atol=1e-9)
 
 
+class Fading(ForceElement):
+    """A load with a memory: it decays with the way that its point has gone."""
+
+    symmetric = dissipates = False
+
+    def __init__(self, f, length):
+        self.f, self.length = f, length
+
+    def bind(self, scene):
+        return [point(scene, None, TIP)]
+
+    def start(self):
+        return np.zeros(2)
+
+    def evaluate(self, x, v, t, history, dt):
+        way = history[1] + np.abs(x[0, 1] - history[0])
+        return np.array([[0.0, t * self.f * np.exp(-way / self.length)]]), np.array([x[0, 1], way])
+
+
+def test_a_load_with_a_memory_brings_work_in():
+    """K w = t f exp(-w / length) at each increment, and nothing is dissipated."""
+    E, h, f, length = 2e7, 0.05, 1.0, 0.02
+    beam = Beam(MeshBeam.init_line([0.0, 0.5, 1.0], height=h), ElementBeamCable(3),
+                StVenantKirchhoff(E, 0.3), width=h)
+    K = 3.0 * E * h**4 / 12.0
+    run = Scene(beam).clamp("left").add(Fading(f, length)).run(1.0, increments=5)
+    w = run.displacement(TIP)[:, 1]
+    exact = [brentq(lambda w, t=t: K * w - t * f * np.exp(-w / length), 0.0, 0.1) for t in run.t]
+    assert_allclose(w, exact, rtol=5e-3)
+    assert np.all(run.dissipated == 0.0)
+
+
 # what it refuses
 
 class Odd(Maxwell):

@@ -202,6 +202,8 @@ class BoundForce(Bound):
     changing = False
     #: Steps and increments change its history, if it has one; else only samples do.
     evolves = True
+    #: With a history, its work that it does not store is dissipated: False for a load.
+    dissipates = True
 
     @cached_property
     def all_dofs(self) -> Array:
@@ -384,7 +386,7 @@ class Remembering:
         lost = -np.sum(mean * (y - x)) + (self.potential_at(x, t) or 0.0) - (
             self.potential_at(y, t, after) or 0.0)
         self._values[:] = after
-        return float(lost)
+        return float(lost) if self.element.dissipates else 0.0
 
     def settle(self, u0: Array, u: Array, t: float) -> float:
         """As :meth:`accept` in statics, between displacements (N,)."""
@@ -540,7 +542,7 @@ class UserForce(BoundForce):
         if hasattr(item, "start"):
             self.start, self.evaluate = item.start, self._evaluate
         self.item, self._N, self.symmetric = item, layout.N, item.symmetric
-        self.name, self._key = item.name, item._key
+        self.name, self._key, self.dissipates = item.name, item._key, item.dissipates
         dofs = np.arange(layout.N) if item.dofs is None else np.unique(item.dofs)
         if dofs.dtype.kind != "i" or (dofs.size and not 0 <= dofs[0] <= dofs[-1] < layout.N):
             raise InputError(f"dofs of {item!r} must be numbers from 0 to {layout.N - 1}, got "

@@ -50,6 +50,9 @@ class Item(Immutable, Bound):
         The stiffness is symmetric: the force has a potential. Set it to False otherwise.
     moving : bool
         The constraint depends on time; False saves its evaluation.
+    dissipates : bool
+        What an item with a memory takes and does not store is dissipated. Set it to False for a
+        load, whose work comes from outside.
     dofs
         Numbers of the DOFs that energy and force depend on and act on, which :meth:`bind` may set;
         all by default, with dense matrices: for small scenes.
@@ -83,6 +86,7 @@ class Item(Immutable, Bound):
 
     symmetric = True
     moving = True
+    dissipates = True
     dofs: Any = None
 
     def __new__(cls, *args: Any, **options: Any) -> Self:

@@ -58,6 +58,8 @@ class ForceElement(BoundForce, Item):
     entries
         For a sparse stiffness, once bound: rows and columns of its values, numbers of components of
         neighbouring links; None for the shape (n, 2, n, 2).
+    dissipates : bool
+        As of an :class:`~skfem_ancf.Item`: False for a load with a memory.
     changing : bool
         Stiffness and resistance are sparse matrices (2 n, 2 n) whose entries may be anywhere, and
         elsewhere at each call, as in contact. Each link is then a pair of degrees of freedom. The
