@@ -232,17 +232,3 @@ def _stencil(s, s0, s1):
 def _gauss_points(a, step):
     x, w = gauss(12)
     return a[:, None] + step[:, None] * x, w
-
-
-def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
-    """Raise MeshError where sixteenths of elements between nodes s have radii of curvature below
-    h/2.
-    """
-    height = np.broadcast_to(height, len(s) - 1).repeat(16)
-    k = int(np.argmax(bent * height))
-    if bent[k] * height[k] / 2 >= 1.0:
-        e, part = divmod(k, 16)
-        at = s[e] + (s[e + 1] - s[e]) * part / 16.0
-        raise MeshError(
-            f"the curve folds near s = {at:.6g}: its radius of curvature {1 / bent[k]:.6g} is "
-            f"below half the height {height[k] / 2:.6g}; use a smaller height or a gentler curve")

@@ -22,7 +22,7 @@ from ..core.errors import (FileError, InputError, MeshError, NameUnknown, requir
                            require_positive, require_unmasked, shown)
 from ..core.immutable import Immutable, cached_property, is_builtin, packed
 from ..core.types import Array, StrPath
-from .curve import Curve, axis_of, check_curvature, derivative_of
+from .curve import Curve, axis_of, derivative_of
 from .mapping import SECTIONS, MappingBeam, heights_of, scaled
 from .numbering import NODAL, ElementBeamP1, NumberedMesh, default_tags, halved
 from .places import Finder, as_point, is_point, points_of_rows
@@ -203,7 +203,14 @@ class MeshBeam(NumberedMesh):
         p, tangent, lengths, turning, bent = curve.elements(s)
         t = _chain(len(s))
         largest, heights, taper = heights_of(height, s, t)
-        check_curvature(bent, s, largest if heights is None else np.max(heights, axis=0))
+        # the curvature of each sixteenth of an element times half the height there
+        h = (largest + 0.0 * lengths if heights is None else np.max(heights, axis=0)).repeat(16)
+        k = int(np.argmax(bent * h))
+        if bent[k] * h[k] >= 2.0:
+            at = np.interp(k / 16.0, np.arange(len(s)), s)
+            raise MeshError(
+                f"the curve folds near s = {at:.6g}: its radius of curvature {1 / bent[k]:.6g} is "
+                f"below half the height {h[k] / 2:.6g}; use a smaller height or a gentler curve")
         return cls._from_nodes(p, t, tangent, lengths, (largest, heights, taper), s.copy(), curve,
                                turning)
 

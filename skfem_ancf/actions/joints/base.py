@@ -242,9 +242,6 @@ class IndependentPart(Joint):
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
         return self.joint.curvature(u, t, self._all(multipliers))
 
-    def quadratic(self, u: Array, t: float, v: Array) -> Array:
-        return self.joint.quadratic(u, t, v)[self.kept]
-
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.mean_entries(u0, u1, t))
 
@@ -255,15 +252,9 @@ class IndependentPart(Joint):
     def lost(self, u: Array) -> str:
         return self.joint.lost(u)
 
-    def offset(self, times: Array, N: int) -> Array:
-        return self.joint.offset(times, N)[:, self.kept]
-
     @property
     def turning(self) -> bool:
         return self.joint.turning
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
         return self._of(*self.joint.slope_entries(times, N))
-
-    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
-        return self._of(*self.joint.second_entries(N))
