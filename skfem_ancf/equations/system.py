@@ -390,7 +390,10 @@ class System:
         for beam, s in zip(self.beams, self.slices):
             if beam.has_sections and beam.kernel.inverted(u[s]):
                 return True
-        return any(domain.inverted(u[self.of(domain)]) for domain in self.domains)
+        for domain in self.domains:
+            if domain.inverted(u[self.of(domain)]):
+                return True
+        return False
 
     def folded(self, u: Array) -> bool:
         """True if the axis folds back within an element."""

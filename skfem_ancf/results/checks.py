@@ -171,8 +171,9 @@ def warn_of(state: Any) -> None:
     """Warn of a doubtful static solution, and of what is found beyond the range of the model."""
     if state.doubt:
         warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning)
-    for text in state._equations.forces.contacts.sunk(state.u, state.load):
-        warn(text, ModelWarning)
+    if state.system.forces.contacts.groups:
+        for text in state._equations.forces.contacts.sunk(state.u, state.load):
+            warn(text, ModelWarning)
     for text in _kinks(state):
         warn(text, ModelWarning)
     warn_of_points(state.system)

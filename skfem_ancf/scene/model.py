@@ -182,7 +182,8 @@ class Model(NearMisses):
             for one in bound:
                 if isinstance(one, Support):
                     one.hold(fixed)
-            require_alone([*self.loads, *(one for one in bound if isinstance(one, Load))])
+                elif isinstance(one, EigenStrain):
+                    require_alone([*self.loads, *bound])
             self._entries, self._fixed, self._system = self._entries + tuple(entries), fixed, None
         return bound
 
