@@ -555,8 +555,59 @@ def histories(quick, out):
                       M[-1] / M[4] / (1.0 - 0.4 * (1.0 - np.exp(-2.0))) - 1.0, 1e-5)
 
 
+def leaves(element, h, E, n, friction=0.0, origin=0.0):
+    """n cantilevers on each other, the upper one loaded at its end, and their stiffness."""
+    law = StVenantKirchhoff(E, 0.0, 1e-3 * E)
+    beams = [Beam(line(8, h).translated((origin, -k * h)), element, law, WIDTH) for k in range(n)]
+    scene = Scene(*beams).contact("all", friction=friction)
+    for k in range(n):
+        scene.clamp("left", k, thickness="free")
+    return scene, 3.0 * n * E * WIDTH * h**3 / 12.0
+
+
+def pairs(quick, out):
+    """Beams that touch: leaves that slide and rub in any units, impacts."""
+    check = "pairs"
+    elements = {"cable 3": ElementBeamCable(3), "cable 5": ElementBeamCable(5),
+                "N=2": ElementBeamANCF(2), "cubic 2": ElementBeamANCFCubic(2)}
+    for name, element in elements.items():
+        for s, E, n, origin in (((1e2, 2e11, 2, 0.0),) if quick else (
+                (2e1, 2e11, 2, 0.0), (1e2, 2e11, 2, 0.0), (1e2, 2e11, 3, 0.0), (1e2, 1e-3, 3, 0.0),
+                (1e2, 2e11, 2, 1e4), (1e3, 2e11, 2, 0.0))):
+            scene, k = leaves(element, 1.0 / s, E, n, origin=origin)
+            state = scene.point_force((0, -1e-3 * k), at=(origin + 1.0, 0), beam=0).solve_static()
+            case = f"{n} leaves, {name}, L/h = {s:g}, E = {E:g}, from x = {origin:g}"
+            yield Row(check, case, "relative error of the deflection",
+                      state.displacement("right", 0)[1] / -1e-3 - 1.0, 6e-3)
+            yield Row(check, case, "penetration over height", state.contact().penetration * s, 1e-2)
+        mu, h = 0.3, 0.1
+        for E in (2e11,) if quick else (2e11, 1e-3):
+            slopes = []
+            for friction in (0.0, mu):
+                scene, k = leaves(element, h, E, 2, friction)
+                scene.point_force((0, -1e-3 * k), at="right", beam=0, amplitude=lambda t: t)
+                tip = scene.run(1.0, increments=5).displacement("right", 0)[:, 1]
+                slopes.append(1.0 / (tip[-2] - tip[-1]))
+            share = 3.0 * mu * h / 4.0
+            yield Row(check, f"friction {mu}, {name}, L/h = 10, E = {E:g}", "relative error of the "
+                      "stiffness", slopes[1] / slopes[0] * (1.0 - share) - 1.0, 5e-3)
+        for friction in (0.0, 0.3):
+            law = StVenantKirchhoff(1e7, 0.0, 1e3)
+            rods = [Beam(line(4, 0.05, **given), element, law, 0.02) for given in (
+                {}, {"origin": (0.4, 0.06), "angle": 0.1})]
+            history = Scene(*rods).contact("all", friction=friction).initial_velocity(
+                (0, -2.0), 1).integrate(0.01 if quick else 0.04, 4e-4)
+            energy = history.total_energy + history.dissipated
+            yield Row(check, f"impact, {name}, friction {friction}", "energy and dissipation, range",
+                      np.ptp(energy) / energy[0], 1e-10)
+            turn = history.angular_momentum
+            yield Row(check, f"impact, {name}, friction {friction}", "angular momentum, range",
+                      np.ptp(turn) / np.max(np.abs(turn)), 1e-10)
+
+
 CHECKS = (formulations_table, slenderness, fine_and_slender, thick_and_heavy, poisson, orders,
-          units, far_away, length_ratios, loads, rigid_motions, spin, pendulum, histories)
+          units, far_away, length_ratios, loads, rigid_motions, spin, pendulum, histories,
+          pairs)
 
 
 def run(out="out/stress", quick=False, progress=None, checks=CHECKS):
