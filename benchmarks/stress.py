@@ -598,11 +598,11 @@ def pairs(quick, out):
             history = Scene(*rods).contact("all", friction=friction).initial_velocity(
                 (0, -2.0), 1).integrate(0.01 if quick else 0.04, 4e-4)
             energy = history.total_energy + history.dissipated
-            yield Row(check, f"impact, {name}, friction {friction}", "energy and dissipation, range",
-                      np.ptp(energy) / energy[0], 1e-10)
-            turn = history.angular_momentum
-            yield Row(check, f"impact, {name}, friction {friction}", "angular momentum, range",
-                      np.ptp(turn) / np.max(np.abs(turn)), 1e-10)
+            turn, case = history.angular_momentum, f"impact, {name}, friction {friction}"
+            yield Row(check, case, "range of energy and dissipation", np.ptp(energy) / energy[0],
+                      1e-10)
+            yield Row(check, case, "range of the angular momentum", np.ptp(turn) / np.max(
+                np.abs(turn)), 1e-10)
 
 
 CHECKS = (formulations_table, slenderness, fine_and_slender, thick_and_heavy, poisson, orders,

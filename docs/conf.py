@@ -16,9 +16,11 @@ os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
 
 import pyvista
 import skfem_ancf
+import words
 from pyvista.plotting.utilities.sphinx_gallery import DynamicScraper
+from sphinx.search.en import SearchEnglish
 
-pyvista.BUILDING_GALLERY = True
+pyvista.BUILDING_GALLERY, SEARCH = True, SearchEnglish({})
 warnings.filterwarnings("error", module="skfem_ancf")
 
 project = "skfem-ancf"
@@ -99,7 +101,14 @@ def links_of_pages(app, docname, source):
     text = re.sub(r"\[([\w-]+\.md)\]\(\1", titled, source[0])
     text = text.replace("](../CONTRIBUTING.md", "](contributing.md")
     text = re.sub(r"\]\((?:\.\./)?demos/(\w+)\.py\)", r"](gallery/\1.rst)", text)
-    source[0] = re.sub(r"\[[^\]]*\]\(\.\./([^)]*)\)", r"`\1`", text)
+    text = re.sub(r"\[[^\]]*\]\(\.\./([^)]*)\)", r"`\1`", text)
+    source[0] = words.indexed(docname, text, stems)
+
+
+def stems(text):
+    """The stems of the words of a text that the search knows."""
+    return {SEARCH.stem(word.lower()) for word in SEARCH.split(text)
+            if SEARCH.word_filter(word.lower())}
 
 
 def links_of_parts(app, path, docname, content):

@@ -133,3 +133,18 @@ def test_wrong_cases_teach():
     loose = Frame.from_lines([(0, 0), (L, 0)], [(0, 1)], material=STEEL, height=0.3, width=0.1)
     with pytest.raises(SupportError, match="combination 'dead': "):
         LoadCases(loose.pin(0), CASES)["dead"]
+
+
+def test_an_envelope_is_printed_by_its_extremes():
+    """q L^2 / 8 = 2 and 1.5 F L / 4 = 3 in the middle of a girder; units are those of the scene."""
+    girder = Frame.from_lines([(0, 0), (4, 0)], [(0, 1)], height=0.2, width=0.1,
+                              material=StVenantKirchhoff(2e8, 0.3))
+    cases = LoadCases(girder.pin(0).hold(1, "y").units("kN", "m"), {
+        "q": lambda scene: scene.line_load((0, -1.0)),
+        "F": lambda scene: scene.point_force((0, -2.0), at=(2, 0))},
+        {"q": {"q": 1.0}, "1.5 F": {"F": 1.5}})
+    lines = str(cases.envelope()).splitlines()
+    assert len(lines) == 6
+    assert next(line for line in lines if line.startswith("greatest M 3 at s = 2 by '1.5 F'"))
+    assert next(line for line in lines if line.startswith("greatest Q")).endswith(" by 'q'")
+    assert str(cases).splitlines()[-1] == "in kN, m"

@@ -576,8 +576,11 @@ def test_domains_whose_stress_is_not_known():
     with pytest.raises(InputError, match="density"):
         Scene(light).clamp("left").gravity((0, -9.81))
     stiff = BilinearForm(lambda u, v, w: ddot(grad(u), grad(v)))
-    with pytest.raises(InputError, match=r"a\(w\['u'\], v, w\)"):
+    with pytest.raises(InputError, match=r"a\.form\(w\['u'\], v, w\)"):
         Domain(light.basis, stiff, stiff)
+    linear = Domain(light.basis, LinearForm(lambda v, w: stiff.form(w["u"], v, w)), stiff)
+    u = np.cos(np.arange(linear.N))
+    assert_allclose(linear.force(u), linear.matrix() @ u, rtol=0, atol=1e-12)
     state = Scene(domain_of(strip(0, 1, 2))).clamp("left").state()
     assert_allclose(state.strain((0.5, 0.0), 0), np.zeros(3))
     with pytest.raises(InputError, match="Domain.solid"):

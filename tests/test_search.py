@@ -1,5 +1,6 @@
 """The search of the site finds what engineers look for; of the pages, if the site is not built."""
 
+import importlib.util
 import json
 import re
 from pathlib import Path
@@ -42,64 +43,35 @@ def pages():
     return found
 
 
-#: What is looked for, and the page of a heading with these words: the site's search names headings
-#: first.
-HEADINGS = {
-    "moving load": "loads", "bolt preload": "loads", "electrostatic": "loads",
-    "mesh convergence": "trust", "units": "units", "strength": "fields",
-    "stiffness obstacle": "obstacles", "own weak form": "domains", "plane mesh": "recipes",
-    "natural frequencies": "modes", "buckling": "modes", "friction": "obstacles",
-    "follower force": "loads", "element": "choose", "damping": "motion", "spring": "loads",
-    "hinge": "frames", "wind": "loads", "gravity": "loads", "self-weight": "loads",
-    "snap-through": "solving", "post-buckling": "solving", "critical load": "modes",
-    "prestress": "loads", "temperature": "sections", "thermal expansion": "sections",
-    "fatigue": "faq", "safety factor": "faq", "will it break": "faq", "fracture": "limitations",
-    "torsion": "limitations", "3D": "faq", "GPU": "faq", "does not converge": "solving",
-    "plasticity": "plasticity", "yield": "plasticity", "creep": "plasticity",
-    "viscoelastic": "plasticity", "material": "choose", "plane strain": "choose", "rubber": "faq",
-    "earthquake": "loads", "settlement": "supports", "displacement control": "supports",
-    "symmetry": "supports", "boundary condition": "supports", "reaction": "supports",
-    "stress concentration": "supports", "point load": "loads", "distributed load": "loads",
-    "load case": "loads", "combination": "loads", "envelope": "loads", "foundation": "loads",
-    "rope": "loads", "mass": "loads", "impact": "obstacles", "belt": "obstacles",
-    "pressure": "obstacles", "contact": "contact", "joint": "joints", "rigid body": "bodies",
-    "motor": "bodies", "resonance": "control", "random vibration": "control",
-    "state space": "control", "modal analysis": "modes", "flutter": "modes",
-    "imperfection": "modes", "time step": "motion", "initial velocity": "faq",
-    "restart": "motion", "checkpoint": "motion", "parallel": "clusters", "Numba": "speed",
-    "memory": "speed", "sandwich": "sections", "laminate": "sections", "profile": "sections",
-    "IPE": "sections", "taper": "sections", "deflection": "fields", "bending moment": "fields",
-    "utilisation": "fields", "von Mises": "fields", "principal stress": "fields",
-    "section forces": "fields", "report": "report", "DXF": "frames", "Gmsh": "frames",
-    "truss": "frames", "film": "paraview", "animation": "paraview", "ParaView": "paraview",
-    "optimization": "gradients", "parameter identification": "gradients",
-    "gradient": "gradients", "quasi-static": "solving", "linear theory": "solving",
-    "mechanism": "solving", "locking": "formulations", "own element": "own",
-    "curved beam": "recipes", "arc length": "solving", "dynamics": "motion", "drop": "faq",
-    "notebook": "faq", "Pyodide": "faq", "JupyterLite": "faq",
-    "pulley": "obstacles",
-    "own material": "own"}
-
-
 @pytest.fixture(scope="module")
-def headings():
-    """From the name of a page to the stems of each of its headings."""
-    if not BUILT.exists():
-        return {page.stem: [stems(line.lstrip("# ")) for line in page.read_text(
-            encoding="utf-8").splitlines() if line.startswith("#")]
-            for page in (ROOT / "docs").glob("*.md")}
-    index = json.loads(re.fullmatch(r"Search\.setIndex\((.*)\)",
-                                    BUILT.read_text(encoding="utf-8"), re.DOTALL)[1])
-    found = {name: [] for name in index["docnames"]}
-    for title, places in index["alltitles"].items():
-        for number, _ in places:
-            found[index["docnames"][number]].append(stems(title))
-    return found
+def words():
+    """The table of docs/words.py."""
+    spec = importlib.util.spec_from_file_location("words", ROOT / "docs" / "words.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-@pytest.mark.parametrize("phrase", HEADINGS)
-def test_a_heading_answers(phrase, headings):
-    assert any(stems(phrase) <= heading for heading in headings[HEADINGS[phrase]])
+def test_headings_answer_and_are_in_the_index(words):
+    """Each phrase has a heading with its words, and an entry there that the search names first.
+    """
+    found = {}
+    if BUILT.exists():
+        index = json.loads(re.fullmatch(r"Search\.setIndex\((.*)\)",
+                                        BUILT.read_text(encoding="utf-8"), re.DOTALL)[1])
+        found = {entry: {index["docnames"][number] for number, *_ in places}
+                 for entry, places in index["indexentries"].items()}
+    for page, phrases in words.WORDS.items():
+        text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+        made = words.indexed(page, text, stems)
+        for phrase in phrases:
+            entry = rf"```{{index}}.*!{re.escape(phrase)}(?:,.*)?\n```"
+            beside = [re.search(one, made, re.MULTILINE) for one in (
+                rf"{entry}\n\n##+ (.*)$", rf"^# (.*)\n\n{entry}")]
+            assert any(stems(phrase) <= stems(one[1]) for one in beside if one), (
+                f"{page}.md has no heading with the words of {phrase!r}")
+            assert not found or page in found.get(phrase.lower(), ()), phrase
+        assert re.sub(r"```{index} .*\n```\n\n", "", made) == text
 
 
 @pytest.mark.parametrize("phrase", PHRASES)

@@ -104,8 +104,8 @@ class Domain(Immutable):
         for what, form, kind in (("residual", residual, LinearForm),
                                  ("tangent", tangent, BilinearForm), ("mass", mass, BilinearForm)):
             if not (isinstance(form, kind) or (form is None and what == "mass")):
-                hint = ("; of a linear problem with the form a(u, v) it is LinearForm(lambda v, w: "
-                        "a(w['u'], v, w))" if isinstance(form, BilinearForm) else "")
+                hint = ("; of a linear problem with the BilinearForm a it is LinearForm(lambda v, "
+                        "w: a.form(w['u'], v, w))" if isinstance(form, BilinearForm) else "")
                 raise InputError(f"{what} of a Domain is a {kind.__name__} of scikit-fem, got "
                                  f"{shown(form)}{hint}")
         self.basis, self.residual, self.tangent, self.mass = basis, residual, tangent, mass

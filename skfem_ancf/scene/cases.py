@@ -40,6 +40,17 @@ class Envelope(NamedTuple):
     greatest: dict[str, Array]
     by: dict[str, Array]
 
+    def __str__(self) -> str:
+        """The extremes of each section force, where they are, and by which combination."""
+        lines = []
+        for name in self.least:
+            for k, (what, values, of) in enumerate((("least", self.least, np.argmin),
+                                                    ("greatest", self.greatest, np.argmax))):
+                at = int(of(values[name]))
+                lines.append(f"{what} {name} {values[name][at]:.4g} at s = {self.s[at]:.4g} by "
+                             f"{str(self.by[name][k, at])!r}")
+        return "\n".join(lines)
+
 
 class LoadCases(Mapping):
     """Load cases of a scene and their combinations, solved when asked for.
@@ -197,8 +208,10 @@ class LoadCases(Mapping):
         cells = [list(rows[0])] + [[row["combination"], *(f"{value:.4g}" for value in list(
             row.values())[1:])] for row in rows]
         widths = [max(map(len, column)) for column in zip(*cells)]
-        return "\n".join("  ".join([row[0].ljust(widths[0]), *(
-            cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))]) for row in cells)
+        units = [] if self.scene._units is None else [f"in {', '.join(self.scene._units)}"]
+        return "\n".join(["  ".join([row[0].ljust(widths[0]), *(
+            cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))])
+            for row in cells] + units)
 
     def __repr__(self) -> str:
         return (f"<LoadCases {', '.join(self.cases)} in {len(self)} combinations, "
