@@ -455,9 +455,12 @@ class BodyContact(ForceElement):
 
     def loads_on(self, beam: Beam, first: int, x: Array, history: Array
                  ) -> list[tuple[int, float, Array]]:
-        """Forces on the elements of a beam, whose first DOF is given.
+        """Of each contact point, and of what it touches: element, xi, nodal force (nb, 2).
 
-        Of each contact point, and of the place that it touches: element, xi, nodal force (nb, 2).
+        Parameters
+        ----------
+        beam, first
+            The Beam of the elements, and its first DOF.
         """
         z, f, out = _complex(x, x)[0], self.search.surfaces.facets, []
         met = self._meet(z, z)
