@@ -166,11 +166,12 @@ def search_contact(contacts: Contacts, start: tuple[Array, float], t: float,
 class StiffnessRamp:
     """Stiffens soft obstacles step by step; see :func:`search_contact`."""
 
-    def __init__(self, contacts, start, t, solve, energy, respond, failed):
+    def __init__(self, contacts: Any, start: Any, t: float, solve: Any, energy: Any, respond: Any,
+                 failed: Any) -> None:
         self.contacts, self.start, self.t, self.respond = contacts, start, t, respond
         self.solve, self.energy, self.failed = solve, energy, failed
 
-    def climb(self, found, rough):
+    def climb(self, found: Any, rough: bool) -> Any:
         """The equilibrium on stiff obstacles, or the last one before a failure.
 
         ``rough``: ``found`` is one that is only a start.
