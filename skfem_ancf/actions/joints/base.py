@@ -168,7 +168,7 @@ class ComposedJoint(Joint):
 
     parts: Sequence[Equation] = ()
 
-    def parts_at(self, t: float) -> Sequence[Equation]:
+    def parts_at(self, t: float) -> Sequence[Any]:
         return self.parts
 
     def value(self, u: Array, t: float) -> Array:

@@ -265,7 +265,7 @@ class PrescribedPosition(ComposedJoint):
     def bind(self, layout: Layout) -> None:
         self.r = point(layout, self.beam, self.at)
 
-    def parts_at(self, t: float) -> Sequence[Equation]:
+    def parts_at(self, t: float) -> Sequence[Any]:
         return [Equation((self.r, n), less=n @ x) for n in np.eye(2)
                 for x in sample(self.motion, np.array([t]), "r", (2,))]
 
@@ -341,7 +341,7 @@ class PrescribedAngle(ComposedJoint):
         _, self.d = section(layout, self.beam, self.at)
         self.start = np.arctan2(*self.d.start[::-1])
 
-    def parts_at(self, t: float) -> Sequence[Equation]:
+    def parts_at(self, t: float) -> Sequence[Any]:
         return [Equation((self.d, n)) for n in self._normals(np.array([t]))]
 
     def _normals(self, times: Array) -> Array:
@@ -405,7 +405,7 @@ class PrescribedTurn(ComposedJoint):
         (_, self.d), (_, self.e) = (section(layout, *place) for place in (self.at, self.other))
         self.start = angle_to(self.d.start, self.e.start)
 
-    def parts_at(self, t: float) -> Sequence[Equation]:
+    def parts_at(self, t: float) -> Sequence[Any]:
         angle = self.start + ask_number("angle(t={:g})", self.angle, t)
         return [aligned(self.d, self.e, rotation(angle))]
 
