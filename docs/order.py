@@ -14,7 +14,7 @@ ORDER = [
     "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",
     "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "bridge_train",
     "hanging_bridge", "tuning_fork", "damping", "balanced_rod", "environment",
-    "own_law", "own_element", "fit_modulus", "uniform_stress", "uncertainty",
+    "own_law", "own_element", "fit_modulus", "uniform_stress", "designed_gripper", "uncertainty",
 ]
 
 

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 
 from skfem_ancf import (Beam, Circle, Design, EigenStrain, ElementBeamANCF, ElementBeamCable,
                         EndMoment, Energy, FollowerForce, Foundation, Frame, InputError, Item, Line,
@@ -267,6 +267,79 @@ def test_coefficients_of_functions():
         scene.solve_static().gradient(tip, [(beam, "E", lambda X, Y: 1.0)])
     with pytest.raises(InputError, match="no number, array or function of time"):
         scene.solve_static().gradient(tip, [(strain, "xx")])
+
+
+def test_heights_free_at_nodes_find_zigzags_and_few_coefficients_do_not():
+    """The least sag of a cantilever of given weight is 16/27 of that of a prism."""
+    x, mean = np.linspace(0, 1, 13), 0.02
+
+    def scene_of(h, parts=1):
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 12 * parts + 1), lambda s: np.interp(s, x, h))
+        beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3), width=0.01)
+        scene = Scene(beam).clamp("left").point_force((0, -1e-3), at=(1, 0))
+        return scene.sensor("tip", "displacement", at=(1, 0))
+
+    def hats(s):
+        return np.array([np.interp(s, np.linspace(0, 1, 6), one) for one in np.eye(6)])
+
+    prism = scene_of(mean + 0 * x)
+    sag = tip(prism.solve_static())[1]
+
+    def least(field, start, functions):
+        design = Design(Parameters(prism, [(prism.beams[0], "height", field)]), ["tip"])
+        share = functions @ np.r_[0.5, np.ones(11), 0.5] / 12
+
+        def goal(p):
+            size = share @ p
+            value, g = design.objective(lambda y: y[1] / sag)(mean * p / size - start)
+            return value, mean / size * (g - (g @ p) / size * share)
+
+        n = len(functions)
+        p = minimize(goal, np.ones(n), jac=True, bounds=[(0.15, 3)] * n,
+                     options={"maxiter": 40}).x
+        return [tip(scene_of(mean / (share @ p) * p @ functions, parts).solve_static())[1] / sag
+                for parts in (1, 4)]
+
+    claimed, true = least("nodes", 0.0, np.eye(13))
+    assert claimed < 0.9 * 16 / 27 and true > 2.0
+    claimed, true = least(hats, mean, hats(x))
+    assert 16 / 27 < claimed < 1.05 * 16 / 27 and np.isclose(claimed, true, rtol=0.03)
+
+
+def test_a_grid_of_struts_becomes_a_gripper():
+    """From a standstill: a push closes a jaw that it first opened."""
+    points = np.array([(x, y) for x in range(7) for y in range(4)])
+    lines = [(a, b) for a in range(28) for b in range(28) if tuple(points[b] - points[a]) in (
+        (1, 0), (0, 1), (1, 1), (1, -1)) and (sum(points[[a, b], 0]) <= 9 or sum(
+            points[[a, b], 1]) >= 2)]
+    used = np.unique(lines)
+    lines, points = np.searchsorted(used, lines), 0.01 * points[used]
+    push, jaw = (0, 0), (0.06, 0.01)
+
+    def grid(heights, elements=1):
+        frame = Frame.from_lines(points, lines, height=heights, width=5e-3, elements=elements,
+                                 material=StVenantKirchhoff(2e9, 0.4))
+        frame.clamp([int(np.argmin(np.hypot(*(points - [0, 0.03]).T)))])
+        frame.hold([k for k, (_, y) in enumerate(points) if y == 0.0], "y", "angle")
+        frame.spring(1e4, (push, ("ground", (-0.05, 0.0))))
+        frame.spring(2e3, (jaw, ("ground", (0.06, -0.05)))).point_force((0.02, 0.0), at=push)
+        return frame.sensor("jaw", "displacement", at=jaw)
+
+    frame = grid(0.5e-3)
+    design = Design(Parameters(frame, [(frame.beams[0], "height", "elements")]), ["jaw"])
+    n = len(lines)
+    start, goal = np.full(n, np.log(0.5e-3)), design.objective(lambda y: 1e7 * y[1])
+
+    def by_logarithms(p):
+        value, gradient = goal(np.exp(p))
+        return value, np.exp(p) * gradient
+
+    p = minimize(by_logarithms, start, jac=True, bounds=[(np.log(0.1e-3), np.log(1e-3))] * n,
+                 options={"maxiter": 12}).x
+    before, after = (design.values(np.exp(x))[1] for x in (start, p))
+    assert after < -3.0 * abs(before)
+    fine = grid(np.exp(p).tolist(), 3).solve_static().displacement(jaw)[1]
+    assert np.isclose(fine, after, rtol=1e-3)  # thicknesses within a strut cannot alternate
 
 
 def test_layers_and_their_laws_change_together():
