@@ -1,5 +1,7 @@
 """Band matrices: products, factors and solutions against dense ones, in NumPy and compiled."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,12 @@ def compiled():
     x, A = np.zeros(2), matrix(2, 1, "symmetric", 1)[1]
     found = [entry(f, (A, *args)) for f, *args in (
         (band_product, x, x), (band_factors,), (band_solution, x))]
-    return [lambda A, *args, run=run: run(Words(A).address, *args) for run in found]
+
+    def called(run, A, *args):
+        words = Words(A)  # lives as long as the call: the kernel gets an address only
+        return run(words.address, *args)
+
+    return [partial(called, run) for run in found]
 
 
 def band_product(A, x, y):
