@@ -404,6 +404,68 @@ def test_section_forces_know_where_a_custom_item_acts(what, known):
         assert one.recovered == other.recovered
 
 
+class Profile(Item):
+    """The end slides along y = f(x), which is straight at first."""
+
+    moving = False
+
+    def __init__(self, profile):
+        self.profile = profile
+
+    def bind(self, layout):
+        bound = super().bind(layout)
+        bound.r = point(layout, 0, (1.0, 0.0))
+        return bound
+
+    def constraint(self, u, t):
+        x, y = self.r(u) - self.r.start
+        return np.array([y - self.profile(x)])
+
+
+class ProfileJoint(Joint):
+    equations, constant = ("force normal to the profile",), False
+
+    def __init__(self, profile):
+        self.profile = profile
+
+    def bind(self, layout):
+        self.r = point(layout, 0, (1.0, 0.0))
+
+    def value(self, u, t):
+        x, y = self.r(u) - self.r.start
+        return np.array([y - self.profile(x)])
+
+    def curvature(self, u, t, multipliers):
+        x, h = (self.r(u) - self.r.start)[0], 1e-4
+        second = (self.profile(x + h) - 2.0 * self.profile(x) + self.profile(x - h)) / h**2
+        a = self.r.row((1.0, 0.0), len(u))
+        k = np.flatnonzero(a)
+        K = -multipliers[0] * second * np.outer(a[k], a[k])
+        return np.repeat(k, len(k)), np.tile(k, len(k)), K.ravel()
+
+
+def rising_from(x0):
+    return lambda x: 5.0 * np.where(np.real(x) > x0, x - x0, 0.0 * x) ** 2
+
+
+def bump(x):
+    inside = (np.real(x) > 0.1) & (np.real(x) < 0.3)
+    return np.where(inside, 0.5 * (1.0 - np.cos(10.0 * np.pi * (x - 0.1))), 0.0 * x) * 0.02
+
+
+@pytest.mark.parametrize("kind", [Profile, ProfileJoint])
+@pytest.mark.parametrize("profile, x", [(rising_from(0.05), 0.1), (rising_from(0.3), 0.35),
+                                        (bump, 0.2)])
+def test_a_profile_may_be_straight_at_first(kind, profile, x):
+    """A constraint is not taken for linear because it is so about the reference configuration."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 9), height=0.02), ElementBeamCable(3),
+                MATERIAL, width=0.02)
+    scene = Scene(beam).clamp("left").add(kind(profile)).fix(
+        "right", "r^1", displacement=lambda t: x * t)
+    assert_allclose(scene.run(1.0, increments=8).displacement((1.0, 0.0))[-1], [x, profile(x)],
+                    rtol=0, atol=1e-9)
+
+
 @pytest.mark.filterwarnings("ignore:a support moves")
 def test_a_joint_with_friction_is_one_class():
     """A bar to and fro on a rail: friction is all that the cycle of its end loses."""

@@ -530,6 +530,32 @@ def at_generic_displacements(check: Callable[[Array, Array], None], sizes: Array
         check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))
 
 
+#: Multiples of a displacement of the size of a scene at which a function is compared with a table:
+#: a profile may be straight at first, have a bump, or rise only far away.
+ALONG = np.concatenate([s * np.append(np.linspace(0.01, 1.0, 100), (2.0, 4.0, 10.0))
+                        for s in (1.0, -1.0)])
+#: Relative difference from a table that is round-off.
+CLOSE = 1e-9
+
+
+def everywhere(sizes: Array) -> Array:
+    """A displacement (N,) that is about as large as the sizes in each component."""
+    rng = np.random.default_rng(0)
+    return sizes * rng.uniform(0.5, 1.5, len(sizes)) * rng.choice((-1.0, 1.0), len(sizes))
+
+
+def is_table(value: Callable[[Array, float], Array], u: Array,
+             table: Callable[[float, float], Array], sizes: Array) -> bool:
+    """True if ``value(s u, t)`` is ``table(s, t)`` along a displacement u (N,), of sizes (m,)."""
+    try:
+        with np.errstate(all="ignore"):
+            return all(np.all(np.abs(value(s * u, t) - table(s, t))
+                              <= CLOSE * sizes * max(1.0, s * s))
+                       for k, s in enumerate(ALONG) for t in ((0.0, 0.37)[k % 2],))
+    except Exception:  # it may not be defined there
+        return False
+
+
 # user-defined items
 
 class UserForce(BoundForce):
@@ -630,14 +656,9 @@ class UserConstraint(BoundConstraint):
         m = len(require_finite(f"constraint(u, t) of {item!r}", value, (None,)))
         self.equations = tuple(f"equation {k}" for k in range(m))
         J = require_finite(f"jacobian(u, t) of {item!r}", self.jacobian(zero, 0.0), (m, layout.N))
-        # as of a joint: does it depend on displacement or time?
-        u = 0.1 * layout.sizes * np.cos(1.0 + np.arange(layout.N))
-        try:
-            changes = [np.abs(self.jacobian(s * u, t) - J) for s, t in ((1.0, 0.37), (-0.7, 1.0))]
-            self.constant = bool(np.max(changes) <= ROUND_OFF * np.abs(J).max())
-        except Exception:  # it may not be defined there
-            self.constant = False
-        self.tabled = self.constant or hasattr(item, "jacobian")  # second derivatives are exact
+        u = everywhere(layout.sizes)
+        self.constant = self.tabled = is_table(
+            self.value, u, lambda s, t: self.value(zero, t) + s * (J @ u), np.abs(J) @ np.abs(u))
         at_generic_displacements(partial(require_derivatives, self, layout.sizes), layout.sizes)
 
     def value(self, u: Array, t: float) -> Array:

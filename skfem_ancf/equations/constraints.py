@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..actions.bound import BoundConstraint
+from ..actions.bound import BoundConstraint, everywhere, is_table
 from ..actions.joints.base import IndependentPart, UnitDirector
 from ..actions.joints.nodes import COMPONENTS, Nodes
 from ..beam.beam import Beam
@@ -244,7 +244,15 @@ class Constraints:
             if not (np.all(np.abs(offset + 0.5 * (J + slope) @ u - phi) <= 1e-9 * of_equations)
                     and (abs(gap) @ sizes <= 1e-9 * (abs(J) @ sizes)).all()):
                 return False
-        return True
+
+        def quadratic(s: float, t: float) -> Array:
+            offset = np.concatenate([one.offset(np.array([t]), self.N)[0] for one in self.joints])
+            J = self._to_sparse(*self._slopes_at(t))
+            return offset + s * (J @ d) + 0.5 * s * s * np.bincount(k, v * d[i] * d[j], self.m)
+
+        d = everywhere(sizes)
+        return is_table(lambda u, t: np.concatenate([one.value(u, t) for one in self.joints]), d,
+                        quadratic, of_equations)
 
     @cached_property
     def _still(self):
