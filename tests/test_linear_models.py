@@ -76,6 +76,18 @@ def test_modes_with_the_static_response_of_the_others():
     assert left[0] < 0.05 and left[1] < 0.2 * left[0] and left[2] < 0.2 * left[1]
 
 
+def test_frequency_response_by_modes():
+    """Beside the closed form, with damping; a moment beside the direct one."""
+    scene = cantilever().damping(mass=0.3, stiffness=2e-3).sensor("M", "M", at=(0.1, 0))
+    load, omega = [PointForce((0, 1), at=(1, 0))], OMEGA[:4]
+    exact = np.array([receptance(w, 2e-3, 0.3) for w in omega])
+    found = scene.frequency_response(omega, load, modes=10)
+    assert np.allclose(found.of("tip 1"), exact, rtol=1e-4, atol=0.0)
+    direct = scene.frequency_response(omega, load)
+    assert found.inputs == direct.inputs and found.outputs == direct.outputs
+    assert np.allclose(found.of("M"), direct.of("M"), rtol=3e-3)
+
+
 def test_joints_are_eliminated():
     a, b = strip(6, 0.0, 0.5, "a"), strip(6, 0.5, 1.0, "b")
     scene = Scene(a, b).clamp("left", a).sensor("tip", "displacement", at=(1, 0), beam=b)

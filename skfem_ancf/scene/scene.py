@@ -543,7 +543,8 @@ class Scene(Model):
 
     def frequency_response(self, frequencies: ArrayLike, inputs: Sequence[Any],
                            outputs: Sequence[str | Sensor] | None = None,
-                           about: State | None = None) -> FrequencyResponse:
+                           about: State | None = None, modes: int | None = None
+                           ) -> FrequencyResponse:
         """The response to harmonic inputs, with the damping of the scene.
 
         Parameters
@@ -552,8 +553,11 @@ class Scene(Model):
             Angular frequencies in rad/s, shape (n,).
         inputs, outputs, about
             As for :meth:`linearize`; ``about`` is the state.
+        modes
+            Superpose this number of lowest modes and the static response of all others; by default
+            the response is direct, one factorisation for each frequency.
         """
-        return self.linearize(about, inputs, outputs).frequency_response(frequencies)
+        return self.linearize(about, inputs, outputs).frequency_response(frequencies, modes)
 
     def initial_velocity(self, v: ArrayLike | Callable[[Array], Array],
                          beam: WhichMember = None) -> Self:
