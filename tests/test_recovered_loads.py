@@ -7,7 +7,9 @@ from skfem import LinearForm
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf.beam.distribution import Distribution
 from skfem_ancf.core.quadrature import gauss
+from skfem_ancf.recovery.section_forces import SectionForces
 
 E, NU, RHO, H, B, G = 2e8, 0.3, 7800.0, 0.01, 0.02, 9.81
 ELEMENTS = [ElementBeamANCF(2), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]
@@ -158,3 +160,14 @@ def test_section_force_of_a_damped_beam_is_that_of_the_part_behind_it(element):
         total -= weight * RHO * B * H / 8 * np.sum(w * (a + alpha * v), axis=(1, 2))
     total += [0.0, -G * RHO * B * H / 2]
     assert_allclose(state.resultants((0.5, 0)).force, total, atol=1e-4 * np.abs(total).max())
+
+
+def test_what_touches_a_beam_a_little_beyond_its_end_acts_there():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), ElementBeamANCF(2),
+                StVenantKirchhoff(E=1e6, nu=0.0), width=0.1)
+    state = Scene(beam).clamp("left").point_force((3.0, 0.0), at=(1, 0)).solve_static()
+    found = SectionForces(beam, state.u, [(1.0, Distribution(stations=(4.1,)))], stations=(-0.1,))
+    assert found.cuts.tolist() == [0.0, 4.0]
+    R, M = found.at(np.array([2]), np.array([0.3]), np.zeros(1))
+    assert_allclose(R[:, 0], [3.0, 0.0], atol=1e-8)
+    assert abs(M[0]) < 1e-8

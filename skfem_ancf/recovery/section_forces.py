@@ -458,7 +458,9 @@ class SectionForces:
     def _cut(self, loads, stations):
         mesh, across = self.beam.mesh, self.beam.across
         ne = mesh.nelements
-        stations = list(stations) + [s for _, load in loads for s in load.stations]
+        # what touches an end may do so a little beyond it
+        stations = np.clip([*stations, *(s for _, load in loads for s in load.stations)],
+                           0.0, ne).tolist()
         self._acted = _snapped(stations)
         begins, ends = np.zeros((2, mesh.p.shape[1]), dtype=bool)
         begins[mesh.t[0]], ends[mesh.t[1]] = True, True
