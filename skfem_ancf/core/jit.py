@@ -95,6 +95,8 @@ def _register_apart(function, found):
 
 
 #: Addresses of the functions that compiled code calls by address, or 0, in arrays of one number.
+#: Code on disk finds them by name: Numba has no public way to a global of the process, so their
+#: names are given to LLVM by the documented functions of llvmlite.
 _CELLS: dict[Any, Any] = {}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..actions.contact.tables import is_clear
 from ..actions.tables import add_constraint_rate
-from ..core.band import dot, largest, multiply, solve_definite
+from ..core.band import add_multiple, dot, largest, multiply, solve_definite
 from ..core.callbacks import call_solver
 from ..core.source import F1, MADE, apart, indices, source
 from ..core.types import Array
@@ -133,15 +133,12 @@ def equilibrium(e, target, rules, factors, g, x, m, stresses, record):
         if not work < 1e300:
             return SINGULAR, k + 1, k, False
         if moving:
-            for i in indices(u.size):
-                du[i] += moved[i]
+            add_multiple(1.0, moved, du)
         elif e.forces.contacts.number > 0 or e.forces.changing > 0:
             hold_back(e, target.at, loose, u, R, du, dm)
         moving = False
-        for i in indices(u.size):
-            u[i] += du[i]
-        for i in indices(dm.size):
-            multipliers[i] += dm[i]
+        add_multiple(1.0, du, u)
+        add_multiple(1.0, dm, multipliers)
         reference = np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
         works[k] = work / reference if reference > 0.0 else 0.0
         k += 1
