@@ -158,6 +158,30 @@ def _loads(dice, n, size, wild):
     return out
 
 
+def draw_leaves(dice):
+    """The script of beams that lie on each other, or a gap apart, and are pressed together."""
+    n, y, lines = dice.choice((2, 2, 3)), 0.0, []
+    E = dice.choice((1e3, 1e6, 2e11))
+    heights = [dice.choice((0.01, 0.02, 0.05)) for _ in range(n)]
+    for k, h in enumerate(heights):
+        y -= 0.5 * (h + heights[k - 1]) + h * dice.choice((0.0, 0.0, 0.001, 0.1)) if k else 0.0
+        element = dice.choice(("ElementBeamCable(3)", "ElementBeamCable(5)", "ElementBeamANCF(2)",
+                               "ElementBeamANCFCubic(1)"))
+        law = "StVenantKirchhoff" if "Cable" in element else dice.choice(
+            ("StVenantKirchhoff", "NeoHookean"))
+        lines += [f"mesh{k} = MeshBeam.init_line(np.linspace(0, {dice.number(0.5, 1.0)}, "
+                  f"{dice.integer(4, 10)}), {h}, origin=(0.0, {y}))",
+                  f"beam{k} = Beam(mesh{k}, {element}, {law}({E}, {dice.choice((0.0, 0.3))}), 0.1, "
+                  f"name='b{k}', compiled=COMPILED)"]
+    lines.append(f"scene = Scene({', '.join(f'beam{k}' for k in range(n))})")
+    lines += [f"scene.clamp('left', beam=beam{k}, thickness='free')" for k in range(n)]
+    lines.append(f"scene.contact('all', friction={dice.choice((0.0, 0.0, 0.3))})")
+    P = float(f"{dice.number(0.02, 1.0) * E * 0.1 * min(heights) ** 3 / 4:.3g}")
+    lines.append(dice.choice((f"scene.point_force((0.0, {-P}), at='right', beam=beam0)",
+                              f"scene.line_load((0.0, {-2 * P}), beam=beam0)")))
+    return "\n".join([*lines, "options = {}", ""])
+
+
 def draw(dice):
     """The script of a scene: it makes ``scene`` and ``options``; COMPILED is given to it."""
     n = dice.choice((1,) * 6 + (2,) * 3 + (3,))
@@ -179,6 +203,8 @@ def draw(dice):
     options = {"method": "newton"} if dice.integer(0, 7) == 0 else {}
     if dice.integer(0, 7) == 0:
         options["first_step"] = 0.25
+    if dice.integer(0, 9) == 9:  # drawn last: the others stay as they are
+        return draw_leaves(dice)
     return "\n".join(lines + [f"options = {options}", ""])
 
 
@@ -361,6 +387,10 @@ def check(scene, state, tol=1e-5):
                     * beam.width * beam.mesh.height:
                 raise Wrong("the textbook's form gives another force")
     external = external_force(system, u) * state.load
+    touching = bool(state._equations.forces.changing)
+    if touching:
+        check_contact(system, state, force)
+        force = state.internal_force
     R = external - force - state.multipliers @ system.constraints.full_jacobian(u, state.load)
     K = tangent(bodies, state)
     scale = 1.0 / np.maximum(np.abs(np.diag(K)), 1e-300)
@@ -375,7 +405,38 @@ def check(scene, state, tol=1e-5):
     held = u[system.constraints.fixed] - system.constraints.values(state.load)
     if np.max(np.abs(held), initial=0.0) > 1e-12 * system.size:
         raise Wrong("a support is not where it should be")
-    return _stability(system, state, K, scale)
+    return "in contact" if touching else _stability(system, state, K, scale)
+
+
+def check_contact(system, state, internal):
+    """Contact of the beams: its resultants, which are those of all forces, gaps and friction."""
+    both = state.contact()
+    if len(both) == 0:
+        return
+    size, friction = np.max(np.abs(both.force)), max(one.friction for one, _ in
+                                                     state._equations.forces.changing)
+    if np.any(both.pressure < 0.0) or np.max(np.abs(both.total)) > 1e-9 * size:
+        raise Wrong("bodies pull each other, or actio is not reactio")
+    faces, most = [], max(np.max(beam.mesh.lengths) for beam in system.beams)
+    for k, (beam, s) in enumerate(zip(system.beams, system.slices)):
+        force = (state.internal_force[s] - internal[s]).reshape(-1, beam.nd // 2, 2)[:, 0]
+        if np.max(np.abs(force.sum(axis=0) + state.contact(on=k).total)) > 1e-6 * size:
+            raise Wrong(f"the nodal forces of contact on beam {k} are not those of its points")
+        x = np.linspace(0.0, beam.mesh.lengths.sum(), 2000)
+        h, y = 0.5 * beam.mesh.height, beam.mesh.p[1, 0]
+        faces.append(np.hstack([state.position(np.array([x, 0 * x + y + side * h]), k)
+                                for side in (-1, 1)]))
+    for k in range(len(faces)):
+        on = state.contact(on=k)
+        others = np.hstack([one for j, one in enumerate(faces) if j != k])
+        for x, gap in zip(on.points.T, on.gap):
+            least = np.min(np.hypot(*(others - x[:, None])))
+            # faces go on by a hundredth of an element beyond their ends
+            if abs(least - abs(gap)) > 0.011 * most + 0.01 * system.beams[k].mesh.height:
+                raise Wrong(f"a gap is {gap:.3g}, and the nearest surface {least:.3g} away")
+        normal = on.pressure.max() if len(on) else 0.0
+        if friction == 0.0 and normal and np.any(on.sticking):
+            raise Wrong("points stick without friction")
 
 
 def verdict_of(system, state, K, scale):

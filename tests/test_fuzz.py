@@ -71,6 +71,15 @@ def test_a_wrong_equilibrium_is_seen(formulation):
         fuzz.check(scene, state)
 
 
+def test_leaves_that_touch_are_checked():
+    """They are in equilibrium, and a displacement that is none is seen."""
+    script = fuzz.draw_leaves(fuzz.Dice((7, 2)))
+    assert "contact" in script and fuzz.run(script) == ("in contact", "")
+    scene, state, _ = fuzz.solve(script, False)
+    with pytest.raises(fuzz.Wrong):
+        fuzz.check(scene, state.replace(u=state.u * (1 + 1e-3)))
+
+
 @pytest.mark.parametrize("load, verdict", [("(-0.14, 0.0)", "stable"), ("(-0.2, 0.0)", "unstable")])
 def test_the_dense_tangent_is_the_derivative_and_knows_euler(load, verdict):
     """Against the package's tangent at any displacement; P_cr = pi^2 E I / (4 L^2) = 0.164."""

@@ -12,7 +12,7 @@ from ..core.archive import output_file
 from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
                            require_like, require_path, require_positive, require_text, shown)
 from ..core.types import StrPath
-from .matplotlib import FLAT, colormap, colour_bar, figure_class, paint, plain
+from .matplotlib import FLAT, colormap, colour_bar, dress, figure_class, paint
 from .scenery import INK, MUTED, Scenery
 
 SUFFIXES = (".gif", ".mp4")
@@ -121,12 +121,12 @@ def _frames(scenery: Scenery, t: Any, size: Any, cmap: Any, unit: str | None) ->
     if size is None:  # no white bands; a flat picture has its colours below
         aspect = (y1 - y0 + 0.08 * (x1 - x0)) / max(x1 - x0, 1e-300)
         wide = 680 if aspect < FLAT else 620
-        size = 800, int(np.clip(wide * aspect + (190 if aspect < FLAT else 90), 240, 900)) // 2 * 2
+        size = 800, int(np.clip(wide * aspect + (140 if aspect < FLAT else 105), 200, 900)) // 2 * 2
     figure = figure_class()(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, layout="constrained")
     canvas, ax, field = FigureCanvasAgg(figure), figure.add_subplot(), scenery.field
     margin = 0.04 * max(x1 - x0, y1 - y0)
     ax.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), aspect="equal")
-    plain(ax)
+    dress(ax, None, "", scenery.length)
     image, artists = paint(ax, scenery, [0], cmap)
     if image is not None:
         colour_bar(ax, image, "neither", scenery.label(field.symbol, unit))
