@@ -192,10 +192,6 @@ class BodyContact(ForceElement):
 
     # states
 
-    def _touch(self, z):
-        """True if there are pairs in contact."""
-        return len(self.search.touching(z).p) > 0
-
     def _meet(self, z0, z1):
         """The :class:`Meeting` between two states, which may be the same array."""
         search, S = self.search, self.search.surfaces
@@ -275,16 +271,12 @@ class BodyContact(ForceElement):
                  ) -> tuple[Array, Array]:
         """The force, and the history after an increment."""
         z = _complex(x, x)[0]
-        if not self._touch(z):
-            return np.zeros(x.shape), np.append(history[:1], np.zeros(len(history) - 1))
         met = self._meet(z, z)
         return self._spread(met, self._forces(met, z, z, history)), self._after(met, z, history)
 
     def mean(self, x: Array, y: Array, t: float, history: Array, dt: float) -> Array:
         """The mean force of a step from x to y, with exact work."""
         z0, z1 = _complex(x, y)
-        if not (self._touch(z0) or self._touch(z1)):
-            return np.zeros(x.shape)
         met = self._meet(z0, z1)
         return self._spread(met, self._forces(met, z0, z1, history))
 
@@ -305,8 +297,6 @@ class BodyContact(ForceElement):
 
     def potential(self, x: Array, *past: Any) -> float:
         z = _complex(x, x)[0]
-        if not self._touch(z):
-            return 0.0
         met, w = self._meet(z, z), self.width
         a = met.before
         S = (np.maximum(a, 0.0) ** 3 - np.maximum(a - w, 0.0) ** 3) / (6.0 * w)
@@ -317,8 +307,6 @@ class BodyContact(ForceElement):
 
     def mean_stiffness(self, x: Array, y: Array, t: float, *past: Any) -> Any:
         (z0, z1), n = _complex(x, y), 2 * len(self.dofs)
-        if not (self._touch(z0) or self._touch(z1)):
-            return sparse.csr_array((n, n))
         met = self._meet(z0, z1)
         pairs, middle = met.pairs, 0.5 * (z0 + z1)
         k, a, b, w = self._stiff(pairs, past[0]), met.before, met.after, self.width
@@ -334,7 +322,7 @@ class BodyContact(ForceElement):
             by = (twice * rub.sticks * rub.stiffness)[:, None] * S - (
                 self.friction * np.sign(rub.force) * (1.0 - rub.sticks) * slope)[:, None] * G
             K -= S[:, :, None] * by[:, None]
-        at = (2 * pairs.dofs[:, :, None] + np.arange(2)).reshape(len(G), -1)
+        at = (2 * pairs.dofs[:, :, None] + np.arange(2)).reshape(G.shape)
         i, j = np.broadcast_arrays(at[:, :, None], at[:, None])
         return sparse.csr_array((K.ravel(), (i.ravel(), j.ravel())), shape=(n, n))
 
