@@ -115,6 +115,19 @@ def test_section_forces_of_members_that_touch(element):
     assert state.resultants((0.0, -h), 1).M == pytest.approx(-push * a, rel=5e-3)
 
 
+@pytest.mark.parametrize("element", [ELEMENTS[2], ElementBeamANCF(3)], ids=repr)
+def test_section_forces_of_leaves_that_touch_at_their_ends(element):
+    """Each carries half; the points that touch are next to the ends, some just beyond."""
+    h, L, F = 0.01, 0.5, 20.0
+    scene = Scene(*(line(L, 8, h, (0.0, -k * h), element) for k in range(2))).contact("all")
+    scene.clamp("left", 0).clamp("left", 1)
+    state = scene.point_force((0.0, -F), at="right", beam=0).solve_static()
+    for x in (0.03, 0.31):
+        forces = [state.resultants((x, -k * h), k).force for k in range(2)]
+        assert_allclose(np.array(forces)[:, 1], -F / 2, rtol=0.02)
+        assert_allclose(np.sum(forces, axis=0), [0.0, -F], atol=1e-6 * F)
+
+
 @pytest.mark.parametrize("element", [*ELEMENTS[1:], ElementBeamANCF(3)], ids=repr)
 @pytest.mark.parametrize("n", [2, 3])
 def test_leaves_without_friction_are_so_many_springs(n, element):

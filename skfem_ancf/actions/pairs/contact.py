@@ -456,7 +456,7 @@ class BodyContact(ForceElement):
         nodes, B = beam.mesh.t[0] * (nb // 2) + first // 2, pairs.weights[0].shape[1]
         for e, zeta, part in ((f.of[pairs.p], f.zeta[pairs.p], rows[:, :B]),
                               (pairs.e, pairs.zeta, rows[:, B:])):
-            xi = 0.5 + 0.5 * np.where(f.spans[e] > 0.0, zeta, -f.sides[e])  # or of an end
+            xi = 0.5 + 0.5 * np.clip(np.where(f.spans[e] > 0.0, zeta, -f.sides[e]), -1.0, 1.0)
             for k, node in enumerate(self.dofs[f.dofs[e, 0]]):
                 out += [(n, float(xi[k]), _plane(part[k, :nb]).T)
                         for n in np.flatnonzero(nodes == node).tolist()]
