@@ -11,7 +11,7 @@ ORDER = [
     "clip_strength", "bow", "soft_finger", "compliant_gripper", "live_view",
     "frame", "portal",
     "cylinder", "pipe_laying", "capstan", "wiper_blade", "ring",
-    "column", "beam_on_bedding", "magnetic_rod", "shallow_arch",
+    "column", "beam_on_bedding", "magnetic_rod", "shallow_arch", "bistable_switch",
     "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "bridge_train",
     "hanging_bridge", "tuning_fork", "damping", "balanced_rod", "environment",
     "own_law", "own_element", "fit_modulus", "uniform_stress", "designed_gripper", "uncertainty",

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from skfem_ancf import (Beam, BucklingLoad, CriticalLoad, Design, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, Frequency, InputError, MeshBeam,
-                        Parameters, RigidBody, Scene, StVenantKirchhoff, Weight)
+                        Parameters, RigidBody, Scene, StabilityWarning, StVenantKirchhoff,
+                        Weight)
 from tests.test_design import agree, beam_of, difference
 
 S = np.linspace(0, 1, 5)
@@ -146,6 +148,28 @@ def test_limit_point_of_an_arch():
     agree(design, p)
     # the load of the snap is proportional to the modulus
     assert np.allclose(relative(design, p)[0, [0, 3]], [1.0, -1.0], atol=1e-6)
+
+
+def test_a_bistable_switch_with_a_prescribed_snap_force():
+    """An arch of given rise is made to snap at a load; it carries less and holds beyond."""
+    rise = 0.065
+
+    def build(p, share=1.0):
+        mesh = MeshBeam.init_curve(lambda s: np.array([s, rise * np.sin(np.pi * s)]),
+                                   np.linspace(0, 1, 7), 0.01 * p[0])
+        scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e6, 0.3), width=0.02))
+        return scene.pin("left").pin("right").point_force((0, -0.2 * share), at=(0.5, rise))
+
+    snap = CriticalLoad(ds=0.03, steps=40, until=lambda point: point.negative > 0)
+    design = Design(build, [snap])
+    found = least_squares(lambda p: design.values(p) - 1.0, [1.5], design.jacobian, xtol=1e-12)
+    assert abs(found.fun[0]) < 1e-6 and found.nfev < 20
+    states = [build(found.x, 0.98).solve_static()]
+    with pytest.warns(StabilityWarning, match="loses its stability"):
+        states.append(build(found.x, 1.02).solve_static())
+    states.append(build(found.x, 0.0).solve_static(start=states[1]))
+    up, through, rest = (state.displacement((0.5, rise))[1] / rise for state in states)
+    assert up > -0.5 > -1.5 > through and rest < -1.5 and states[2].stability == "stable"
 
 
 def test_bifurcation_of_a_column():
