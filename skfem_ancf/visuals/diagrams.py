@@ -125,21 +125,14 @@ def _over_length(axes, state, beams, recover):
         ax.set_ylabel(label + (f" ({unit_of_resultant(name, units)})" if units else ""),
                       fontsize=9, color=INK)
         ax.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
-        _clear_of_noise(ax)
+        size = max(map(abs, ax.get_ylim()))
+        if size < 1e-9 * max(max(map(abs, other.get_ylim())) for other in ax.figure.axes):
+            ax.set_ylim(-1.0, 1.0)  # round-off about zero is not to be seen
         plain(ax)
     axes[2].set_xlabel("arc length $s$" + (f" ({units[1]})" if units else ""), fontsize=9,
                        color=INK)
     if several:
         axes[0].legend(fontsize=8, frameon=False)
-
-
-def _clear_of_noise(ax):
-    """Set limits such that round-off about zero is not visible."""
-    low, high = ax.get_ylim()
-    size = max(abs(low), abs(high))
-    others = [max(map(abs, other.get_ylim())) for other in ax.figure.axes if other is not ax]
-    if size < 1e-9 * max(others, default=0.0):
-        ax.set_ylim(-1.0, 1.0)
 
 
 def lines_of(state: Any, beams: Any, recover: bool = True) -> list[Any]:

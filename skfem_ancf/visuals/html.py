@@ -41,16 +41,12 @@ def scene_html(scene: Any) -> str:
     rows += [("rigid body", b) for b in scene.bodies]
     rows += [("domain", d) for d in scene.domains]
     rows += [("item", one) for one in scene.items]
-    table = "".join(f"<tr><td>{kind}</td><td>{html.escape(_short(thing))}</td></tr>"
-                    for kind, thing in rows)
+    texts = [(kind, " ".join(repr(thing).split())) for kind, thing in rows]
+    table = "".join(f"<tr><td>{kind}</td><td>" + html.escape(
+        text if len(text) <= 160 else text[:157] + "...") + "</td></tr>" for kind, text in texts)
     return (_words(repr(scene)[1:-1]) + f"<table>{table}</table>"
             + picture(lambda: scene.state().plot("displacement", colorbar=False, title="",
                                                   cmap="Greys")))
-
-
-def _short(thing: Any) -> str:
-    text = " ".join(repr(thing).split())
-    return text if len(text) <= 160 else text[:157] + "..."
 
 
 def path_html(path: Any) -> str:

@@ -16,8 +16,8 @@ from ..core.errors import (InputError, MissingExtra, require_flag, require_integ
                            require_option, require_path, require_positive, require_text)
 from ..core.types import StrPath
 from ..recovery.fields import FIELDS, unit_of, units_of
-from .scenery import (BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, layers_of,
-                      rounded)
+from ..recovery.grids import layout
+from .scenery import BODIES, GHOST, INK, MUTED, RIGID, WALL, WIDE, Scenery, rounded
 from .symbols import LOAD, Sketch, symbols_of
 
 #: Largest resolution of a file, in dots per inch.
@@ -232,12 +232,14 @@ def _materials(ax, scenery, beams, subdivide, inside):
     if not colours:
         return
     for body, beam in zip(scenery.frames[0], beams):
-        which, layers = layers_of(beam, subdivide), beam.across.layers
-        for k, layer in enumerate(layers):
+        X, cells = layout(beam, *subdivide)
+        which = np.broadcast_to(beam.across.which(np.mean(X[..., cells], axis=-1)), (
+            beam.mesh.nelements, len(cells))).ravel()  # the layer of each quad
+        corners = body.points(body.reference, scenery.factor).reshape(2, -1).T[body.cells]
+        for k, layer in enumerate(beam.across.layers):
             colour = colours[_law(layer.material)]
-            ax.add_collection(PolyCollection(
-                body.cells_of(which == k, scenery.factor), facecolor=colour, edgecolor=colour,
-                linewidth=0.3, zorder=1.2, gid="layer"))
+            ax.add_collection(PolyCollection(corners[which == k], facecolor=colour, linewidth=0.3,
+                                             edgecolor=colour, zorder=1.2, gid="layer"))
     ax.legend(handles=[Patch(facecolor=colour, edgecolor=INK, linewidth=0.5, label=text)
                        for text, colour in colours.items()],
               fontsize=8, frameon=False, **({} if inside else {
@@ -271,7 +273,8 @@ def paint(ax: Any, scenery: Scenery, frames: Sequence[int], cmap: Any,
     from matplotlib.tri import Triangulation
 
     ghosts = scenery.outlines(0, True) if scenery.undeformed else []
-    rigid = [line for k in frames for line in scenery.rigid_outlines(k)]
+    rigid = [cell for k in frames for grid in scenery.rigid[k]
+             for cell in (grid.x + grid.u).T[grid.cells]]
     edges = [np.vstack([line, line[:1]]) for k in frames for line in scenery.outlines(k)]
     walls = np.concatenate([scenery.walls[k] for k in frames])
     image, artists = None, []

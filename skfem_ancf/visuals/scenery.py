@@ -16,7 +16,7 @@ from ..core.errors import (AncfError, InputError, require_finite_scalar, require
 from ..core.types import Array
 from ..recovery.fields import (DRAWN, Field, find_field, no_value, unit_of, units_of,
                                values_on_grid)
-from ..recovery.grids import Grid, grids, in_space, layout
+from ..recovery.grids import Grid, grids, in_space
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
@@ -67,18 +67,6 @@ class _Body:
             out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
                                   run[:, 0, -2:0:-1]]).T)
         return out
-
-
-    def cells_of(self, which, factor):
-        """Corners (n, 4, 2) of the quads that ``which`` names, of the reference configuration."""
-        return self.points(self.reference, factor).reshape(2, -1).T[self.cells[which]]
-
-
-def layers_of(beam: Any, subdivide: tuple[int, int]) -> Array:
-    """The number of the layer of each quad of a beam, shape (nc,)."""
-    X, cells = layout(beam, *subdivide)
-    which = beam.across.which(np.mean(X[..., cells], axis=-1))
-    return np.broadcast_to(which, (beam.mesh.nelements, len(cells))).ravel()
 
 
 class _Solid:
@@ -265,10 +253,6 @@ class Scenery:
         """Closed lines around the beams of frame ``k``, shapes (n, 2), deformed or not."""
         return [line for b in self.frames[k] for line in b.outline(
             b.reference if undeformed else b.deformed, self.factor)]
-
-    def rigid_outlines(self, k: int) -> list[Array]:
-        """Corners of the rigid bodies of frame ``k``, shapes (n, 2)."""
-        return [cell for g in self.rigid[k] for cell in (g.x + g.u).T[g.cells]]
 
     def cells(self, frames: Iterable[int] = (0,)) -> Array:
         """Quads of the beams of frames, as rows of points, (nc, 4)."""
