@@ -76,6 +76,22 @@ def test_motor_follows_its_input():
     assert np.allclose(stepper.state.position((1, 0)), history.position((1, 0))[-1], atol=1e-9)
 
 
+def test_the_caller_may_use_its_array_of_inputs_again():
+    """A motion starts from the last value, not from what the array holds now."""
+    beam = scene_of().beams[0]
+
+    def stepper():
+        scene = Scene(beam).pin("left")
+        return scene.stepper(DT, {"angle": scene.motor((0, "left"), angle=lambda t: 0.0)})
+
+    one, other, again = stepper(), stepper(), np.zeros(1)
+    for k in range(20):
+        again[0] = 1e-4 * (k + 1)**2
+        one.step(again)
+        other.step([1e-4 * (k + 1)**2])
+    assert np.array_equal(one.u, other.u)
+
+
 def _parts(t):
     """Piecewise linear through the squares."""
     k = int(min(t / DT + 1e-9, 99))

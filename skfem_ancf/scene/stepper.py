@@ -165,9 +165,12 @@ class Stepper:
         ConvergenceError
             If the step fails, halved steps too; the stepper stays where it was.
         """
-        given, first, values = np.atleast_1d(require_finite("inputs", inputs)), 0, []
+        plain = type(inputs) is np.ndarray and inputs.dtype == float and np.isfinite(inputs).all()
+        given = np.atleast_1d(inputs if plain else require_finite("inputs", inputs))  # 10 us less
+        first, values = 0, []
         for one in self._held:
-            values.append(given[first:first + one.first.size].reshape(one.first.shape))
+            # a copy: the caller may use the array again
+            values.append(given[first:first + one.first.size].reshape(one.first.shape).copy())
             first += one.first.size
         if given.shape != (first,):
             raise InputError(f"inputs must have the shape ({first},) of {self.inputs}, got "
