@@ -111,7 +111,7 @@ WRONG = [
     (lambda: clamped().load(LinearForm(lambda v, w: np.nan * v[0])), "force of .*FormLoad.* NaN"),
     (lambda: clamped().load(LinearForm(lambda v, w: np.nan * w.r[0] * v[0])), "FormLoad.* NaN"),
     (lambda: clamped().sensor("grows", lambda s: np.zeros(round(1 + 1e3 * s.t))).integrate(
-        0.003, 0.001), r"sensor .grows. must .* the same shape.*got \(1,\), then \(2"),
+        0.003, 0.001), r"sensor .grows. must .* the same shape.*got \([12],\), then \([23]"),
     (lambda: clamped().run(1.0, min_step=2), "min_step must be at most 1.*got 2"),
     (lambda: Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamCable(5), MATERIAL),
      "give width=, that of a rectangle, or section="),
